@@ -43,6 +43,7 @@ __all__ = [
     "KinematicViscosity",
     "Length",
     "LengthUnit",
+    "Level",
     "Mass",
     "Modulus",
     "Permeance",
@@ -203,6 +204,7 @@ SPECIFIC_HEAT = Kind("a specific heat", "J/kg/K", "385 J/kg/K", ("J/kg/K", "kJ/k
 CONDUCTANCE = Kind("a thermal conductance", "W/K", "0.6 W/K", ("W/K", "mW/K"))
 HEAT_TRANSFER = Kind("a heat transfer coefficient", "W/m^2/K", "12 W/m^2/K", ("W/m^2/K",))
 EXPANSION = Kind("a coefficient over temperature", "1/K", "12e-6 1/K", ("1/K", "um/m/K"))
+LEVEL = Kind("a level", "dB", "35 dB", ("dB",), {"dB": 1.0, "dBA": 1.0, "dB(A)": 1.0})
 RATIO = Kind(
     "a number without unit",
     "-",
@@ -712,6 +714,7 @@ SpecificHeat = Annotated[float, *typed(SPECIFIC_HEAT)]
 ThermalConductance = Annotated[float, *typed(CONDUCTANCE)]
 HeatTransfer = Annotated[float, *typed(HEAT_TRANSFER)]
 Expansion = Annotated[float, *typed(EXPANSION)]
+Level = Annotated[float, *typed(LEVEL)]
 Ratio = Annotated[float, *typed(RATIO)]
 LengthUnit = Annotated[
     float,

@@ -19,17 +19,19 @@ from scipy.integrate import quad
 
 from klack.acoustics.drive_pattern import drive_pattern
 from klack.acoustics.force_bands import averaged, force_bands
+from klack.acoustics.impulsive import impulsive_prominence, prominence_of_levels
 from klack.acoustics.signal_statistics import (
     EXPOSURE_REFERENCE,
-    a_weighted,
-    a_weighting,
     crest_factor,
     equivalent_level,
+    fast_square,
     kurtosis,
     peak_level,
     pressure_third_octaves,
     sound_exposure_level,
     sound_statistics,
+    weighted,
+    weighting,
 )
 from klack.acoustics.sound import (
     audio_band,
@@ -359,7 +361,7 @@ def test_a_weighting_has_the_magnitude_and_the_causality_of_its_filter():
 
     impulse = np.zeros(RATE)
     impulse[4800] = 1.0
-    response = a_weighted(sound(impulse)).values
+    response = weighted(sound(impulse)).values
     f = np.array([31.5, 100.0, 1e3, 4e3, 10e3])
     zeros, poles = (
         [0.0] * 4,
@@ -369,9 +371,85 @@ def test_a_weighting_has_the_magnitude_and_the_causality_of_its_filter():
     turned = np.exp(-2j * pi * np.outer(f, np.arange(RATE) - 4800) / RATE) @ response
 
     np.testing.assert_allclose(turned, analogue[:-1] / np.abs(analogue[-1]), atol=2e-5)
-    np.testing.assert_allclose(np.abs(turned), a_weighting(f), atol=2e-5)
+    np.testing.assert_allclose(np.abs(turned), np.abs(weighting(f)), atol=2e-5)
     # ringing of the sharp end at 24 kHz alone comes ahead
     assert np.sum(response[:4752] ** 2) < 1e-3 * np.sum(response**2)
+
+
+def test_c_weighting_is_that_of_the_table_and_of_its_filter():
+    """IEC 61672-1:2013, Table 3, one decimal; phase of four poles and two zeros at 0 Hz."""
+    from scipy.signal import freqs_zpk
+
+    table = {31.5: -3.0, 63: -0.8, 125: -0.2, 500: 0.0, 2e3: -0.2, 4e3: -0.8, 8e3: -3.0, 16e3: -8.5}
+    exact = 10.0 ** (np.round(10.0 * np.log10(list(table))) / 10.0)
+    level = 20.0 * np.log10(np.abs(weighting(exact, "C")))
+    poles = -2.0 * pi * np.array([20.598997, 20.598997, 12194.217, 12194.217])
+    analogue = freqs_zpk([0.0] * 2, poles, 1.0, worN=2.0 * pi * np.append(exact, 1e3))[1]
+
+    np.testing.assert_allclose(level, list(table.values()), atol=0.051)
+    np.testing.assert_allclose(weighting(exact, "C"), analogue[:-1] / np.abs(analogue[-1]))
+
+
+def test_the_fast_level_of_a_tone_and_of_a_click():
+    """A steady tone: its level; a click: that of the exposure over 125 ms, less half its length."""
+    tail = sound(np.concatenate((20e-6 * np.sqrt(2e5) * np.ones(5), np.zeros(4800))))
+    mean = fast_square(tail)
+    energy = np.sum(tail.values**2) * tail.step
+    # the mean over (t - s) of 2 samples of 21 us: 3e-4 of the square
+    assert mean.max() == pytest.approx(energy / 0.125, rel=5e-4)
+    assert mean[5 + 4799 - 1] == pytest.approx(mean[4] * np.exp(-4799 * tail.step / 0.125))
+    assert sound_statistics(tone(70.0)).fast_level_A == pytest.approx(70.0, abs=0.02)
+    # two periods end at the same level; a period of 0.1 s has 10 lg e^(0.1/0.125) = 3.47 dB
+    click = sound(np.concatenate(([1.0], np.zeros(4799))))
+    steady = 10.0 * np.log10(fast_square(click, periodic=True))
+    assert steady[0] - steady[-1] == pytest.approx(10.0 / np.log(10.0) * 4799 / 6000, rel=1e-9)
+
+
+@pytest.mark.parametrize("level", [20.0, 30.0, 40.0, 50.0, 60.0])
+@pytest.mark.parametrize("background", [20.0, 30.0, 40.0])
+def test_a_click_on_steady_noise_is_as_prominent_as_by_hand(level, background):
+    """The rise is one step: LD = 10 lg(1 + 10^((L_AE + 9.03 - L_b)/10)), OR = LD / 20 ms.
+
+    The click rings for 0.1 ms and its A-weighting for some more: 0.03 dB of the fast level.
+    """
+    click = burst(6e-3, 4800, width=0.05e-3)
+    scale = 10.0 ** (0.05 * (level - sound_statistics(sound(click)).exposure_level_A))
+    pattern = drive_pattern(sound(scale * click), 1.0 / 8.0, 8.0)
+
+    found = impulsive_prominence(pattern, background)
+
+    rise = 10.0 * np.log10(1.0 + 10.0 ** (0.1 * (level - background)) / 0.125)
+    assert found.level_difference == pytest.approx(rise, abs=0.03)
+    assert found.onset_rate == pytest.approx(found.level_difference / 0.02, rel=1e-9)
+    expected = 3.0 * np.log10(rise / 0.02) + 2.0 * np.log10(rise)
+    # 5 dP/P of a small rise: dP = 5 lg(e) d(LD)/LD
+    assert found.prominence == pytest.approx(expected, abs=0.003 + 2.2 * 0.03 / rise)
+    assert found.adjustment == pytest.approx(max(0.0, 1.8 * (found.prominence - 5.0)))
+
+
+@pytest.mark.parametrize("rate", [0.5, 1.0, 5.0, 10.0, 20.0])
+def test_a_train_stands_out_from_what_is_left_of_the_click_before(rate):
+    """Between clicks the level falls by 10 lg e / 125 ms = 34.74 dB/s, one step excepted."""
+    pattern = drive_pattern(sound(burst(6e-3, 2400, width=0.05e-3)), rate, 2.0)
+
+    found = impulsive_prominence(pattern)
+
+    fall = 10.0 / np.log(10.0) / 0.125
+    assert found.level_difference == pytest.approx(fall * (1.0 / rate - 0.02), abs=0.05)
+
+
+def test_a_short_pause_does_not_part_a_rise():
+    """By hand: three steps up by 3 dB, a pause, three more; 1 dB in 20 ms is 50 dB/s."""
+    rise = [0.0, 3.0, 6.0, 9.0]
+    one = prominence_of_levels(np.array([*rise, 8.9, *(8.9 + np.array(rise[1:]))]), 0.02)
+    two = prominence_of_levels(np.array([*rise, 9.0, 9.0, 9.0, *(9.0 + np.array(rise[1:]))]), 0.02)
+    flat = prominence_of_levels(np.linspace(0.0, 1.9, 20), 0.02)
+
+    assert one.level_difference == pytest.approx(17.9)
+    assert (two.level_difference, two.onset_rate) == (pytest.approx(9.0), pytest.approx(150.0))
+    assert two.prominence == pytest.approx(3.0 * np.log10(150.0) + 2.0 * np.log10(9.0))
+    assert np.isnan(flat.prominence)
+    assert flat.adjustment == 0.0
 
 
 def test_bands_of_a_sound_hold_all_of_its_energy():

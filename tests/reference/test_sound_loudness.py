@@ -14,7 +14,7 @@ import pytest
 from klack.acoustics.drive_pattern import drive_pattern
 from klack.acoustics.loudness import loudness_level, time_varying_loudness
 from klack.acoustics.nonlinear_decay import nonlinear_decay
-from klack.acoustics.signal_statistics import a_weighted, a_weighting, pressure_third_octaves
+from klack.acoustics.signal_statistics import pressure_third_octaves, weighted, weighting
 from klack.acoustics.sound import click_pressure
 from klack.acoustics.third_octave import band_edges, band_energies, middle_frequencies
 from klack.errors import InputError
@@ -139,7 +139,7 @@ def test_levels_are_those_of_pyoctaveband(what):
 
 def test_a_weighting_is_that_of_the_table():
     nominal = np.array(list(A_TABLE))
-    level = 20.0 * np.log10(a_weighting(10.0 ** (np.round(10.0 * np.log10(nominal)) / 10.0)))
+    level = 20.0 * np.log10(np.abs(weighting(10.0 ** (np.round(10.0 * np.log10(nominal)) / 10.0))))
 
     np.testing.assert_allclose(level, list(A_TABLE.values()), atol=0.05 + 1e-9)  # one decimal
 
@@ -153,7 +153,7 @@ def test_a_weighted_level_of_noise_is_that_of_pyoctaveband():
     low[np.fft.rfftfreq(values.size, 1.0 / RATE) > 8e3] = 0.0
     values = np.fft.irfft(low)
     theirs = WeightingFilter(RATE, "A").filter(values)
-    ours = a_weighted(TimeSeries(step=1.0 / RATE, values=values, unit="Pa")).values
+    ours = weighted(TimeSeries(step=1.0 / RATE, values=values, unit="Pa")).values
 
     ratio = np.sum(ours**2) / np.sum(np.asarray(theirs) ** 2)
     assert 10.0 * np.log10(ratio) == pytest.approx(0.0, abs=0.2)

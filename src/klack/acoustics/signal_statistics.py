@@ -1,7 +1,8 @@
 """Single numbers of a sound: levels, and how impulsive it is."""
 
 from dataclasses import dataclass
-from math import log10
+from math import exp, log10
+from typing import Literal
 
 import numpy as np
 import scipy
@@ -12,37 +13,38 @@ from klack.signals.sampled import Spectrum, TimeSeries
 
 __all__ = [
     "EXPOSURE_REFERENCE",
+    "FAST",
     "PRESSURE_REFERENCE",
     "SoundStatistics",
-    "a_weighted",
-    "a_weighting",
     "crest_factor",
     "equivalent_level",
+    "fast_square",
     "kurtosis",
     "peak_level",
     "pressure_third_octaves",
     "sound_exposure_level",
     "sound_statistics",
+    "weighted",
+    "weighting",
 ]
 
 
 # pole frequencies [Hz] of IEC 61672-1:2013, E.4.1, to the digits the standard's formulas give
 _F1, _F2, _F3, _F4 = 20.598997, 107.65265, 737.86223, 12194.217
+_POLES = {"A": (_F1, _F1, _F2, _F3, _F4, _F4), "C": (_F1, _F1, _F4, _F4)}
+_ZEROS = {"A": 4, "C": 2}  # at 0 Hz
 _PADDING = 0.25  # [s] for the weighting to die out: longer than 1 / 20 Hz
+Letter = Literal["A", "C"]
 
 
-def _unnormalised(f: NDArray[np.float64]) -> NDArray[np.float64]:
-    s = f * f
-    low = (s + _F1**2) * np.sqrt((s + _F2**2) * (s + _F3**2))
-    out: NDArray[np.float64] = _F4**2 * s * s / (low * (s + _F4**2))
-    return out
+def weighting(frequency: ArrayLike, letter: Letter = "A") -> NDArray[np.complex128]:
+    r"""Frequency weighting A or C with the phase of its filter, of size 1 at 1 kHz.
 
+    .. math:: H(f) = \frac{R(f)}{|R(1\,\mathrm{kHz})|}, \qquad
+              R = \frac{(if)^z}{\prod_k (if + f_k)}
 
-def a_weighting(frequency: ArrayLike) -> NDArray[np.float64]:
-    r"""A-weighting as amplitude factor, 1 at 1 kHz.
-
-    .. math:: A(f) = \frac{R(f)}{R(1\,\mathrm{kHz})}, \qquad
-              R = \frac{f_4^2 f^4}{(f^2+f_1^2)\sqrt{(f^2+f_2^2)(f^2+f_3^2)}\,(f^2+f_4^2)}
+    with two poles at 20.6 Hz and two at 12.2 kHz; A has two more, at 107.7 and 737.9 Hz, and
+    z = 4 instead of 2.
 
     Parameters
     ----------
@@ -50,26 +52,28 @@ def a_weighting(frequency: ArrayLike) -> NDArray[np.float64]:
 
     Examples
     --------
-    >>> (20.0 * np.log10(a_weighting([100.0, 1000.0]))).round(1).tolist()
+    >>> (20.0 * np.log10(np.abs(weighting([100.0, 1000.0])))).round(1).tolist()
     [-19.1, 0.0]
+    >>> (20.0 * np.log10(np.abs(weighting([31.5, 8000.0], "C")))).round(1).tolist()
+    [-3.0, -3.0]
     """
-    f = np.asarray(frequency, dtype=float)
-    out: NDArray[np.float64] = _unnormalised(f) / _unnormalised(np.array(1000.0))
-    return out
+
+    def response(f: NDArray[np.float64]) -> NDArray[np.complex128]:
+        s = 1j * f
+        return np.asarray(s ** _ZEROS[letter] / np.prod([s + pole for pole in _POLES[letter]], 0))
+
+    return response(np.asarray(frequency, dtype=float)) / abs(response(np.array(1000.0)))
 
 
-def a_weighted(pressure: TimeSeries) -> TimeSeries:
-    """Sound pressure weighted by A over its spectrum, with the phase of the standard's filter.
-
-    Poles: two at 20.6 Hz, one at 107.7 Hz, one at 737.9 Hz, two at 12.2 kHz; four zeros at 0 Hz.
+def weighted(pressure: TimeSeries, letter: Letter = "A") -> TimeSeries:
+    """Sound pressure weighted over its spectrum.
 
     Parameters
     ----------
     pressure [Pa]
     """
     n = scipy.fft.next_fast_len(pressure.values.size + int(_PADDING / pressure.step), real=True)
-    f = scipy.fft.rfftfreq(n, pressure.step)
-    factor = a_weighting(f) * np.exp(1j * _phase(f))
+    factor = weighting(scipy.fft.rfftfreq(n, pressure.step), letter)
     return TimeSeries(
         step=pressure.step,
         values=scipy.fft.irfft(scipy.fft.rfft(pressure.values, n) * factor, n)[
@@ -77,16 +81,12 @@ def a_weighted(pressure: TimeSeries) -> TimeSeries:
         ],
         unit=pressure.unit,
         start=pressure.start,
-        name=f"{pressure.name}, A-weighted",
+        name=f"{pressure.name}, {letter}-weighted",
     )
 
 
-def _phase(f: NDArray[np.float64]) -> NDArray[np.float64]:
-    poles = 2.0 * np.arctan(f / _F1) + np.arctan(f / _F2) + np.arctan(f / _F3)
-    out: NDArray[np.float64] = -(poles + 2.0 * np.arctan(f / _F4))  # four zeros turn by 2 pi
-    return out
-
-
+FAST = 0.125
+"""Time constant of the weighting F [s], IEC 61672-1."""
 PRESSURE_REFERENCE = 20e-6  # [Pa]
 EXPOSURE_REFERENCE = PRESSURE_REFERENCE**2  # [Pa^2 s], over 1 s
 
@@ -97,12 +97,14 @@ class SoundStatistics:
 
     Parameters
     ----------
-    peak_level [dB re 20 uPa]
-        Of the unweighted peak.
+    peak_level, peak_level_C [dB re 20 uPa]
+        Of the peak without weighting, and with C.
     exposure_level, exposure_level_A [dB re (20 uPa)^2 s]
         Energy of the whole record; per click where the record is one.
     equivalent_level_A [dB re 20 uPa]
         Energy mean over the record.
+    fast_level_A [dB re 20 uPa]
+        Highest with the time weighting F: that of the exposure + 9.0 dB for a click alone.
     kurtosis, crest_factor [-]
         Over the whole record, see there.
     duration [s]
@@ -116,6 +118,8 @@ class SoundStatistics:
     kurtosis: float
     crest_factor: float
     duration: float
+    peak_level_C: float = float("nan")
+    fast_level_A: float = float("nan")
 
 
 def sound_statistics(pressure: TimeSeries) -> SoundStatistics:
@@ -125,16 +129,37 @@ def sound_statistics(pressure: TimeSeries) -> SoundStatistics:
     ----------
     pressure [Pa]
     """
-    weighted = a_weighted(pressure)
+    audible = weighted(pressure, "A")
     return SoundStatistics(
         peak_level=peak_level(pressure),
         exposure_level=sound_exposure_level(pressure),
-        exposure_level_A=sound_exposure_level(weighted),
-        equivalent_level_A=equivalent_level(weighted),
+        exposure_level_A=sound_exposure_level(audible),
+        equivalent_level_A=equivalent_level(audible),
         kurtosis=kurtosis(pressure),
         crest_factor=crest_factor(pressure),
         duration=pressure.values.size * pressure.step,
+        peak_level_C=peak_level(weighted(pressure, "C")),
+        fast_level_A=_level(float(fast_square(audible).max()) / PRESSURE_REFERENCE**2),
     )
+
+
+def fast_square(pressure: TimeSeries, *, periodic: bool = False) -> NDArray[np.float64]:
+    """Mean square with the weighting F at the end of every sample [Pa^2].
+
+    Parameters
+    ----------
+    pressure [Pa]
+        A-weighted where the level is to be.
+    periodic
+        Whether the record has gone on like this for ever; else there was silence before.
+    """
+    stays = exp(-pressure.step / FAST)
+    square = pressure.values**2
+    mean, _ = scipy.signal.lfilter([1.0 - stays], [1.0, -stays], square, zi=[0.0])
+    if periodic:
+        left = stays ** np.arange(1, square.size + 1)
+        mean = mean + left * mean[-1] / (1.0 - left[-1])
+    return np.asarray(mean)
 
 
 def kurtosis(series: TimeSeries) -> float:

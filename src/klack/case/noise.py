@@ -12,6 +12,7 @@ from klack.units import (
     Density,
     Frequency,
     Length,
+    Level,
     Mass,
     Ratio,
     Rotation,
@@ -100,6 +101,14 @@ class CaseNoise(Section):
     distance: Length = Field(default=1.0, gt=0, description="From the valve to the listener.")
     air_density: Density = Field(default=1.204, gt=0, description="Of air at 20 degC.")
     sound_speed: Speed = Field(default=343.2, gt=0, description="In air at 20 degC.")
+    background: Level | None = Field(
+        default=None,
+        examples=["35 dB"],
+        ge=-20,
+        le=140,
+        description="A-weighted level of steady noise besides, re 20 uPa, which clicks stand out "
+        "from; default none.",
+    )
     drive: Annotated[NoiseDrive, Field(description="Pattern of clicks to listen to.")] = NoiseDrive(
         frequency=10.0
     )

@@ -295,6 +295,14 @@ def _assumptions(study: NoiseStudy) -> Section:
             lambda d: f"{d.settings.air_density:.4g} kg/m³, {d.settings.sound_speed:.4g} m/s",
         ),
         ("drive pattern", lambda d: f"{d.settings.rate:.4g} strokes per second"),
+        (
+            "steady noise besides",
+            lambda d: (
+                "none"
+                if d.settings.background is None
+                else quantity(d.settings.background, "dBA", 3)
+            ),
+        ),
         ("force from", lambda d: f"{d.kind} '{d.run}' of case {d.case}"),
         ("modes of the bodies", _modes),
     ):

@@ -97,6 +97,33 @@ CLICK_MEASURES: tuple[Measure[SoundStatistics], ...] = described_in(
         deviation="difference",
         page=True,
     ),
+    Measure(
+        key="peak_level_weighted",
+        json_name="peak_level_dBC",
+        name="peak level of a click, C-weighted",
+        symbol="L_Cpeak",
+        unit="dBC",
+        definition="Level of the largest pressure of one click with weighting C, re 20 µPa.",
+        read=lambda click: click.peak_level_C,
+        form="fixed",
+        digits=1,
+        deviation="difference",
+        page=True,
+    ),
+    Measure(
+        key="fast_level",
+        json_name="fast_level_dBA",
+        name="highest level of a click, A-weighted, fast",
+        symbol="L_AFmax",
+        unit="dBA",
+        definition="Highest level of one click with the frequency weighting A and the time "
+        "weighting F (125 ms), re 20 µPa: what a sound level meter shows.",
+        read=lambda click: click.fast_level_A,
+        form="fixed",
+        digits=1,
+        deviation="difference",
+        page=True,
+    ),
 )
 """Of one click: these need no more than its pressure."""
 
@@ -232,6 +259,38 @@ DESIGN_MEASURES: tuple[Measure[NoiseDesign], ...] = described_in(
         digits=3,
         column=Column("acum", 1.0, ".3g"),
         deviation="factor",
+        page=True,
+    ),
+    Measure(
+        key="impulsive_prominence",
+        name="impulsive prominence of the drive pattern",
+        symbol="P",
+        definition="3 lg(OR/(dB/s)) + 2 lg(LD/dB) of the most prominent rise of the level with the "
+        "weightings A and F in steps of 20 ms, ISO/PAS 1996-3; above the steady noise of the case, "
+        "or above what is left of the click before.",
+        source=_SOUND,
+        read=_heard(
+            lambda sound: None if sound.prominence is None else sound.prominence.prominence
+        ),
+        form="fixed",
+        digits=2,
+        deviation="difference",
+        page=True,
+    ),
+    Measure(
+        key="impulse_adjustment",
+        name="adjustment for impulsive sound",
+        symbol="K_I",
+        unit="dB",
+        definition="1.8 (P - 5) dB of an impulsive prominence P above 5, else 0: added to the "
+        "equivalent level where a noise is rated; above 9 dB beyond the usual range of the method.",
+        source=_SOUND,
+        read=_heard(
+            lambda sound: None if sound.prominence is None else sound.prominence.adjustment
+        ),
+        form="fixed",
+        digits=1,
+        deviation="difference",
         page=True,
     ),
     Measure(

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.acoustics.impulsive import Prominence
 from klack.acoustics.loudness import Loudness
 from klack.acoustics.signal_statistics import SoundStatistics
 from klack.acoustics.third_octave import ThirdOctaves
@@ -168,6 +169,8 @@ class ClickSound:
         Of the drive pattern, over whole periods.
     loudness
         Of one click.
+    prominence
+        Of the drive pattern; None in results of former versions.
     """
 
     pressure: TimeSeries
@@ -175,6 +178,7 @@ class ClickSound:
     bands: ThirdOctaves
     pattern: SoundStatistics
     loudness: Loudness
+    prominence: Prominence | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -196,6 +200,8 @@ class NoiseSettings:
         Of the drive pattern.
     given
         Whether the case has such a section.
+    background [dB re 20 uPa]
+        A-weighted level of steady noise besides, which clicks stand out from.
     """
 
     mount: str
@@ -207,6 +213,7 @@ class NoiseSettings:
     rate: float
     duration: float
     given: bool
+    background: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from klack.acoustics.drive_pattern import drive_pattern
 from klack.acoustics.force_bands import force_bands
+from klack.acoustics.impulsive import impulsive_prominence
 from klack.acoustics.loudness import time_varying_loudness
 from klack.acoustics.mount import Mount
 from klack.acoustics.plate import Air, Plate
@@ -284,6 +285,7 @@ def _settings(source: NoiseSource) -> NoiseSettings:
         rate=noise.drive.rate,
         duration=noise.drive.duration,
         given=source.given,
+        background=noise.background,
     )
 
 
@@ -330,6 +332,7 @@ def _heard(pressure: TimeSeries, source: NoiseSource, clock: StageClock) -> Clic
         bands=bands,
         pattern=of_pattern,
         loudness=time_varying_loudness(pressure),
+        prominence=impulsive_prominence(pattern, source.noise.background),
     )
 
 
