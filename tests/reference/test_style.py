@@ -13,7 +13,8 @@ ROOT = Path(__file__).parents[2]
 STYLE = ROOT / "docs" / "project" / "style.md"
 _ROW = re.compile(r"^\| *(?P<term>[^|]+?) *\| *[^|]+\| *(?P<avoid>[^|]*?) *\|$", re.MULTILINE)
 _CODE = re.compile(
-    r"^( *)(`{3,}|~{3,}).*?^\1\2|``.+?``|`[^`]+`|\]\([^)]*\)|^ *\w[\w, ]* : .*?$",
+    r"^( *)(`{3,}|~{3,}).*?^\1\2|``.+?``|`[^`]+`|\]\([^)]*\)"
+    r"|^ *\w[\w, ]* : .*?$|^ *\w+(?:, \w+)* [(\[][^\n]*[)\]]$",  # entries of parameter lists
     re.DOTALL | re.MULTILINE,
 )
 
