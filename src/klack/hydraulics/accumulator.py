@@ -25,20 +25,17 @@ class Accumulator(Component):
               U = \frac{p V_g - p_0 V_0}{n - 1} - p_{amb}(V_0 - V_g)
 
     with the absolute precharge ``p_0`` and the fluid volume ``V``.  Below the precharge it is
-    empty: the wall rests on its stop and holds no pressure; when the gas has shrunk to
-    ``full_at`` of its volume it is full and takes no more.  Both are warned of, once.  Energies of
-    the gas and of the compressed fluid inside are a store.  With ``inlet_diameter`` the fluid
-    passes an orifice; without it the pressure of the node is that of the gas.
+    empty: the wall rests on its stop and holds no pressure; with the gas at ``full_at`` of its
+    volume it is full.  Both are warned of, once.  Energies of the gas and of the compressed fluid
+    inside are a store.  With ``inlet_diameter`` the fluid passes an orifice; without it the
+    pressure of the node is that of the gas.
 
-    At the start it is in equilibrium with its node.
+    It starts in equilibrium with its node, which needs a chamber beside it, however small.
 
-    The node needs a chamber beside it, however small.
-
-    Limits: one exponent, so no exchange of heat over time: ``n`` = 1 for slow, 1.4 for fast changes
-    of nitrogen at moderate pressure; above 200 bar real gas is stiffer (n up to 1.8).  The
-    pressure inside follows by an implicit step of first order, whose loss is counted: fine for
-    changes that take many steps.
-    Source: Findeisen, Oelhydraulik, 5th ed. 2006, ch. on accumulators; polytropic change of state.
+    Limits: one exponent: ``n`` = 1 for slow, 1.4 for fast changes of nitrogen at moderate pressure;
+    above 200 bar real gas is stiffer (n up to 1.8).  The pressure inside follows by an implicit
+    step of first order, whose loss is counted: fine for changes that take many steps.  Source:
+    Findeisen, Oelhydraulik, 5th ed. 2006, ch. on accumulators; polytropic change of state.
     """
 
     type: ClassVar[str] = "accumulator"

@@ -1,17 +1,15 @@
 r"""Area of a needle below its narrowest sections on a conical seat, where the tip pressure acts.
 
-The passage has up to three narrow sections in series: the *upper* one, between the edge of the
-needle or its shank and the seat, the *lower* one, between the cone of the tip and the lower end of
-the seat, and the bore.  As of orifices with one flow coefficient, each takes a share of the
-pressure drop with one over the square of its area,
+Up to three narrow sections are in series: the *upper* one between edge or shank and seat, the
+*lower* one between the cone of the tip and the lower end of the seat, and the bore.  Like orifices
+with one flow coefficient, each takes a share of the pressure drop with one over the square of its
+area,
 
 .. math:: S(x) = \pi\,\frac{r_u^2\,A_u^{-2} + r_l^2\,A_l^{-2}}{A_u^{-2} + A_l^{-2} + A_b^{-2}} ,
 
-where ``r`` are the radii of the needle at the upper and the lower section; at the bore all of the
-needle is above.  Closed, ``A_u`` is zero and ``S`` the area within the circle of contact; far open
-the bore takes all and ``S`` tends to zero.  Each area is the minimum over closed parts of both
-contours, so it is continuous in the lift, and so is ``S`` where the place of the minimum is; that
-moves with a step where another corner becomes the nearer one (chamfer, blunt tip).
+with the radii ``r`` of the needle at both; at the bore all of the needle is above.  Closed, ``S``
+is the area within the circle of contact; far open it tends to zero.  Each area is continuous in the
+lift; ``S`` steps where another corner becomes the nearest one (chamfer, blunt tip).
 
 Limits: the pressure steps at the sections, each jet is dissipated before the next one; what its
 momentum takes from the pressure beside the section is the flow force of the seat.
@@ -81,11 +79,10 @@ def _lower(par: Any, base: int, edge: int, x: float) -> tuple[float, float]:
 
 @njit(error_model="numpy")
 def acting_area(par: Any, base: int, edge: int, x: float, bore: float) -> float:
-    """Area ``S`` [m^2] at the lift ``x`` [m]; the last argument is the area [m^2] of the bore.
+    """Area ``S`` [m^2] at the lift ``x`` [m] with the area ``bore`` [m^2].
 
-    ``par`` from ``base`` on as for
-    :func:`~klack.hydraulics.narrowest_mantle.narrowest_mantle`; ``edge`` is the number of the point
-    of the needle where the cone of the tip ends.
+    ``par`` from ``base`` on as for :func:`~klack.hydraulics.narrowest_mantle.narrowest_mantle`;
+    ``edge`` is the point of the needle where the cone of the tip ends.
     """
     upper, r_u = _upper(par, base, edge, x)
     lower, r_l = _lower(par, base, edge, x)

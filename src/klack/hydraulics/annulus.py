@@ -50,7 +50,7 @@ def annulus_step(par: Any, state: Any, inp: Any, out: Any) -> int:
 
 @step_function
 def annulus_under_pressure_step(par: Any, state: Any, inp: Any, out: Any) -> int:
-    """Step of :func:`annulus_step` with ``par`` behind it: the two numbers of the viscosity law."""
+    """Step of :func:`annulus_step` with the two numbers of the viscosity law behind ``par``."""
     h, p_a, p_b = inp[1], inp[2], inp[3]
     rho_a, rho_b = inp[4], inp[5]
     needle = body = 0.0
@@ -78,10 +78,9 @@ class Annulus(Component):
               F_{n,b} = \frac{\pi d c}{2}\,(p_a - p_b)
                   \mp \frac{\mu \pi d l}{c \sqrt{1 - \varepsilon^2}}\,(v_n - v_b)
 
-    Couette-Poiseuille flow: the walls drag fluid along, and the pressure drop over the gap pushes
-    both walls, half of it each.  Flow and force carry the same factor ``pi d c/2``, so that what
-    the fluid does to the walls is exactly what they take from the flow, and the rest,
-    ``k dp^2 + drag v^2``, is heat.
+    Couette-Poiseuille flow: the walls drag fluid along, and the pressure drop pushes both walls,
+    half of it each.  Flow and force have the same factor ``pi d c/2``, so that the work on the
+    walls is exactly that taken from the flow, and the rest, ``k dp^2 + drag v^2``, is heat.
 
     Port a is the lower end: positive flow runs along +z.  A body that is not joined rests.  Face
     areas beside the gap: that of the needle is ``pi/4 d^2``, the strip ``pi d c`` belongs to this

@@ -23,19 +23,18 @@ class Chamber(Component):
     .. math:: \frac{dm}{dt} = \sum \dot m, \qquad V \varrho(p) = m, \qquad
               V = V_0 + \sum_i A_i y_i
 
-    The state is the *mass*, the pressure follows from the density of the fluid: nothing drifts,
-    with gas and vapour too, where the usual ``dp/dt = K/V (sum Q - dV/dt)`` loses mass whenever
-    ``K`` changes in a step.  Walls are :class:`~klack.hydraulics.pressure_face.PressureFace`.  The
-    hydraulic spring on a face is ``K A^2/V``, 1e6 to 1e8 N/m in a valve.
+    The state is the *mass*, which nothing makes drift, while the usual ``dp/dt = K/V (sum Q -
+    dV/dt)`` loses mass whenever ``K`` changes in a step (gas, vapour).  Walls are
+    :class:`~klack.hydraulics.pressure_face.PressureFace`.  The hydraulic spring on a face is ``K
+    A^2/V``, 1e6 to 1e8 N/m in a valve.
 
     With a section ``wall`` its volume also grows with the pressure, ``dV = V_0 dp/K_wall`` from
     that of the surroundings on; the strain energy of the wall is a store.  That share follows by
     an implicit step of first order, whose loss is counted: damping ratios of ``omega h/4`` times
     the share of the wall in the compliance.
 
-    Limits: one pressure, so shorter than 1/20 of a wave; isothermal.  Choose the volume at y = 0
-    large enough for every face that moves in: a volume that vanishes stops the run.
-    Source: Merritt 1967, sec. 3-8.
+    Limits: one pressure, so shorter than 1/20 of a wave; isothermal.  A volume that vanishes as
+    faces move in stops the run.  Source: Merritt 1967, sec. 3-8.
     """
 
     type: ClassVar[str] = "chamber"

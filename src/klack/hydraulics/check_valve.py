@@ -19,7 +19,7 @@ __all__ = ["CheckValve", "check_valve_step"]
 
 @step_function
 def check_valve_step(par: Any, state: Any, inp: Any, out: Any) -> int:
-    """Flow at the opening that belongs to the pressure drop.
+    """Flow at the opening of the pressure drop.
 
     ``par``: 0-3 of the opening, 4 cracking pressure, 5 that of the full area, 6 leak area, 7 area
     when open less that; the state is the area.
@@ -44,9 +44,9 @@ class CheckValve(OpeningComponent):
 
     with the flow of an orifice of that area.  The spring holds the poppet shut up to the cracking
     pressure ``p_c`` and lets it lift in proportion beyond; from ``p_1`` on it is fully open.  Flow
-    and pressure drop always have the same sign, so the valve only dissipates.  The area is
-    straight, not rounded where it begins: rounded, the flow would have a double zero there, which
-    no static equilibrium of a closed volume behind the valve is found from.
+    and pressure drop always have the same sign, so the valve only dissipates.  The area is not
+    rounded where it begins: the flow would have a double zero there, from which no static
+    equilibrium of a closed volume behind the valve is found.
 
     Limits: no inertia of the poppet, no impact and no chatter; for these take a ``rigid-mass`` with
     ``seat``, ``pressure-face``, ``spring`` and ``end-stop``.  Pressures of the spring are

@@ -50,9 +50,8 @@ def _pass(par: Any, state: Any, inp: Any, out: Any, law: int, base: int) -> None
 def conical_seat_step(par: Any, state: Any, inp: Any, out: Any) -> int:
     """Flow at the mean lift of the step, and the forces of the flow.
 
-    ``par``: 0 unused, 1 circumference of the seal, 2-3 unused, 4-15 those of
-    :func:`~klack.hydraulics.seat.seat_step`, from 16 on the contours for
-    :func:`~klack.hydraulics.narrowest_mantle.narrowest_mantle`.
+    ``par``: 1 circumference of the seal, 4-15 those of :func:`~klack.hydraulics.seat.seat_step`,
+    from 16 on the contours for :func:`~klack.hydraulics.narrowest_mantle.narrowest_mantle`.
     ``state``: those of the seat, and the acting diameter.
     """
     _pass(par, state, inp, out, 0, 16)
@@ -68,7 +67,7 @@ def conical_seat_under_pressure_step(par: Any, state: Any, inp: Any, out: Any) -
 
 @inner(error_model="numpy")
 def _acting_pass(par: Any, state: Any, inp: Any, out: Any, law: int, base: int) -> None:
-    """Pass of the seat, and what the faces with their constant area leave out."""
+    """Pass of the seat with the correction of the faces."""
     _pass(par, state, inp, out, law, base)
     p_a, p_b, rho_a, rho_b = inp[2], inp[3], inp[4], inp[5]
     side, edge = par[base - 3], int(par[base - 1])  # 1: the tip is at b, -1: at a
@@ -132,9 +131,8 @@ class ConicalSeat(OpeningComponent):
     .. math:: F = (S(x) - S(0))\,(p_{tip} - p_{shank}), \qquad Q = (S(x) - S(0))\,\dot x
 
     with the acting area ``S`` of :mod:`~klack.hydraulics.acting_area`, and takes the volume ``Q``
-    that this area sweeps from the side of the tip to the other one, so that the work on the needle
-    is exactly that of the fluid (virtual work).  The channel ``acting diameter`` is then that of
-    ``S``.
+    that this area sweeps from the side of the tip to the other one (virtual work).  The channel
+    ``acting diameter`` is then that of ``S``.
 
     Limits: concentric, quasi-steady, rigid; of two narrow sections only the narrower one counts for
     the flow.  Without ``tip_side`` the faces keep their diameters.  The contours beyond the ends of
@@ -300,7 +298,7 @@ class ConicalSeat(OpeningComponent):
 
     @property
     def sealing_diameter(self) -> float:
-        """Where the closed needle touches the seat [m]: that of the pressure faces."""
+        """Diameter [m] of contact and of the pressure faces."""
         return 2.0 * self.contour.seal(self.half_angle)[0]
 
     @property
@@ -310,16 +308,13 @@ class ConicalSeat(OpeningComponent):
         return self.contour.numbers(self.half_angle, lower, upper)
 
     def opening(self, lift: float) -> tuple[float, float]:
-        """Flow area [m^2] and acting diameter [m] at a lift [m]; a negative one is closed."""
+        """Flow area [m^2] and acting diameter [m] at a lift [m], closed below zero."""
         area, radius = narrowest_mantle(np.array(self.contours), 0, max(lift, 0.0))
         bore = pi / 4.0 * self.lower_diameter**2
         return (float(area), 2.0 * float(radius)) if area <= bore else (bore, 0.0)
 
     def parameters(self, viscosity: float, vapour_pressure: float) -> tuple[float, ...]:
-        """First 16 that :func:`conical_seat_step` takes, for a viscosity [Pa s] and pressure [Pa].
-
-        They are those of a ``seat`` but for its shape.
-        """
+        """First 16 of :func:`conical_seat_step`, those of a ``seat`` but for its shape."""
         contraction = NOT_CHOKED if self.cavitation is None else self.cavitation
         leak_size = sqrt(4.0 * self.leak_area / pi)
         force, around = self.flow_force, pi * self.sealing_diameter
@@ -370,7 +365,7 @@ class ConicalSeat(OpeningComponent):
         )
 
     def acting_area(self, lift: float) -> float:
-        """Area [m^2] on which the pressure at the tip acts, at a lift [m] of zero or more."""
+        """Area [m^2] on which the tip pressure acts, at a lift [m] of zero or more."""
         bore = pi / 4.0 * self.lower_diameter**2
         return float(acting_area(np.array(self.contours), 0, self.contour.edge_point, lift, bore))
 
@@ -379,7 +374,7 @@ class ConicalSeat(OpeningComponent):
         return side, self.acting_area(0.0), float(self.contour.edge_point)
 
     def _check_faces(self, rows: Rows) -> None:
-        """Faces with another diameter would be corrected from a diameter that they do not have."""
+        """Reject faces with another diameter, from which the correction would start."""
         seal = self.sealing_diameter
         for port in ("a", "b"):
             at_tip = port == self.tip_side

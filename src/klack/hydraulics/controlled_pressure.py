@@ -20,8 +20,8 @@ class ControlledPressure(Controlled):
     The controller's output is the absolute pressure [Pa], constant over a sample time: a rail or a
     pilot stage that is fast against the valve.  It gives and takes any flow.
 
-    Limits: the pressure jumps from one sample time to the next; a line or a chamber behind an
-    orifice makes it smooth.
+    Limits: the pressure jumps between sample times; a line or a chamber behind an orifice smooths
+    it.
     """
 
     type: ClassVar[str] = "controlled-pressure"

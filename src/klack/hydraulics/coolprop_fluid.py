@@ -1,15 +1,14 @@
-r"""Pure fluids from the equations of state of CoolProp, ``CoolProp:n-Dodecane``; an optional extra.
+"""Pure fluids from the equations of state of CoolProp, ``CoolProp:n-Dodecane``; an optional extra.
 
-At the temperature of the run the equation of state is tabulated once along the isentrope that
-starts at one atmosphere (or just above the vapour pressure, where that is higher), up to 2500 bar
-or the end of the equation.  Bulk modulus and density are those of
-:class:`~klack.hydraulics.property_table.CompressedLiquid`.  The viscosity is one exponential over
-pressure, least squares up to 350 bar at constant temperature, as for the pure fluids of the
-library.
+The equation of state is tabulated once along the isentrope that starts at the temperature of the
+run and one atmosphere (or just above the vapour pressure, where that is higher), up to 2500 bar or
+the end of the equation, as :class:`~klack.hydraulics.property_table.CompressedLiquid`.  The
+viscosity is one exponential over pressure, least squares up to 350 bar at constant temperature, as
+for the pure fluids of the library.
 
-Limits: pure fluids; freezing under pressure is not looked at; the viscosity above 350 bar, see
-:mod:`~klack.hydraulics.pressure_viscosity`.
-Source: Bell, Wronski, Quoilin and Lemort, Ind. Eng. Chem. Res. 53 (2014) 2498.
+Limits: pure fluids; no freezing under pressure; the viscosity above 350 bar, see
+:mod:`~klack.hydraulics.pressure_viscosity`.  Source: Bell, Wronski, Quoilin and Lemort, Ind. Eng.
+Chem. Res. 53 (2014) 2498.
 """
 
 from dataclasses import dataclass
@@ -54,7 +53,7 @@ def coolprop_fluid(name: str) -> FluidDefinition:
     MissingExtraError
         Without CoolProp.
     InputError
-        For a fluid that CoolProp does not have, or not with a viscosity.
+        For a fluid that it does not have, or not with a viscosity.
     """
     state = _state(name)
     import CoolProp
@@ -78,13 +77,7 @@ def coolprop_fluid(name: str) -> FluidDefinition:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EquationOfState:
-    """Properties of a fluid of CoolProp over temperature.
-
-    Parameters
-    ----------
-    name
-        With the prefix.
-    """
+    """Properties of a fluid of CoolProp; ``name`` has the prefix."""
 
     name: str
 

@@ -1,4 +1,4 @@
-"""Squeeze films between two faces that close: what stops a needle before metal touches metal."""
+"""Squeeze films, which stop a needle before metal touches metal."""
 
 from abc import abstractmethod
 from functools import cache
@@ -35,10 +35,9 @@ _LEAST_RISE = 20.0  # of a spherical face over its cut-off: below that it is nea
 
 
 def flow_factor(height: float) -> float:
-    r"""Pressure flow factor of an isotropic rough gap, ``phi = 1 - 0.9 exp(-0.56 h/sigma)``.
+    """Pressure flow factor of an isotropic rough gap, ``phi = 1 - 0.9 exp(-0.56 h/sigma)``.
 
-    The share of the flow of a smooth gap of the same mean height (Patir and Cheng 1978, for
-    surfaces without a direction).
+    Relative to a smooth gap of the same mean height (Patir and Cheng 1978).
 
     Parameters
     ----------
@@ -80,13 +79,12 @@ class Film(Section):
 
     .. math:: F = \Bigl(\frac{B}{h^3} + \frac{C}{h}\Bigr) V, \qquad h = \max(g, 0) + h_r
 
-    ``g`` is the gap of the law, ``h_r`` a cut-off that stands for the roughness: where the
-    asperities touch, some height is left for the fluid.  It also bounds the impulse that the film
-    can take, ``B/(2 h_r^2)``; without it a viscous film would never let the faces touch.
+    ``g`` is the gap of the law, ``h_r`` a cut-off that stands for the roughness: asperities leave
+    some height for the fluid.  It bounds the impulse of the film, ``B/(2 h_r^2)``; without it a
+    viscous film would never let the faces touch.
 
-    With ``roughness`` the film of the same height is harder: asperities stand in the way of the
-    fluid (:func:`mean_flow_factor`).  While the faces part the film pulls, at most with
-    ``(p - p_cav) A``: then it cavitates.
+    With ``roughness`` asperities resist the flow (:func:`mean_flow_factor`).  While the faces part
+    the film pulls, at most with ``(p - p_cav) A``: then it cavitates.
 
     Limits: both edges at one constant pressure; no inertia of the fluid (``rho h V / mu`` up to
     about 1); rigid faces in parallel (the bodies' own compliance is in series, see
@@ -144,14 +142,7 @@ class Film(Section):
         return _CUT_OFF_HEIGHTS * self.roughness if self.roughness else SMOOTH_CUT_OFF
 
     def film_row(self, viscosity: float, tension: float) -> FilmRow:
-        """Return the row of the film.
-
-        Parameters
-        ----------
-        viscosity [Pa s]
-        tension [Pa]
-            Pressure around the film less that at which it cavitates.
-        """
+        """Row of the film; ``tension`` [Pa]: pressure around it less that at which it cavitates."""
         cubic, linear = self.coefficients()
         factor = 1.0
         if self.roughness:
@@ -168,7 +159,7 @@ class Film(Section):
         return axial
 
     def row(self, rows: Rows) -> FilmRow:
-        """Return the row of the film in the fluid of a network."""
+        """Row of the film in the fluid of a network."""
         fluid = network_fluid(rows)
         around = rows.ambient.pressure if self.pressure is None else self.pressure
         cavitation = self.cavitation_pressure
@@ -181,7 +172,7 @@ class Film(Section):
     def _all_vapour(
         self, component: str, fluid: str, cavitation: float, around: float
     ) -> InputError:
-        """Error of a film in surroundings below its cavitation pressure, at a key that is given."""
+        """Error of a film in surroundings below its cavitation pressure."""
         limit, words = value_text(cavitation, "Pa"), value_text(around, "Pa")
         film = f"the film of '{component}'"
         if self.cavitation_pressure is not None:
@@ -230,8 +221,8 @@ class RingFilm(Film):
               - \frac{(R_2^2 - R_1^2)^2}{\ln(R_2/R_1)}\Bigr]
 
     (Reynolds' equation in polar coordinates), here as ``3 pi mu (R_1 R_2)^2 2 sinh t [cosh t -
-    sinh(t)/t]`` with ``t = ln(R_2/R_1)``, which keeps its digits for narrow rings.  A pocket inside
-    that is not vented is a chamber of its own.
+    sinh(t)/t]`` with ``t = ln(R_2/R_1)``, which keeps its digits for narrow rings.  An unvented
+    pocket inside is a chamber of its own.
     """
 
     shape: Literal["ring"] = Field(description="Which shape: ring.")
@@ -313,14 +304,12 @@ class SphereFilm(Film):
 
     Reynolds' equation with the parabola for the sphere (Cox and Brenner 1967).  Two spheres: ``R``
     with ``1/R = 1/R_1 + 1/R_2``.  The momentum lost between two heights is ``6 pi mu R^2`` times
-    the logarithm of their ratio, so roughness and the distance from which the film acts matter
-    little.
+    the logarithm of their ratio, so roughness and the first distance matter little.
 
-    The face ends at ``edge_radius`` ``a``, where the sphere has risen by ``s = a^2/2R``.  The exact
-    force of that face is the above times ``(s/(h + s))^2``: the film is too strong by ``2h/s`` at
-    small ``h``, its impulse by a factor of ``1/(1 - 1/ln(s/h_r))`` from ``h = s`` on.  So an
-    end stop takes a travel up to ``s``, and ``s`` must be 20 cut-offs or more: below that the face
-    is nearly a disc.
+    The face ends at ``edge_radius`` ``a``, where the sphere has risen by ``s = a^2/2R``.  Its exact
+    force is the above times ``(s/(h + s))^2``: the film is too strong by ``2h/s`` at small ``h``,
+    its impulse by a factor of ``1/(1 - 1/ln(s/h_r))`` from ``h = s`` on.  So an end stop takes a
+    travel up to ``s``, and ``s`` must be 20 cut-offs or more: below that the face is nearly a disc.
 
     ``roughness`` sets the cut-off only: the flow factor would add to the logarithm 0.007 at a
     cut-off of 3 roughnesses, 0.12 at one.

@@ -1,9 +1,8 @@
-r"""Flow forces on a needle, in addition to the pressure on its faces.
+"""Flow forces on a needle, in addition to the pressure on its faces.
 
-A jet that leaves a seat carries momentum away, so that the pressure near the edge is lower than in
-the chamber: the needle is drawn shut with ``rho Q v cos(theta)`` whichever way the fluid runs
-(Lee & Blackburn 1952).  A column of fluid along the needle that is accelerated pushes back with
-``rho L dQ/dt``.
+A jet carries momentum away, which lowers the pressure near the edge and draws the needle shut,
+whichever way the fluid runs (Lee & Blackburn 1952).  A column of fluid along the needle that is
+accelerated pushes back with ``rho L dQ/dt``.
 """
 
 from math import cos
@@ -23,8 +22,8 @@ class FlowForce(Section):
 
     along +z on the needle and, opposite, on the body.  The first term is ``rho Q v cos(theta)``
     with the jet's speed ``v = C_v sqrt(2 dp/rho)`` and equals ``2 C_q C_v A dp cos(theta)`` where
-    the flow is turbulent; it always closes.  Do not add it where the pressure on the land is
-    already taken from a flow computation.
+    the flow is turbulent; it always closes.  Not to be added where the pressure on the land is that
+    of a flow computation.
     """
 
     velocity_coefficient: Ratio = Field(

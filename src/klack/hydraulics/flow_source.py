@@ -21,7 +21,7 @@ __all__ = ["FlowSource", "FlowStep", "FlowTable"]
 
 @step_function
 def flow_source_step(par: Any, state: Any, inp: Any, out: Any) -> int:
-    """Flow of the middle of the step, whatever the pressures, and the work that takes.
+    """Flow of the middle of the step, and its work.
 
     ``par``: size of all, number ``n`` of times, ``n`` times, ``n`` mass flows, fluid table.
     ``state``: interval, and the places in the fluid table of both ends.
@@ -73,8 +73,8 @@ class FlowSource(Component):
     integral of ``dp/rho``) is counted as a supply.  Left alone, port a takes the fluid from the
     surroundings.  The flow is a volume at ambient density, times that density a mass flow.
 
-    Limits: a flow out of a chamber continues when the chamber is empty; the fluid's pressure then
-    falls to its lower end, and the run says so.
+    Limits: a flow out of an empty chamber continues; its pressure then falls to its lower end, and
+    the run says so.
     """
 
     type: ClassVar[str] = "flow-source"

@@ -28,9 +28,9 @@ class Fluid:
               K = -V \frac{dp}{dV}
 
     with ``rho_c`` of :class:`~klack.hydraulics.mixture.Vapour` and the gas of
-    :class:`~klack.hydraulics.mixture.EntrainedGas`.  ``rho`` and ``K`` come from the same ``V``,
-    so mass is conserved; formulas that adjust ``K`` alone lose it.  The density rises strictly
-    with pressure from 1 Pa on.
+    :class:`~klack.hydraulics.mixture.EntrainedGas`.  ``rho`` and ``K`` come from the same ``V``;
+    formulas that adjust ``K`` alone lose mass.  The density rises strictly with pressure from 1 Pa
+    on.
 
     Parameters
     ----------
@@ -40,10 +40,10 @@ class Fluid:
     pressure_viscosity [1/Pa]
         ``alpha`` of :func:`~klack.hydraulics.liquid.barus_viscosity`.
     known_range
-        Where more is known of it than what the liquid's law says of itself.
+        Where more is known than that of the liquid's law.
     viscosity_law
-        With one, orifices, seats, annuli and channels follow the viscosity over pressure, as do
-        lines and films; without, the former keep that at ambient pressure.
+        With one, orifices, seats, annuli and channels follow the viscosity over pressure, as lines
+        and films always do.
 
     Examples
     --------
@@ -89,18 +89,18 @@ class Fluid:
 
     @property
     def pressure_range(self) -> PressureRange:
-        """Absolute pressure range of the fluid description, with its source."""
+        """Absolute pressure range of the fluid description."""
         return self.known_range or self.liquid.pressure_range
 
     @property
     def kinks(self) -> tuple[float, ...]:
-        """Pressures [Pa] where the second derivative of the density jumps, increasing."""
+        """Increasing pressures [Pa] where the second derivative of the density jumps."""
         places = {*self.liquid.kinks, *self.gas.kinks, *self.vapour.kinks}
         return tuple(sorted(places))
 
     @property
     def mixture_mass(self) -> float:
-        """Mass [kg] of a cubic metre of mixture at the reference pressure, with all gas free."""
+        """Mass [kg] of 1 m^3 of mixture at the reference pressure, with all gas free."""
         reference = self.gas.reference_pressure
         liquid = (1.0 - self.gas.fraction) * float(self.liquid.density(reference))
         return liquid + self.gas.mass
@@ -111,7 +111,7 @@ class Fluid:
         return self.gas.release_time is not None and self.gas.fraction > 0.0
 
     def all_free(self) -> Self:
-        """Return this fluid with all of its gas free at every pressure."""
+        """Same fluid with all of its gas free at every pressure."""
         gas = replace(
             self.gas,
             release_pressure=None,
@@ -139,7 +139,7 @@ class Fluid:
         return v / np.sqrt(-slope)
 
     def _fast_volume(self, pressure: ArrayLike) -> tuple[Values, Values]:
-        """As :meth:`specific_volume`, its slope without gas that takes time to dissolve."""
+        """As :meth:`specific_volume`, with the slope without gas that takes time to dissolve."""
         v, slope = self.specific_volume(pressure)
         if self.has_release_times:
             p = np.maximum(np.asarray(pressure, dtype=float), LOWEST_PRESSURE)

@@ -273,7 +273,7 @@ class FluidChoice(NamedSection):
         return fluid if law is None else replace(fluid, viscosity_law=law)
 
     def _law(self, fluid: Fluid) -> PressureViscosity | None:
-        """Return the law of the viscosity over pressure that was chosen."""
+        """Chosen law of the viscosity over pressure."""
         if self.viscosity_law == "ambient":
             return None
         if fluid.pressure_viscosity == 0.0:

@@ -70,18 +70,18 @@ class MeasuredProperties:
     ----------
     pressure [Pa]
     molar_mass [kg/mol]
-    temperature : tuple [K]
-    density : tuple [kg/m^3]
-    bulk_modulus : tuple [Pa]
+    temperature [K]
+    density [kg/m^3]
+    bulk_modulus [Pa]
         Isentropic.
-    bulk_modulus_slope : tuple [-]
-    viscosity : tuple [Pa s]
-    pressure_viscosity : tuple [1/Pa]
-    vapour_pressure : tuple [Pa]
-    highest_pressure : tuple [Pa]
-        To which the properties hold; between the columns on straight lines.
+    bulk_modulus_slope [-]
+    viscosity [Pa s]
+    pressure_viscosity [1/Pa]
+    vapour_pressure [Pa]
+    highest_pressure [Pa]
+        To which the properties hold; straight lines between the columns.
     range_source
-        Where it comes from.
+        Of these pressures.
     """
 
     pressure: float
@@ -154,10 +154,10 @@ class MineralOil:
     walther_a, walther_b [-]
     pressure_viscosity [1/Pa]
     vapour_pressure [Pa]
-        Held over temperature, unless it has ``boiling``: then that at 20 degC.
+        At all temperatures, or, with ``boiling``, at 20 degC.
     molar_mass [kg/mol]
     boiling [K]
-        Heat of vaporisation over the gas constant, ``p_v ~ exp(-boiling/T)``; 0 holds it.
+        Heat of vaporisation over the gas constant, ``p_v ~ exp(-boiling/T)``.
     """
 
     density: float
@@ -243,11 +243,10 @@ class TaitOil:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FixedProperties:
-    """A user's numbers; they hold at the temperature of the run, whatever it is.
+    """A user's numbers at the temperature of the run.
 
     Parameters
     ----------
-    liquid : Murnaghan or TabulatedLiquid
     viscosity [Pa s]
         Dynamic, at one atmosphere.
     pressure_viscosity [1/Pa]
@@ -263,7 +262,7 @@ class FixedProperties:
     vapour_density: float | None = None
 
     def at(self, temperature: float) -> FluidState:
-        """Return the numbers, which do not depend on temperature."""
+        """The numbers, which do not depend on temperature."""
         vapour_density = self.vapour_density
         if vapour_density is None:
             vapour_density = _vapour_density(self.vapour_pressure, temperature, _MOLAR_MASS)
@@ -285,10 +284,9 @@ class FluidDefinition:
     constants
         What the properties rest on.
     lowest_temperature, highest_temperature [K]
-        Range in which the constants hold.
+        Range of the constants.
     pressure_range
-        Absolute pressures for which they hold; by default what the properties or the law of the
-        liquid say.
+        Absolute; by default that of the properties or the law of the liquid.
     """
 
     name: str
@@ -317,13 +315,9 @@ class FluidDefinition:
     ) -> Fluid:
         """Fluid at one temperature, with entrained gas.
 
-        Parameters
-        ----------
-        temperature [K]
-        gas_fraction, gas_exponent, release_pressure, saturation_pressure
+        Parameters ---------- temperature [K] gas_fraction, gas_exponent, release_pressure,
+        saturation_pressure, release_time, absorption_time
             See :class:`~klack.hydraulics.mixture.EntrainedGas`; the fraction is at one atmosphere.
-        release_time, absorption_time [s]
-            Time constants of the gas in chambers, see the same.
         boiling_half_width [Pa]
             See :class:`~klack.hydraulics.mixture.Vapour`.
         """

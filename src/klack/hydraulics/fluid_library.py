@@ -1,7 +1,7 @@
 """Fluids by name: every constant with its source, and whether that source was read.
 
-A library fluid is a place to start, not a certificate: standards for test oils, diesel and brake
-fluids allow bands, and two barrels of one name differ by more than the digits given here.
+They are no certificates: standards for test oils, diesel and brake fluids allow bands, and two
+barrels of one name differ by more than the digits given here.
 """
 
 from collections.abc import Callable, Mapping
@@ -107,7 +107,7 @@ def _measured(
 
 
 def _every_step(lowest: float, *, first: float | None = None) -> tuple[float, ...]:
-    """Temperatures [K] up to 140 degC, after a freezing point where it is off the steps."""
+    """Temperatures [K] up to 140 degC, from a freezing point on where it is off the steps."""
     steps = range(round((413.15 - lowest) / _STEP) + 1)
     return (*(() if first is None else (first,)), *(lowest + _STEP * k for k in steps))
 

@@ -1,13 +1,12 @@
 r"""Fluid that a compliant part holds at a node: its volume, and the energy that fills it.
 
-A part holds the volume ``V(p)`` of fluid, not falling with the pressure, and stores ``U(p)`` with
-``dU = (p - p_amb) dV``.  With the compression of that fluid it holds mass and energy
+It holds the volume ``V(p)``, not falling with the pressure, and stores ``U(p)`` with ``dU = (p -
+p_amb) dV``; with the compression of the fluid mass and energy are
 
 .. math:: m = \varrho(p)\,V(p), \qquad E = m\,g(p) - (p - p_{amb})\,V + U, \qquad dE = g\,dm ,
 
-so that ``E`` is a convex function of ``m``.  The pressure inside is found at the end of the step;
-the energy ``g_a dm`` that arrives then covers the change of ``E``, and what is left is a loss,
-never negative.
+so that ``E`` is a convex function of ``m``.  With the pressure at the end of the step the energy
+``g_a dm`` that arrives covers the change of ``E``; the rest is a loss, never negative.
 """
 
 from math import exp, inf, log
@@ -36,8 +35,8 @@ def gas_store(
     .. math:: V = V_0\Bigl(1 - \bigl(\tfrac{p_0}{p}\bigr)^{1/n}\Bigr), \qquad
               U = \int_{p_0}^{p} (p - p_{amb})\,dV
 
-    nothing below the precharge ``p_0``; from the pressure on at which the gas has the volume
-    ``least`` it cannot be compressed further.
+    nothing below the precharge ``p_0``; at the volume ``least`` the gas cannot be compressed
+    further.
 
     Parameters
     ----------
@@ -45,10 +44,6 @@ def gas_store(
     whole, least [m^3]
         Of the gas at the precharge, and when the accumulator is full.
     exponent [-]
-
-    Returns
-    -------
-    volume, slope, energy : float [m^3], [m^3/Pa], [J]
     """
     if p <= precharge:
         return 0.0, 0.0, 0.0
@@ -66,14 +61,14 @@ def gas_store(
 
 @njit(error_model="numpy")
 def wall_store(p: float, ambient: float, compliance: float) -> tuple[float, float, float]:
-    """Volume by which an elastic wall gives way, its slope with pressure, and its strain energy."""
+    """Volume by which an elastic wall yields, its slope with pressure, and its strain energy."""
     volume = compliance * (p - ambient)
     return volume, compliance, 0.5 * volume * (p - ambient)
 
 
 @inner(error_model="numpy")
 def _held(par: Any, table: Any, p: float, hint: int) -> tuple[float, float, float, float, int]:
-    """Mass inside, its slope with pressure, energy, density, and the place in the fluid table."""
+    """Mass inside, its slope with pressure, energy, density, and place in the table."""
     rho, by_p, g, hint = fluid_at(table, p, hint)
     if par[1] == GAS:
         volume, slope, energy = gas_store(p, par[2], par[3], par[4], par[5], par[6])
@@ -89,9 +84,9 @@ def fluid_store_step(par: Any, state: Any, inp: Any, out: Any) -> int:
     """Flow into a store of fluid, with or without an inlet.
 
     ``par``: 0 size of all, 1 kind, 2 ambient pressure, 3-6 of the volume law, 7-10 inlet
-    (conductance, number, throat, vapour pressure; conductance 0: none), fluid table.
-    ``state``: pressure inside, volume of gas, place in the fluid table, 1 once that pressure is
-    known.  Port b is at the surroundings: what is inside counts as a store.
+    (conductance, 0 for none; number, throat, vapour pressure), fluid table.  ``state``: pressure
+    inside, volume of gas, place in the fluid table, 1 once that pressure is known.  Port b is at
+    the surroundings: what is inside counts as a store.
     """
     table = carray(par, (int(par[0]),))[11:]
     h, p_a, hint = inp[1], inp[2], int(state[2])

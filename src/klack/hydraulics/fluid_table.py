@@ -6,9 +6,9 @@ and slope.  From it follow, without a further approximation,
 .. math:: \rho = \frac1v, \qquad \frac{d\rho}{dp} = -\frac{v'}{v^2}, \qquad
           g(p) = \int_{p_a}^p v\,dp ,
 
-the last as the exact integral of the pieces.  ``dg = dp/rho`` therefore holds to round-off, and
-the energy ``m g - (p - p_a) V`` of a chamber is a true potential; with separate tables of ``rho``
-and ``g`` every closed cycle would make or lose energy at the level of their errors.
+the last exactly.  So ``dg = dp/rho`` holds to round-off, and the energy ``m g - (p - p_a) V`` of a
+chamber is a true potential; with separate tables of ``rho`` and ``g`` every closed cycle would make
+or lose energy by their errors.
 
 Layout: number of pieces, seven zeros, then eight numbers per piece (one cache line): lower end
 ``p``, ``v`` there, factors of ``s .. s^5`` with ``s`` counted from the lower end, and ``g`` there.
@@ -46,18 +46,13 @@ Vector = NDArray[np.float64]
 def fluid_table(fluid: NetworkFluid, ambient_pressure: float) -> Vector:
     """Tabulate a fluid for :func:`fluid_at`.
 
-    Pieces are halved until the specific volume is right to 1e-10 everywhere between 1 Pa and
-    4000 bar; ends of pieces lie on the kinks of the fluid and on the ambient pressure.
+    Pieces, a few hundred, are halved until the specific volume is right to 1e-10 between 1 Pa and
+    4000 bar; kinks of the fluid and the ambient pressure are ends of pieces.
 
     Parameters
     ----------
     ambient_pressure [Pa]
-        Where the pressure energy ``g`` counts from, absolute.
-
-    Returns
-    -------
-    array, shape (8 (n + 2),)
-        A few hundred pieces.
+        Absolute, where the pressure energy ``g`` is zero.
     """
     require_positive("fluid_table: ambient_pressure", ambient_pressure, "Pa")
     if isinstance(fluid, Fluid) and isinstance(fluid.liquid, Murnaghan | Tait):
@@ -67,7 +62,7 @@ def fluid_table(fluid: NetworkFluid, ambient_pressure: float) -> Vector:
 
 @lru_cache(maxsize=20)
 def _table_of(fluid: Fluid, ambient_pressure: float) -> Vector:
-    """Table of a fluid that cannot change; strokes of one valve share it."""
+    """Cached table of a fluid that cannot change; strokes of one valve share it."""
     return _table(fluid, ambient_pressure)
 
 
@@ -89,7 +84,7 @@ def _table(fluid: NetworkFluid, ambient_pressure: float) -> Vector:
 
 
 def _pieces(fluid: NetworkFluid, ambient_pressure: float) -> tuple[Vector, Vector]:
-    """Ends of all pieces and their six factors, halving those that are not accurate."""
+    """Ends of all pieces and their six factors."""
     ends = np.geomspace(LOWEST_PRESSURE, HIGHEST_PRESSURE, 40)
     special = [p for p in (*fluid.kinks, ambient_pressure) if ends[0] < p < ends[-1]]
     ends = np.unique(np.concatenate((ends, special)))
@@ -118,7 +113,7 @@ def _pieces(fluid: NetworkFluid, ambient_pressure: float) -> tuple[Vector, Vecto
 
 
 def _quintic(fluid: NetworkFluid, left: Vector, right: Vector) -> Vector:
-    """Factors, shape (n, 6), from value and slope at both ends and values at two places inside."""
+    """Factors (n, 6) from value and slope at both ends and two values inside."""
     h = right - left
     va, da = fluid.specific_volume(left)
     vb, db = fluid.specific_volume(right)
@@ -139,7 +134,7 @@ def _quintic(fluid: NetworkFluid, left: Vector, right: Vector) -> Vector:
 
 
 def _error(fluid: NetworkFluid, left: Vector, right: Vector, factors: Vector) -> Vector:
-    """Largest relative error of each piece in value, and whether it falls with pressure."""
+    """Largest relative error of each piece, and whether it falls with pressure."""
     s = _TESTED[:, None] * (right - left)
     v, slope = fluid.specific_volume(left + s)
     c = factors.T
@@ -154,17 +149,9 @@ def _error(fluid: NetworkFluid, left: Vector, right: Vector, factors: Vector) ->
 def fluid_at(table: Vector, p: float, hint: int) -> tuple[float, float, float, int]:
     """Density [kg/m^3], its slope [kg/(m^3 Pa)], pressure energy [J/kg] and the place in the table.
 
-    Never fails: below 1 Pa the specific volume, above 4000 bar the density continues
-    linearly, so that the density is above zero and rises with pressure everywhere.
-
-    Parameters
-    ----------
-    table
-        Of :func:`fluid_table`.
-    p [Pa]
-        Absolute.
-    hint
-        What the last call returned; 0 for the first.
+    Never fails: below 1 Pa the specific volume, above 4000 bar the density continues linearly, so
+    that the density is above zero and rises with pressure everywhere.  ``hint`` is the last place,
+    0 for the first call.
     """
     i = max(hint, _ROW)
     while i > _ROW and p < table[i]:
@@ -202,21 +189,12 @@ def _beyond(
 
 @njit(error_model="numpy", _nrt=False, forceinline=True)
 def pressure_at(table: Vector, rho: float, hint: int) -> tuple[float, int]:
-    """Absolute pressure [Pa] at which the fluid has the density ``rho`` [kg/m^3], and its place.
+    """Absolute pressure [Pa] at the density ``rho`` [kg/m^3], and its place.
 
-    Inverse of :func:`fluid_at`: Newton inside one piece, kept between its ends.  A solver that
-    looks for the pressure of a volume should take its steps in the density and come back through
-    this function where the fluid starts to boil: there the density falls by a factor of a thousand
-    within some kilopascals, and a step in pressure from one side lands far beyond the other.
-
-    Parameters
-    ----------
-    table
-        Of :func:`fluid_table`.
-    rho [kg/m^3]
-        Values of 0 and less are taken as a trace of vapour.
-    hint
-        As for :func:`fluid_at`; both share their places.
+    Inverse of :func:`fluid_at`, by Newton's method inside one piece.  A solver that looks for the
+    pressure of a volume should take its steps in the density where the fluid starts to boil: there
+    the density falls by a factor of a thousand within some kilopascals, and a step in pressure from
+    one side lands far beyond the other.  ``rho`` of 0 and less is taken as a trace of vapour.
     """
     v = 1.0 / max(rho, _TRACE)
     last = _ROW * (int(table[0]) + 1)

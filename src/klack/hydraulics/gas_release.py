@@ -6,16 +6,16 @@ A share ``y`` of the gas is free, the rest is dissolved and has no volume of its
           \dot y = \frac{\theta(p) - y}{\tau}
 
 with ``v_t`` of :func:`~klack.hydraulics.fluid_table.fluid_table` for a fluid all of whose gas is
-free, ``v_g`` the volume of this gas per mass of fluid, ``theta`` the share at equilibrium, and
-``tau`` that of release where ``y`` is below it and of absorption above.  Over a step ``H`` the
-share follows the pressure at its end, :math:`y = y_0 + (1 - e^{-H/\tau})(\theta(p) - y_0)`: the
-step of a constant pressure is exact, and a short ``tau`` leads to equilibrium.
+free, the volume ``v_g`` of this gas per mass of fluid, the share ``theta`` at equilibrium, and
+``tau`` of release where ``y`` is below it and of absorption above.  Over a step ``H`` the share
+follows the pressure at its end, :math:`y = y_0 + (1 - e^{-H/\tau})(\theta(p) - y_0)`, exactly for a
+constant pressure; a short ``tau`` leads to equilibrium.
 
 .. math:: E = m\,g_t(p) - (p - p_a) V - D\,G(p), \qquad dE = g_t\,dm - (p - p_a)\,dV - G\,dD
 
 is the energy of a chamber with the dissolved mass ``D = m (1 - y)`` (fluid whose gas is dissolved)
-and :math:`G = \int_{p_a}^p v_g\,dp`: ``-G dD`` is what gas that leaves the liquid gives, and takes
-back when it is dissolved.
+and :math:`G = \int_{p_a}^p v_g\,dp`: gas that leaves the liquid gives ``-G dD`` and takes it back
+when dissolved.
 """
 
 from math import exp, log
@@ -75,7 +75,7 @@ def release_numbers(fluid: Fluid, ambient_pressure: float) -> Vector:
 def free_gas(law: Any, p: float) -> tuple[float, float, float]:
     """Volume of all gas per mass of fluid, its slope with pressure, and the energy ``G``.
 
-    Below 1 Pa on a straight line, as the volume of the fluid.
+    Linear below 1 Pa, as the volume of the fluid.
     """
     c, power, ambient = law[0], law[1], law[2]
     at = max(p, _ONE)
@@ -94,7 +94,7 @@ def free_gas(law: Any, p: float) -> tuple[float, float, float]:
 
 @njit(error_model="numpy", _nrt=False)
 def settled_share(law: Any, p: float) -> tuple[float, float]:
-    """Share of the gas that is free at equilibrium, and its slope with pressure."""
+    """Free share of the gas at equilibrium, and its slope with pressure."""
     width = law[4] - law[3]
     t = min(max((p - law[3]) / width, 0.0), 1.0)
     return 1.0 - t * t * (3.0 - 2.0 * t), -6.0 * t * (1.0 - t) / width
@@ -106,7 +106,7 @@ def share_moved(
 ) -> tuple[float, float]:
     """Free share at the end of a step and its slope with the pressure there.
 
-    ``freed`` and ``taken``: share of the way to equilibrium that release and absorption go.
+    ``freed`` and ``taken``: share of the way to equilibrium by release and absorption.
     """
     there, slope = settled_share(law, p)
     part = freed if there > before else taken
@@ -131,9 +131,9 @@ def mixture_at(
 def mixture_pressure(
     table: Any, law: Any, rho: float, before: float, freed: float, taken: float, hint: int
 ) -> tuple[float, int]:
-    """Pressure at which :func:`mixture_at` has this density, and the place in the table.
+    """Pressure at which :func:`mixture_at` has this density, and its place.
 
-    The mixture is never lighter than with all gas free: that pressure is the upper bound.
+    Upper bound: the pressure with all gas free, since the mixture is never lighter.
     """
     high, hint = pressure_at(table, rho, hint)
     if high <= _ONE:  # less than a trace of gas is dissolved

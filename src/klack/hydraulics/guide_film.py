@@ -4,11 +4,10 @@ r"""Film of a needle in its guide: a short bearing that does not turn, eccentric
           = \dot h, \qquad h = c - e_x \cos\theta - e_y \sin\theta
 
 (Ocvirk 1952 for a journal that turns, Booker 1965 for squeeze.)  The pressure is a parabola along
-the guide, with the line load :math:`\mu L^3 (-\dot h)/h^3` round it.  Its integrals over a range of
-``theta`` are closed with Sommerfeld's angle ``psi``, ``1 - eps cos(theta) = (1 - eps^2)/(1 + eps
-cos(psi))``.
+the guide, with the line load :math:`\mu L^3 (-\dot h)/h^3`, whose integrals over ``theta`` are
+closed with Sommerfeld's angle ``psi``, ``1 - eps cos(theta) = (1 - eps^2)/(1 + eps cos(psi))``.
 
-A rotation of the journal with ``omega`` is a whirl of ``-omega/2``; a needle does not turn.
+A rotation of the journal with ``omega`` is a whirl of ``-omega/2``.
 """
 
 from math import atan2, cos, hypot, pi, sin, sqrt
@@ -40,16 +39,14 @@ def guide_film_force(
     rate [1/s]
         ``d eps / dt``.
     whirl [1/s]
-        ``d gamma / dt`` of the direction in which the needle lies; of a journal that turns with
-        ``omega`` less ``omega / 2``.
+        ``d gamma / dt`` of the direction of the eccentricity.
     ruptured
-        Only the half with a pressure above ambient acts (Booker 1965, Ocvirk's film of 180
-        degrees); else the whole film.
+        Only the half above ambient pressure acts (Ocvirk's film of 180 degrees).
 
     Returns
     -------
     radial, tangential : float [1/s]
-        Along the eccentricity, and 90 degrees ahead of it.
+        Along the eccentricity, and 90 degrees ahead.
     """
     first, last = 0.0, 2.0 * pi
     across = eccentricity * whirl
@@ -64,10 +61,7 @@ def guide_film_force(
 def guide_film_damping(x: float, y: float) -> Matrix:
     """Damping of the whole film over ``mu L^3 R / c^3``, symmetric, above 0; shape (2, 2) [-].
 
-    Parameters
-    ----------
-    x, y [-]
-        Place of the needle over the clearance.
+    ``x`` and ``y`` are the place of the needle over the clearance.
     """
     radius = hypot(x, y)
     left = 1.0 - radius * radius
@@ -87,12 +81,13 @@ def guide_film_step(
 ) -> tuple[float, float, Matrix]:
     """Mean force of the whole film over a step, and its slopes with the place at the end.
 
-    With the damping in the middle of the way: the work is dissipated exactly at every step size.
+    With the damping in the middle of the way, which lies within the clearance, work is dissipated
+    exactly at every step size.
 
     Parameters
     ----------
     x0, y0, x1, y1 [-]
-        Places at both ends over the clearance; the middle lies within it.
+        Places over the clearance.
     step [s]
 
     Returns
@@ -100,7 +95,6 @@ def guide_film_step(
     x, y : float [1/s]
         Force over ``mu L^3 R / c^2``.
     slopes : array (2, 2) [1/s]
-        Of the same over ``x1`` and ``y1``.
     """
     x, y = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
     u, v = (x1 - x0) / step, (y1 - y0) / step
@@ -121,7 +115,7 @@ def guide_film_step(
 
 @njit
 def guide_film_drag(eccentricity: float) -> float:
-    """Drag against a motion along the guide over ``2 pi mu R L v / c``: ``1/sqrt(1 - eps^2)``."""
+    """Drag against axial motion over ``2 pi mu R L v / c``: ``1/sqrt(1 - eps^2)``."""
     return 1.0 / sqrt(1.0 - eccentricity * eccentricity)
 
 
@@ -142,7 +136,7 @@ def _integrals(eps: float, first: float, last: float) -> tuple[float, float, flo
 
 @inner
 def _sommerfeld(eps: float, theta: float) -> float:
-    """``psi`` of an angle within one turn and a half of 0, without a jump."""
+    """Continuous ``psi`` of an angle within one turn and a half of 0."""
     turns = 0.0
     if theta > pi:
         turns, theta = 2.0 * pi, theta - 2.0 * pi

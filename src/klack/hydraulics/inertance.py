@@ -21,7 +21,7 @@ __all__ = ["Inertance"]
 
 @inner(error_model="numpy")
 def _pass(par: Any, state: Any, inp: Any, out: Any, friction: float, table: int) -> None:
-    """Mean flow of the step under a friction; ``table``: place of the fluid table in ``par``."""
+    """Mean flow of the step under a friction; ``table``: place of the fluid table."""
     size, inertia = int(par[0]), par[1]
     h, before = inp[1], state[0]
     fluid = carray(par, (size,))[table:]
@@ -48,7 +48,7 @@ def inertance_step(par: Any, state: Any, inp: Any, out: Any) -> int:
 
 @step_function
 def inertance_under_pressure_step(par: Any, state: Any, inp: Any, out: Any) -> int:
-    """Step of :func:`inertance_step`, ``par`` with the viscosity law in front of the table."""
+    """Step of :func:`inertance_step` with the viscosity law before the table."""
     ratio, _, _ = mean_viscosity_ratio(inp[2], inp[3], par[3], par[4])
     _pass(par, state, inp, out, par[2] * ratio, 5)
     return 0
@@ -62,8 +62,8 @@ class Inertance(Component):
               E = \frac{l}{2 \varrho_0 A}\,\dot m^2
 
     For a liquid this is ``I dQ/dt = dp - R Q`` with ``I = rho l/A`` and ``R = 128 mu l/(pi d^4)``.
-    The step takes the mean of both flows (implicit midpoint), so the kinetic energy changes by
-    exactly the work of the pressures less the friction: no numerical damping of its own.
+    By the implicit midpoint rule the kinetic energy changes exactly by the work of the pressures
+    less the friction: no numerical damping.
 
     Positive flow runs from a to b.
 

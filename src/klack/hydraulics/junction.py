@@ -1,4 +1,4 @@
-"""Junction of lines: a node without volume, whose pressure is that at which its flows balance."""
+"""Junction of lines: a node without volume."""
 
 from collections.abc import Mapping
 from typing import ClassVar
@@ -21,15 +21,14 @@ class Junction(Component):
               P = \frac{\sum_k c_k/Z_k}{\sum_k 1/Z_k} \;\; \text{of lines alone}
 
     Each line end answers a flow at once with its impedance ``Z``, so nothing has to be stored.  A
-    wave that comes in through line ``j`` leaves through line ``k`` with the share
-    ``2 Y_j / sum Y``, ``Y = 1/Z``, of its pressure, and is reflected with that share less one:
-    exact for any number of lines, at any step.  Orifices, seats, losses and sources at the node
-    are solved together with it.  With one line it is the end of that line: shut, or with whatever
-    else is joined there.  A chamber instead delays waves by ``V/K sum Y``, and its volume has to be
-    known.
+    wave from line ``j`` enters line ``k`` with the share ``2 Y_j / sum Y``, ``Y = 1/Z``, of its
+    pressure, and is reflected with that share less one: exact for any number of lines, at any step.
+    Orifices, seats, losses and sources at the node are solved together with it.  With one line it
+    is the end of that line, shut or with what else is joined.  A chamber instead delays waves by
+    ``V/K sum Y``, and needs a volume.
 
-    Where its pressure would fall below that of boiling, a cavity opens there, holds that pressure
-    and takes what flows out, until it is filled again (discrete vapour cavity, as in a line).
+    Where its pressure would fall below that of boiling, a cavity holds that pressure until it is
+    filled again (discrete vapour cavity, as in a line).
 
     Limits: needs the end of a line; no face may move there (its room is a chamber); one pressure,
     that of fluid at rest, so no loss by mixing (put a pressure-loss into each branch); in a run

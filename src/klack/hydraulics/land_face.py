@@ -31,10 +31,6 @@ def land_areas(inner: float, outer: float) -> tuple[float, float]:
     inner, outer [m]
         Radii, ``0 < inner < outer``.
 
-    Returns
-    -------
-    inside, outside : float [m^2]
-
     Examples
     --------
     >>> inside, outside = land_areas(0.9e-3, 1.0e-3)

@@ -39,10 +39,10 @@ class Line(Component):
     .. math:: \frac{\partial p}{\partial t} + \varrho a^2 \frac{\partial u}{\partial x} = 0, \qquad
               \varrho \frac{\partial u}{\partial t} + \frac{\partial p}{\partial x} + J = 0
 
-    Without ``J`` both waves cross the bore unchanged in ``T = L / a``: the line is two delays and
-    the impedance ``Z = rho a / A``, exact for every step, where a grid or a chain of volumes and
-    inertances smears fronts.  A needle that stops shuts the flow and the jump ``rho a du`` comes
-    back every ``2 L / a``: the stairs in a measured rebound velocity.
+    Without ``J`` both waves cross the bore unchanged in ``T = L / a``: two delays and the impedance
+    ``Z = rho a / A`` are exact for every step, where a grid or a chain of volumes and inertances
+    smears fronts.  The jump ``rho a du`` of a needle that stops comes back every ``2 L / a``: the
+    stairs in a measured rebound velocity.
 
     Friction ``J`` is lumped between segments and at both ends.  ``kagawa`` remembers how the flow
     changed; ``steady`` is Hagen-Poiseuille, which damps the first mode of a short fuel line fifty
@@ -149,12 +149,9 @@ class Line(Component):
         return self.segments or _PARTS[self.friction]
 
     def wave_speed(self, fluid: NetworkFluid, pressure: float | None = None) -> float:
-        r"""Speed of pressure waves [m/s], lowered by the wall: ``1/a^2 + rho D / (E s)``.
+        """Speed of pressure waves [m/s], lowered by the wall: ``1/a^2 + rho D / (E s)``.
 
-        Parameters
-        ----------
-        pressure [Pa]
-            Absolute, about which they run; by default the one that the line was given.
+        ``pressure`` [Pa], absolute, is by default that of the line.
         """
         about = self.pressure if pressure is None else pressure
         if about is None:
@@ -176,14 +173,14 @@ class Line(Component):
         return np.asarray(1.0 / np.sqrt(slowness))
 
     def echo_time(self, fluid: NetworkFluid, pressure: float | None = None) -> float:
-        """Return ``2 L / a`` [s], after which an end hears of the other one."""
+        """``2 L / a`` [s], after which an end hears of the other one."""
         return 2.0 * self.length / self.wave_speed(fluid, pressure)
 
     def working_pressure(self, rows: Rows) -> float:
-        """Pressure [Pa] whose properties the line has: given, or the higher one of its ends.
+        """Pressure [Pa] for the properties of the line: given, or the higher one of its ends.
 
-        An end whose start pressure the case states comes before one that begins in steady flow,
-        which is not known yet.
+        An end with a stated start pressure comes before one that begins in steady flow, which is
+        not known yet.
         """
         if self.pressure is not None:
             return self.pressure
@@ -229,7 +226,7 @@ class Line(Component):
         rows.limits += self._limits(rows, fluid, pressure)
 
     def _require_liquid(self, rows: Rows, fluid: NetworkFluid, pressure: float) -> None:
-        """Linear waves run in liquid; below boiling they would have the speed in vapour."""
+        """Reject a line below boiling, where linear waves would have the speed in vapour."""
         if pressure >= fluid.all_liquid_from:
             return
         found = "" if self.pressure is not None else ", the higher start pressure of its ends"
@@ -265,7 +262,7 @@ class Line(Component):
     def _pieces(
         self, rows: Rows, viscosity: float, *, turbulent: bool
     ) -> list[tuple[int, int, float]]:
-        """Nodes and share of each piece; turbulent friction is between them, in equal lumps."""
+        """Nodes and share of each piece; between them equal lumps of turbulent friction."""
         begin, last = rows.port("a"), rows.port("b")
         if not turbulent:
             return [(begin, last, 1.0)]
@@ -284,7 +281,7 @@ class Line(Component):
         return [*pieces, (begin, last, 0.5 / self.parts)]
 
     def _limits(self, rows: Rows, fluid: NetworkFluid, pressure: float) -> list[LimitRow]:
-        """Pressures at the ends about which its one wave speed and its one impedance hold."""
+        """Pressures at the ends for which its one wave speed and impedance hold."""
 
         def error(p: ArrayLike) -> NDArray[np.float64]:
             """Larger of both errors [-]; the impedance is ``a / rho`` as the network counts it."""

@@ -15,17 +15,15 @@ shocks dissipate it.  Between cells acts the flux of Tadmor that keeps it exactl
 
 less a share of the jumps of ``g`` and ``u``, never against their signs: so no face makes energy.
 The share is that of third differences where waves are smooth (second order), and one at fronts.
-Time advances in the three stages of Shu and Osher.  What the cells lose is counted.
+Time advances in the three stages of Shu and Osher.  The loss is counted.
 
-The ``g`` of the node is ``g + u^2/2`` of an end where fluid enters the line, and everywhere at a
-junction, so that lines in a row lose nothing where they meet.  Fluid that leaves into a chamber has
-the ``g`` of the chamber itself, and its kinetic energy is lost.  The wave that leaves an end is
-read where it was half a step before.
+The ``g`` of the node is ``g + u^2/2`` of an end where fluid enters the line, and always at a
+junction, so that lines in a row lose nothing there.  Fluid that leaves into a chamber has its ``g``
+and loses its kinetic energy.  The wave that leaves an end is read where it was half a step before.
 
 Friction acts once in a step on every cell, implicit in the flow of the cell: its steady part
 (laminar, or turbulent after :mod:`klack.hydraulics.pipe_friction`) and, with memory, the terms of
-Kagawa.  The memory of a term is kept as ``sqrt(M) i``, so that compression alone does not change
-its energy.
+Kagawa.  Its memory is ``sqrt(M) i``, so that compression alone does not change its energy.
 """
 
 from math import exp, sqrt
@@ -109,7 +107,7 @@ def pressure_of(
 
 @njit(error_model="numpy", _nrt=False)
 def _slope(a: float, b: float) -> float:
-    """Mean of two differences, at most twice the smaller one; none where their signs differ."""
+    """Mean of two differences, at most twice the smaller one; 0 for opposite signs."""
     if a * b <= 0.0:
         return 0.0
     mean, most = 0.5 * (a + b), 2.0 * min(abs(a), abs(b))
@@ -120,7 +118,7 @@ def _slope(a: float, b: float) -> float:
 
 @njit(error_model="numpy", _nrt=False)
 def _uneven(a: float, b: float) -> float:
-    """0 for equal differences, 1 where they differ in sign or one of them is nothing."""
+    """0 for equal differences, 1 where they differ in sign or one is zero."""
     total = abs(a) + abs(b)
     return abs(a - b) / total if total > 0.0 else 0.0
 
@@ -129,8 +127,8 @@ def _uneven(a: float, b: float) -> float:
 def _limited(before: float, here: float, after: float) -> float:
     """Part of the jump ``here`` at a face that dissipates, of its sign; also its neighbours.
 
-    That is what is left after half the slopes of both cells, of third order where the differences
-    are alike.  Where they are not, a share of the whole jump: so no oscillation follows a front.
+    That is the rest after half the slopes of both cells, of third order where the differences are
+    alike; else a share of the whole jump, so that no oscillation follows a front.
     """
     jump = here - 0.5 * (_slope(before, here) + _slope(here, after))
     uneven = max(_uneven(before, here), _uneven(here, after))
@@ -196,8 +194,8 @@ def _leaving(
 ) -> tuple[float, float, float]:
     """Energy of the node [J/kg], flow into the line [kg/s] and its slope of what reaches an end.
 
-    The slope is that of a small wave, ``rho A / a``; where the end was denser in the ``last`` step,
-    that of the shock to there: a boiling cell answers a small wave in quite another way.
+    The slope is that of a small wave, ``rho A / a``, or, where the end was denser in the ``last``
+    step, that of the shock to there: a boiling cell answers a small wave quite differently.
     """
     n, dx, area, stretch, ambient = int(par[0]), par[1], par[2], par[3], par[4]
     table = shift(par, int(par[9]))
@@ -271,7 +269,7 @@ def _resistance(par: Any, rho: float, u: float, mu: float) -> tuple[float, float
 
 @njit(error_model="numpy", _nrt=False)
 def loss_per_length(par: Any, p: float, flow: float) -> float:
-    """Energy per mass and length [J/(kg m)] that a steady flow [kg/s] loses at a pressure."""
+    """Energy per mass and length [J/(kg m)] lost by a steady flow [kg/s]."""
     if par[6] == 0.0:
         return 0.0
     rho, _, _, _ = fluid_at(shift(par, int(par[9])), p, 0)
@@ -320,10 +318,10 @@ def pressure_of_total(
 def _end_flux(
     par: Any, M: Any, p: Any, hint: Any, work: Any, side: int, total: float, flow: float
 ) -> float:
-    """Flux of momentum [N] at an end where the energy of the node and the flow to b are known.
+    """Flux of momentum [N] at an end with known energy of the node and flow to b.
 
-    Where the flow would reach a good part of the wave speed there (the end boils), that of one wave
-    into the first cell.
+    Where the end boils and the flow would near the wave speed, that of one wave into the first
+    cell.
     """
     n = int(par[0])
     near = 0 if side == 0 else n - 1
@@ -344,7 +342,7 @@ def _end_flux(
 
 @njit(error_model="numpy", _nrt=False)
 def _rub(par: Any, M: Any, J: Any, p: Any, memory: Any, H: float) -> tuple[float, float]:
-    """Let friction act on all cells for a step; heat [J] and the largest Reynolds number."""
+    """Let friction act on all cells over a step; heat [J] and the largest Reynolds number."""
     n, dx, area, stretch, ambient, D = int(par[0]), par[1], par[2], par[3], par[4], par[5]
     heat, fastest = 0.0, 0.0
     for i in range(n):

@@ -7,9 +7,9 @@ The wall shear of an accelerated flow depends on its history (Zielke 1968): with
               + \frac{4\mu}{R^2}\int_0^t W\bigl(\tau(t - s)\bigr)\,\frac{dV}{ds}\,ds .
 
 For laminar flow ``W`` is ``sum_k exp(-j_k^2 tau)`` over the zeros of the Bessel function ``J_2``.
-A sum of few exponentials turns the convolution into one state per term.  Kagawa's ten terms follow
-``W`` to 0.3 % down to ``tau`` = 1e-5 and are used by lines.  Trikha's three are up to 38 % off and
-halve the damping of a short fuel line: they are here to show just that.
+A sum of exponentials turns the convolution into one state per term.  Lines use Kagawa's ten terms,
+which follow ``W`` to 0.3 % down to ``tau`` = 1e-5.  Trikha's three are up to 38 % off and halve the
+damping of a short fuel line: they are here to show that.
 """
 
 from dataclasses import dataclass
@@ -38,12 +38,7 @@ Values = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class ExponentialWeights:
-    """Weighting function ``W(tau) = sum_k factors_k exp(-rates_k tau)``.
-
-    Parameters
-    ----------
-    factors, rates [-]
-    """
+    """Weighting function ``W(tau) = sum_k factors_k exp(-rates_k tau)``."""
 
     factors: tuple[float, ...]
     rates: tuple[float, ...]
@@ -86,13 +81,7 @@ _SERIES_FROM = 3e-7
 
 
 def laminar_weight(tau: ArrayLike) -> Values:
-    """``W`` of laminar flow from its exact series, summed to round-off.
-
-    Parameters
-    ----------
-    tau [-]
-        ``nu t / R^2``, at least 3e-7.
-    """
+    """Exact series of ``W`` for laminar flow at ``tau`` of at least 3e-7."""
     times = np.asarray(tau, dtype=float)
     require_positive(
         "laminar_weight: tau - 3e-7", float(np.min(times, initial=1.0)) - _SERIES_FROM, "-"
@@ -112,15 +101,8 @@ def _bessel_zeros() -> tuple[float, ...]:
 def zielke_weight(tau: ArrayLike) -> Values:
     """``W`` of laminar flow by Zielke's two formulas, to 0.05 %.
 
-    Parameters
-    ----------
-    tau [-]
-        ``nu t / R^2`` above zero.
-
-    Notes
-    -----
-    Zielke, J. Basic Eng. 90 (1968) 109: five exponentials above ``tau`` = 0.02, below it a series
-    in powers of ``sqrt(tau)`` that starts with ``1 / (2 sqrt(pi tau))``.
+    J. Basic Eng. 90 (1968) 109: five exponentials above ``tau`` = 0.02, below it a series in powers
+    of ``sqrt(tau)`` that starts with ``1 / (2 sqrt(pi tau))``.
     """
     times = np.asarray(tau, dtype=float)
     late = sum(np.exp(-rate * times) for rate in _ZIELKE_RATES)
@@ -134,17 +116,8 @@ def vardy_brown_weight(tau: ArrayLike, reynolds: float) -> Values:
     .. math:: W = \frac{e^{-B\tau}}{2\sqrt{\pi\tau}}, \quad B = \frac{Re^k}{12.86}, \quad
               k = \log_{10}\frac{15.29}{Re^{0.0567}}
 
-    Parameters
-    ----------
-    tau [-]
-        ``nu t / R^2`` above zero.
-    reynolds [-]
-        Of the mean flow, 2e3 to 1e8.
-
-    Notes
-    -----
-    Vardy & Brown, J. Sound Vib. 259 (2003) 1011.  It starts as the laminar one does and forgets
-    sooner, since eddies carry the momentum to the wall.
+    with ``Re`` of the mean flow from 2e3 to 1e8 (Vardy & Brown, J. Sound Vib. 259 (2003) 1011).  It
+    starts as the laminar one and forgets sooner, since eddies carry the momentum to the wall.
     """
     require_positive("vardy_brown_weight: reynolds", reynolds, "-")
     times = np.asarray(tau, dtype=float)
@@ -159,7 +132,6 @@ def laminar_resistance(length: float, diameter: float, viscosity: float) -> floa
     ----------
     length, diameter [m]
     viscosity [Pa s]
-        Dynamic.
 
     Examples
     --------
@@ -172,7 +144,7 @@ def laminar_resistance(length: float, diameter: float, viscosity: float) -> floa
 def unsteady_terms(
     weights: ExponentialWeights, *, resistance: float, diameter: float, kinematic_viscosity: float
 ) -> tuple[Values, Values]:
-    """Turn a weighting function into the terms of a :class:`~klack.network.rows.LineRow`.
+    """Gains [Pa s/m^3] and rates [1/s] of a :class:`~klack.network.rows.LineRow` by a weighting.
 
     Parameters
     ----------
@@ -180,11 +152,6 @@ def unsteady_terms(
         :func:`laminar_resistance` of the line; a term gains half of it times its factor.
     diameter [m]
     kinematic_viscosity [m^2/s]
-
-    Returns
-    -------
-    gain : array, shape (k,) [Pa s/m^3]
-    rate : array, shape (k,) [1/s]
     """
     rate = 4.0 * kinematic_viscosity / diameter**2
     return 0.5 * resistance * np.array(weights.factors), rate * np.array(weights.rates)

@@ -25,7 +25,7 @@ ATMOSPHERE = 101_325.0
 """Standard atmosphere [Pa]."""
 
 HIGHEST_PRESSURE = 4e8
-"""Absolute pressure [Pa] up to which any liquid is described: where the time loop stops."""
+"""Absolute pressure [Pa] up to which any liquid is described and the time loop runs."""
 
 _STEEP = 11.5  # [-] slopes above it are those of a liquid at low pressure
 _STIFFENS = 10.0  # [-] dK/dp of most liquids
@@ -38,16 +38,16 @@ Values = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PressureRange:
-    """Pressures, absolute, for which a liquid is described.
+    """Absolute pressures for which a liquid is described.
 
     Parameters
     ----------
     lowest, highest [Pa]
         Between them the bulk modulus is right to some 10 %, the speed of sound to 5 %.
     usable [Pa]
-        Above it a number means nothing any more, and a run stops.
+        Above it numbers mean nothing any more, and a run stops.
     source
-        Where the range comes from.
+        Of the range.
     """
 
     lowest: float = 0.0
@@ -57,7 +57,7 @@ class PressureRange:
 
 
 class LiquidLaw(Protocol):
-    """Density of a liquid over pressure, rising everywhere; see the classes of this module."""
+    """Density of a liquid over pressure, rising everywhere."""
 
     def density(self, pressure: ArrayLike) -> Values:
         """Density [kg/m^3] at the absolute pressure [Pa]."""
@@ -85,9 +85,9 @@ class Murnaghan:
     .. math:: K(p) = K_0 + m\,(p - p_0), \qquad
               \rho = \rho_0\,\Bigl(1 + \frac{m\,(p - p_0)}{K_0}\Bigr)^{1/m}
 
-    Density and stiffness belong together exactly, unlike the constant ``K`` with a constant
-    ``rho`` of many textbooks, which loses mass.  With isentropic ``K_0`` it describes waves and
-    strokes of milliseconds; an isothermal one (10 to 25 % lower in fuels) only slow changes.
+    Density and stiffness agree exactly, while a constant ``K`` with a constant ``rho`` loses mass.
+    Waves and strokes of milliseconds need an isentropic ``K_0``; an isothermal one (10 to 25 %
+    lower in fuels) describes only slow changes.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ class Murnaghan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tait:
-    r"""Liquid after Tait, as used for mineral oils.
+    r"""Liquid after Tait, for mineral oils.
 
     .. math:: \rho = \frac{\rho_0}{1 - \frac{1}{1 + K'}\ln\bigl(1 + p\,(1 + K')/K_0\bigr)}
 
@@ -211,8 +211,8 @@ class Tait:
 class TabulatedLiquid:
     """Liquid from a table of densities: monotone cubic pieces, straight lines beyond both ends.
 
-    The bulk modulus is the slope of these pieces, so it is only as good as the *differences* of
-    the densities: give them with six digits or more.
+    The bulk modulus is as good as the *differences* of the densities: give them with six digits or
+    more.
 
     Parameters
     ----------
@@ -251,8 +251,8 @@ class TabulatedLiquid:
     def pressure_range(self) -> PressureRange:
         """The table and a hundredth of the bulk modulus of its ends beyond them.
 
-        Straight on the bulk modulus stays, where that of a liquid rises by about ten times the
-        pressure: a tenth of it is missing there, all of it ten times as far.
+        The bulk modulus stays there, while that of a liquid rises by about ten times the pressure:
+        a tenth of it is missing, all of it ten times as far.
         """
         first, last = (float(K) for K in self.bulk_modulus(self.pressure[[0, -1]]))
         low, high = float(self.pressure[0]), float(self.pressure[-1])
@@ -311,9 +311,9 @@ def walther_viscosity(temperature: ArrayLike, a: float, b: float) -> Values:
 
     .. math:: \log_{10}\log_{10} Z = A - B\,\log_{10} T, \qquad Z \approx \nu + 0.7
 
-    with ``nu`` in mm^2/s and ``T`` in K (Walther 1931).  Below 2 mm^2/s the correction of ASTM
-    D341 is subtracted, ``exp(-0.7487 - 3.295 x + 0.6119 x^2 - 0.3193 x^3)`` with ``x = Z - 0.7``;
-    it reaches down to 0.21 mm^2/s.
+    with ``nu`` in mm^2/s and ``T`` in K (Walther 1931).  Below 2 mm^2/s, down to 0.21 mm^2/s, the
+    correction of ASTM D341 is subtracted, ``exp(-0.7487 - 3.295 x + 0.6119 x^2 - 0.3193 x^3)`` with
+    ``x = Z - 0.7``.
 
     Parameters
     ----------

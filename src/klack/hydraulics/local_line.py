@@ -49,12 +49,11 @@ class LocalLine:
 
     Parameters
     ----------
-    length, diameter [m]
+    length, diameter, roughness [m]
     stretch [1/Pa]
         Growth of the bore area per pressure.
     friction
         One of :data:`FRICTIONS`.
-    roughness [m]
     """
 
     length: float
@@ -136,8 +135,8 @@ class LocalLine:
 def _profile(par: Vector, p: float, flow: float, more: float, found: Vector) -> float:
     """Pressures in the middle of all cells of a steady flow; energy per mass lost on the way.
 
-    Not a number where the pressure does not suffice for the flow.
-    ``more`` is added to the energy, in equal parts along the line.
+    NaN where the pressure does not suffice.  ``more`` is added to the energy, evenly along the
+    line.
     """
     numbers, dx, n = first(par), par[1], found.size
     _, _, total, hint = fluid_at(par[HEAD:], p, 0)
@@ -171,7 +170,7 @@ def _drop(par: Vector, p_a: float, flow: float) -> tuple[float, float]:
 
 @njit(error_model="numpy")
 def _plain_drop(par: Vector, p: float, flow: float) -> float:
-    """Energy that any flow loses in the fluid of one pressure, with its outflow."""
+    """Energy lost by a flow at one pressure, with its outflow."""
     numbers = first(par)
     lost = par[0] * par[1] * loss_per_length(numbers, p, flow)
     if par[14 if flow > 0.0 else 13] == 0.0:

@@ -1,7 +1,7 @@
-r"""Liquid with entrained gas, and vapour at low pressure.
+"""Liquid with entrained gas, and vapour at low pressure.
 
-Both are described by their volume per volume of liquid, so that mass is conserved by construction
-and density and stiffness are one function, see :class:`klack.hydraulics.fluid.Fluid`.
+Both are volumes per volume of liquid, so that density and stiffness are one function, see
+:class:`klack.hydraulics.fluid.Fluid`.
 """
 
 from dataclasses import dataclass
@@ -31,29 +31,28 @@ def _smooth_step(t: Values) -> tuple[Values, Values]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EntrainedGas:
-    r"""Bubbles of gas that are spread evenly and follow the pressure at once.
+    r"""Bubbles of gas, spread evenly, that follow the pressure at once.
 
     .. math:: V_g(p) = \alpha\,\theta(p)\,(p_0/p)^{1/n}
 
-    is their volume per volume of mixture at ``p_0``.  ``theta`` is the share that is not
-    dissolved: 1 up to ``release_pressure``, 0 from ``saturation_pressure`` on, a smooth cubic
-    between.  By default it is 1 everywhere, because in a stroke of milliseconds bubbles have no
-    time to dissolve.  Surface tension and the inertia of the bubbles are left out.
+    is their volume per volume of mixture at ``p_0``.  The free share ``theta`` is 1 up to
+    ``release_pressure``, 0 from ``saturation_pressure`` on, a smooth cubic between; by default 1
+    everywhere, because in milliseconds bubbles have no time to dissolve.  Surface tension and the
+    inertia of the bubbles are left out.
 
     Parameters
     ----------
     fraction [-]
-        ``alpha``, share of the volume at ``reference_pressure`` with all gas free; usually 1e-4
-        to 5e-3, and the least known number of a hydraulic model: identify it.
+        ``alpha``, share of the volume at ``reference_pressure`` with all gas free; usually 1e-4 to
+        5e-3, and the least known number of a hydraulic model.
     exponent [-]
         ``n``: 1 isothermal (slow) to 1.4 adiabatic (fast).
     reference_pressure [Pa]
     release_pressure, saturation_pressure [Pa]
         Both or none.
     release_time, absorption_time [s]
-        Time constants with which gas leaves and enters the liquid of the chambers of a network,
-        see :mod:`klack.hydraulics.gas_release`: both or none, with both pressures.  ``theta`` is
-        then the share at equilibrium.
+        Time constants in the chambers of a network, see :mod:`klack.hydraulics.gas_release`: both
+        or none, with both pressures.  ``theta`` is then the share at equilibrium.
     """
 
     fraction: float = 0.0
@@ -113,7 +112,7 @@ class EntrainedGas:
 
     @property
     def mass(self) -> float:
-        """Gas [kg] per m^3 of mixture at the reference pressure, taken as air of 20 degC."""
+        """Gas [kg] per m^3 of mixture at the reference pressure, as air of 20 degC."""
         return self.fraction * _AIR_DENSITY * self.reference_pressure / ATMOSPHERE
 
     def volume(self, pressure: ArrayLike) -> tuple[Values, Values]:
@@ -126,7 +125,7 @@ class EntrainedGas:
         return share * all_free, all_free * (slope - share / (self.exponent * p))
 
     def dissolving(self, pressure: ArrayLike) -> Values:
-        """Part of the slope of :meth:`volume` that is gas which dissolves [1/Pa]."""
+        """Part of the slope of :meth:`volume` by gas that dissolves [1/Pa]."""
         p = np.asarray(pressure, dtype=float)
         all_free = self.fraction * (self.reference_pressure / p) ** (1.0 / self.exponent)
         return np.asarray(all_free * self._free_share(p)[1])
@@ -145,11 +144,10 @@ class Vapour:
 
     .. math:: \rho_c = s\,\rho_l(p) + (1 - s)\,\rho_v\,p/p_v
 
-    with the liquid share ``s`` of the volume rising as a smooth cubic over the band
-    ``max(p_v - d, p_v/2) < p < p_v + d``: the homogeneous equilibrium model, whose plateau at the
-    vapour pressure is given a small slope so that the density determines the pressure.  Below the
-    band there is ideal vapour only, down to 1 Pa; nothing is clipped and no mass is lost.  Bubbles
-    grow and collapse at once (no delay by heat, inertia or nuclei).
+    with the liquid share ``s`` of the volume rising as a smooth cubic over ``max(p_v - d, p_v/2) <
+    p < p_v + d``: the homogeneous equilibrium model, whose plateau gets a small slope so that the
+    density determines the pressure.  Below the band there is ideal vapour only, down to 1 Pa.
+    Bubbles grow and collapse at once (no delay by heat, inertia or nuclei).
 
     Parameters
     ----------
@@ -158,7 +156,7 @@ class Vapour:
     density [kg/m^3]
         ``rho_v`` of the saturated vapour.
     half_width [Pa]
-        ``d``: wider is smoother for the solver, narrower nearer to the true plateau.
+        ``d``: smoother for the solver if wide, truer if narrow.
     """
 
     pressure: float

@@ -1,22 +1,21 @@
 r"""Narrowest section between the contour of a needle and a conical seat.
 
-Between a point of one contour and a point of the other the flow passes the mantle of a frustum,
+Between two points of the contours the flow passes the mantle of a frustum,
 
 .. math:: A = \pi (r_P + r_Q)\,|PQ| ,
 
-and the smallest of all is the flow area.  Between two straight pieces it always has a vertex at one
-end: moved together, both ends see an area that is quadratic in the displacement and has no minimum
-above zero.  From a vertex at the distance ``h`` of a line of slope ``s = dr/dl`` it ends at
+and the smallest is the flow area.  Between two straight pieces it always has a vertex at one end:
+with both ends moved together the area is quadratic and has no minimum above zero.  From a vertex at
+the distance ``h`` of a line of slope ``s = dr/dl`` it ends at
 
 .. math:: \tau = -q h, \quad q = \frac{2 s h}{R + \sqrt{R^2 - 8 s^2 h^2}}, \quad
           A = \pi (R - s q h)\, h \sqrt{1 + q^2}
 
-beyond the foot of the perpendicular, ``R`` the sum of the radii of vertex and foot: towards the
-axis, where the frustum is smaller.  On a rounded edge the end is where the area has no slope along
-the arc, found by regula falsi.
+beyond the foot of the perpendicular towards the axis, where the frustum is smaller; ``R`` is the
+sum of the radii of vertex and foot.  On a rounded edge regula falsi finds the end where the area
+has no slope along the arc.
 
-Limit: both contours end where they end; what lies beyond must not be nearer.
-Source: elementary geometry.
+Limit: nothing beyond the ends of the contours may be nearer.  Source: elementary geometry.
 """
 
 from math import cos, inf, pi, sin, sqrt
@@ -36,7 +35,7 @@ _ROUNDS = 30
 def to_line(
     pr: float, pz: float, r0: float, z0: float, ur: float, uz: float, side: float
 ) -> tuple[float, float, float, float]:
-    """Best end on a line for a point: place along it, area over pi, distance, its tangent."""
+    """Best end on a line for a point: place, area over pi, distance, its tangent."""
     wr, wz = pr - r0, pz - z0
     along = wr * ur + wz * uz
     h = max(side * (wz * ur - wr * uz), 0.0)

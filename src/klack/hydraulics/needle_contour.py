@@ -1,8 +1,8 @@
 r"""Contour of a needle with an edge on a conical seat: two cones, sharp, rounded or chamfered.
 
-The edge is where tip and shank would meet.  The blunter tip and the steeper shank leave the seat on
-both sides, so the closed needle touches it along one circle, the sealing diameter: the edge itself,
-an end of the chamfer, or the point of the rounding whose tangent is that of the seat,
+The edge is where tip and shank would meet.  With a tip blunter and a shank steeper than the seat
+the closed needle touches along one circle, the sealing diameter: the edge, an end of the chamfer,
+or the point of the rounding with the tangent of the seat,
 
 .. math:: r_s = r_e - \rho\Bigl(\cos\beta_2 + \sin\beta_2
           \tan\tfrac{\beta_2 - \beta_1}{2}\Bigr) + \rho \cos\alpha
@@ -24,13 +24,11 @@ Point = tuple[float, float]
 class NeedleContour:
     """Contour in the half plane of radius and height; height 0 is the edge.
 
-    Parameters
-    ----------
-    points : tuple of (float, float) [m], [m]
+    Parameters ---------- points [m], [m]
         From the axis up; the last one far away.
     edge_start [m]
         Radius where the cone of the tip ends.
-    arc : tuple of float, length 5 [m], [m], [m], [rad], [rad]
+    arc [m], [m], [m], [rad], [rad]
         Centre, radius, angles of shank and tip; radius 0 without a rounding.
     """
 
@@ -52,8 +50,8 @@ class NeedleContour:
     ) -> Self:
         """Build from the radius [m] of the edge, half angles [rad], a length [m] of the shank.
 
-        ``tip_radius`` [m] of a blunt tip, ``rounding`` [m] of the edge, ``chamfer`` half angle
-        [rad] and width [m].
+        Also ``tip_radius`` [m], ``rounding`` [m] of the edge, ``chamfer`` half angle [rad] and
+        width [m].
         """
         below = above = 0.0
         arc = (0.0, 0.0, 0.0, 0.0, 0.0)
@@ -93,7 +91,7 @@ class NeedleContour:
         return max(self.points, key=lambda p: p[0] * out - p[1] * down)
 
     def numbers(self, angle: float, lower: float, upper: float) -> tuple[float, ...]:
-        """What :func:`~klack.hydraulics.narrowest_mantle.narrowest_mantle` takes.
+        """Parameters of :func:`~klack.hydraulics.narrowest_mantle.narrowest_mantle`.
 
         Closed on a seat of this half angle [rad] between two radii [m]; its lower end has height 0.
         """

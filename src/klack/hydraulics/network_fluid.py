@@ -23,7 +23,7 @@ __all__ = [
 
 
 def network_fluid(rows: Rows) -> NetworkFluid:
-    """Return the fluid; raise :class:`InputError` if the network has none."""
+    """Fluid of the network; InputError if it has none."""
     if rows.fluid is None:
         raise InputError(
             f"{rows.component or 'component'}: fluid",
@@ -42,8 +42,8 @@ def gas_is_slow(rows: Rows) -> bool:
 def energy_table(rows: Rows) -> NDArray[np.float64]:
     """Table of the pressure energy that flows carry.
 
-    Where gas leaves and enters the fluid with time constants, they carry that with all gas free:
-    see :mod:`klack.hydraulics.gas_release`.
+    Where gas has time constants, this is that with all gas free: see
+    :mod:`klack.hydraulics.gas_release`.
     """
     fluid = network_fluid(rows)
     if isinstance(fluid, Fluid) and fluid.has_release_times:
@@ -52,11 +52,11 @@ def energy_table(rows: Rows) -> NDArray[np.float64]:
 
 
 def ambient_viscosity(rows: Rows) -> tuple[NetworkFluid, float]:
-    """Fluid and its dynamic viscosity [Pa s] at the ambient pressure.
+    """Fluid and its dynamic viscosity [Pa s] at the ambient pressure, for restrictions.
 
-    Restrictions keep this one unless the fluid has a :func:`viscosity_law`, and then that at one
-    atmosphere, which the law refers to.  The rise with pressure is 0.1 to 0.2 % per bar in oils and
-    less in fuels: below the accuracy of flow coefficients up to some tens of bar.
+    With a :func:`viscosity_law` it is that at one atmosphere, to which the law refers.  The rise
+    with pressure is 0.1 to 0.2 % per bar in oils and less in fuels: below the accuracy of flow
+    coefficients up to some tens of bar.
     """
     fluid = network_fluid(rows)
     if isinstance(fluid, Fluid) and fluid.viscosity_law is not None:
@@ -65,7 +65,7 @@ def ambient_viscosity(rows: Rows) -> tuple[NetworkFluid, float]:
 
 
 def fixed_viscosity(rows: Rows) -> tuple[NetworkFluid, float]:
-    """As :func:`ambient_viscosity`, for a restriction that follows no viscosity law and says so."""
+    """As :func:`ambient_viscosity`, with a note that the restriction follows no viscosity law."""
     if viscosity_law(rows) is not None:
         warnings.warn(
             f"{rows.component}: its laminar flow has the viscosity at one atmosphere. The law of "
@@ -77,6 +77,6 @@ def fixed_viscosity(rows: Rows) -> tuple[NetworkFluid, float]:
 
 
 def viscosity_law(rows: Rows) -> PressureViscosity | None:
-    """How the viscosity of the fluid rises with pressure in restrictions; None: not at all."""
+    """Law of the viscosity over pressure in restrictions, if any."""
     fluid = network_fluid(rows)
     return fluid.viscosity_law if isinstance(fluid, Fluid) else None

@@ -1,9 +1,9 @@
-r"""Metering notches in the edge of a spool: their narrowest section over the displacement.
+"""Metering notches in the edge of a spool: their narrowest section over the displacement.
 
-A notch begins at its tip, ``length`` ahead of the edge, and ends open at the edge.  With the edge
-open by ``x`` (covered: negative) the tip is uncovered by ``s = x + L``.  Between the notch and the
-edge of the sleeve, the fluid passes the *exit*, the part of the outline beyond that edge, and the
-*throat*, the section below that edge normal to the bottom of the notch.  The smaller one counts.
+A notch runs from its tip, ``length`` ahead of the edge, to the edge.  With the edge open by ``x``
+(covered: negative) the tip is uncovered by ``s = x + L``.  The smaller one counts of the *exit*,
+the part of the outline beyond the edge of the sleeve, and the *throat*, the section below that edge
+normal to the bottom of the notch.
 
 ===========  ==========================  ==========================  ============================
 shape        exit                        throat, ``x <= 0``          throat, ``x > 0``
@@ -17,10 +17,10 @@ hole         segment of the circle       none                        none
 
 with the width ``b`` and the depth ``t`` at the edge, ``r = b/2``, the width ``w(s)`` of the outline
 where it passes the edge of the sleeve, and ``tan(be) = t/L`` of a bottom that rises to the tip.
-``b sin(be) s^2/(2 L)`` is the smallest of all plane sections through the edge of the sleeve, the
-exit among them.  Beyond the edge of the land, each strip of the triangular notch has the shortest
-distance between the edge of the sleeve and its bottom: with ``q`` from 0 at a flank to 1 in the
-middle ``(x + L q) sin(be)``, and ``sqrt(x^2 + t^2 q^2)`` where ``q < x L/t^2``.
+``b sin(be) s^2/(2 L)`` is the smallest of all plane sections through the edge of the sleeve.
+Beyond the edge of the land, each strip of the triangular notch has the shortest distance to its
+bottom: with ``q`` from 0 at a flank to 1 in the middle ``(x + L q) sin(be)``, and ``sqrt(x^2 + t^2
+q^2)`` where ``q < x L/t^2``.
 
 Limits: the surface of the spool is plane across a notch, ``b`` small against the diameter; the
 edges are sharp; both areas are those of a quasi-steady flow, in series only as the smaller one.
@@ -152,16 +152,14 @@ def notch_opening(
               J = \int \frac{d\xi}{w\,(t + c)^3} , \qquad
               G = \int \frac{du}{l(u) + l_e}
 
-    ``A`` is the smaller one of exit and throat, ``w`` the width at the edge of the sleeve and
-    ``4 A/P`` the smaller hydraulic diameter of both, so that ``2 g`` is what it is at the edge
-    itself.  ``J`` is the friction along the notch, a slot of the local width and depth; of the
-    triangular one with the mean of the depth cubed, ``t^3/4``, and without the clearance.  ``G`` is
-    the leakage through the covered flank of a triangular or round tip, strip by strip; ``l_e`` is
-    the length of gap that resists as the edge does.
+    with the smaller one ``A`` of exit and throat, the width ``w`` at the edge of the sleeve and the
+    smaller hydraulic diameter ``4 A/P`` of both, ``2 g`` at the edge itself.  ``J`` is the friction
+    along the notch, a slot of the local width and depth; of the triangular one with the mean of the
+    depth cubed, ``t^3/4``, and without the clearance.  ``G`` is the leakage through the covered
+    flank of a triangular or round tip, strip by strip; a gap of length ``l_e`` resists as the edge
+    does.
 
-    Parameters
-    ----------
-    par : sequence of floats
+    Parameters ---------- par
         From ``base`` on: kind, count, width [m], depth [m], length [m], width at the edge [m].
     x, c, more [m]
         Opening, clearance, ``l_e``.

@@ -1,8 +1,8 @@
-r"""Opening of a seat whose needle is off-axis or tilted, in compiled code.
+"""Opening of a seat whose needle is off-axis or tilted, in compiled code.
 
-The area is that of :func:`klack.hydraulics.off_axis_seat.flow_area`.  Sectors round the edge lie
-in parallel: a laminar flow through the land goes with the mean of :math:`h^3`, that of a sharp edge
-at rest with the mean of :math:`h^2` over that of ``h``.  Centred all of them are the one gap.
+The area is that of :func:`klack.hydraulics.off_axis_seat.flow_area`.  Sectors round the edge are in
+parallel: laminar flow through the land goes with the mean of :math:`h^3`, that of a sharp edge at
+rest with the mean of :math:`h^2` over that of ``h``.
 """
 
 from math import cos, pi, sin, sqrt

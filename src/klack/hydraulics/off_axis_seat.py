@@ -6,14 +6,14 @@ the needle, a plane, cone or ball, is placed by five numbers
 .. math:: (x,\; e_x,\; e_y,\; t_x,\; t_y)
 
 lift and offset of the point of its axis that is in the middle of the edge when seated, and slopes
-of the plane across its axis, :math:`z = t_x x + t_y y` as of
-:mod:`~klack.hydraulics.tilted_film`.  The shortest line from the edge to the face is the gap
-:math:`h(\varphi)`, and all of these lines together are the surface that the flow passes:
+of the plane across its axis, :math:`z = t_x x + t_y y` as of :mod:`~klack.hydraulics.tilted_film`.
+The shortest lines from the edge to the face are the gap :math:`h(\varphi)`, and together the
+surface that the flow passes:
 
 .. math:: A = \int_0^{2\pi}\!\int_0^{h} |(P' + s\,n') \times n|\, ds\, d\varphi
 
-with the unit vector ``n`` along the line.  It is the mantle of
-:class:`~klack.hydraulics.seat.Seat` for any placement.  Nothing flows where faces overlap.
+with the unit vector ``n`` along the line, the mantle of :class:`~klack.hydraulics.seat.Seat` for
+any placement.  Nothing flows where faces overlap.
 
 To first order in offset and tilt, with :math:`\beta` between axis and face at the edge,
 
@@ -71,7 +71,6 @@ class SeatFace:
     Parameters
     ----------
     shape
-        flat, cone or ball.
     radius [m]
         Of the edge.
     angle [rad]
@@ -95,7 +94,7 @@ class SeatFace:
 
     @classmethod
     def of(cls, seat: _Seat) -> Self:
-        """Take shape, edge and angle of a seat."""
+        """Shape, edge and angle of a seat."""
         return cls(shape=seat.shape, radius=0.5 * seat.diameter, angle=seat.surface_angle)
 
 
@@ -138,7 +137,7 @@ def ring_opening(mean: ArrayLike, swing: ArrayLike, radius: float) -> Vector:
 
     .. math:: A = 2 r (h\,\varphi_c + a \sin\varphi_c), \qquad \cos\varphi_c = -h/a
 
-    and :math:`2\pi r h` while nothing overlaps, ``h > a``; none below ``h = -a``.
+    and :math:`2\pi r h` for ``h > a``; none below ``h = -a``.
 
     Parameters
     ----------
@@ -174,10 +173,10 @@ def pressure_load(
     :math:`\pi r\,(e \cos\beta - r\,t \sin\beta) \sin\beta`: pressure from outside centres an offset
     needle.
 
-    Limits: pressure at rest.  Left out are the fall of pressure along the face within a gap's
-    length, and jets that differ round the edge: both change the force across the axis by terms of
-    the same order, :math:`\Delta p\, r\, e`, so it is right for a gap that is small against
-    its land (creeping flow, a needle that nearly closes) and an order of magnitude otherwise.
+    Limits: pressure at rest.  The fall of pressure along the face within a gap's length, and jets
+    that differ round the edge, change the force across the axis by terms of the same order,
+    :math:`\Delta p\, r\, e`, so it is right for a gap that is small against its land (creeping
+    flow, a needle that nearly closes) and an order of magnitude otherwise.
     """
     place = _placed(placement)
     phi = _angles(angles)
@@ -218,7 +217,7 @@ def _edge(radius: float, phi: Vector) -> Vector:
 
 
 def _derivative(closed: Vector) -> Vector:
-    """Derivative over the angle of points round a closed curve, exact for its harmonics."""
+    """Derivative over the angle along a closed curve, exact for its harmonics."""
     number = len(closed)
     order = np.fft.rfftfreq(number, 1.0 / number)
     order[2 * order == number] = 0.0
@@ -227,7 +226,7 @@ def _derivative(closed: Vector) -> Vector:
 
 
 def _gap(face: SeatFace, place: Any, phi: Vector) -> tuple[Any, Any, Any, Any]:
-    """Gap, unit vector along it, and of that vector the turning over the angle.
+    """Gap, unit vector along it, and the turning of that vector over the angle.
 
     Analytic in ``place`` (no absolute values), so that complex placements give slopes.  Returned
     are gap (S,), ``n`` (S, 3), squares of the edge's speed along the face's meridian and across it,

@@ -36,14 +36,14 @@ def opening_flow(
     contraction: float,
     vapour: float,
 ) -> tuple[float, float, float, float]:
-    r"""Mass flow of an orifice of any area, its slopes with both pressures, and that with the area.
+    r"""Mass flow [kg/s], its slopes with both pressures [kg/(s Pa)], and with the area.
 
     Area and flow number change together, ``D_h = sqrt(4 A/pi)``:
 
     .. math:: \frac{\partial\dot m}{\partial A} = \frac1A\Bigl(\tfrac12\dot m
               + \frac{\partial\dot m}{\partial\Delta p}\,\Delta p\Bigr) ,
 
-    or ``mdot/A`` where the throat cavitates.
+    or ``mdot/A`` where the throat cavitates; returned is that of the magnitude, never below zero.
 
     Parameters
     ----------
@@ -56,11 +56,6 @@ def opening_flow(
         ``2 / (mu lambda_c)``.
     contraction, vapour [-], [Pa]
         See :func:`~klack.hydraulics.orifice.choked_flow`.
-
-    Returns
-    -------
-    flow, slope_a, slope_b, by_area : float [kg/s], [kg/(s Pa)], [kg/(s Pa)], [kg/(s m^2)]
-        The last one of the magnitude of the flow: never below zero.
     """
     if area <= 0.0:
         return 0.0, 0.0, 0.0, 0.0
@@ -97,7 +92,7 @@ class OpeningComponent(Component):
     def opening_constants(
         self, viscosity: float, vapour_pressure: float
     ) -> tuple[float, float, float, float]:
-        """Last four parameters of :func:`opening_flow`, at a viscosity [Pa s] and pressure [Pa]."""
+        """Last four parameters of :func:`opening_flow`."""
         contraction = NOT_CHOKED if self.cavitation is None else self.cavitation
         number = 2.0 / (viscosity * self.critical_flow_number)
         return self.discharge, number, contraction, vapour_pressure

@@ -67,18 +67,12 @@ def choked_flow(
     Parameters
     ----------
     flow, up, down [kg/s], [kg/(s Pa)]
-        Without the limit, zero or more; its slopes with the pressure before and behind, the second
-        negative.
+        Without the limit, zero or more; its slopes with the pressure before and behind.
     supply, density [Pa], [kg/m^3]
         Before the restriction.
     throat [m^2]
         ``C_c A``; zero switches the limit off.
     vapour [Pa]
-
-    Returns
-    -------
-    flow, up, down : float
-        As they came, or limited.
     """
     if throat <= 0.0:
         return flow, up, down
@@ -109,23 +103,19 @@ def orifice_flow(
     throat: float,
     vapour: float,
 ) -> tuple[float, float, float]:
-    r"""Mass flow of an orifice and its slopes with both pressures, at given densities.
+    """Mass flow [kg/s] of an orifice and its slopes with both pressures [kg/(s Pa)].
 
     Parameters
     ----------
     p_a, p_b [Pa]
     rho_a, rho_b [kg/m^3]
-        Only that before the orifice acts.
+        That before the orifice acts.
     conductance [m^2]
         ``C_q A``.
     number [m s/kg]
         ``2 D_h / (mu lambda_c)``.
     throat, vapour [m^2], [Pa]
         See :func:`choked_flow`.
-
-    Returns
-    -------
-    flow, slope_a, slope_b : float [kg/s], [kg/(s Pa)]
     """
     forward = p_a >= p_b
     density = rho_a if forward else rho_b
@@ -167,9 +157,9 @@ def orifice_flow_under_pressure(
     exponent: float,
     power: float,
 ) -> tuple[float, float, float]:
-    """Flow of :func:`orifice_flow` with the viscosity that acts between both pressures.
+    """:func:`orifice_flow` with the viscosity that acts between both pressures.
 
-    ``number`` is that with the viscosity at one atmosphere; ``exponent`` and ``power`` are those of
+    ``number`` is that at one atmosphere; ``exponent`` and ``power`` are those of
     :class:`~klack.hydraulics.pressure_viscosity.PressureViscosity`.
     """
     ratio, by_a, by_b = mean_viscosity_ratio(p_a, p_b, exponent, power)
@@ -190,7 +180,7 @@ def orifice_flow_under_pressure(
 
 @step_function
 def orifice_under_pressure_step(par: Any, state: Any, inp: Any, out: Any) -> int:
-    """Step of :func:`orifice_step` with the two numbers of the viscosity law behind ``par``."""
+    """:func:`orifice_step` with the two numbers of the viscosity law behind ``par``."""
     out[0], out[1], out[2] = orifice_flow_under_pressure(
         inp[2], inp[3], inp[4], inp[5], par[0], par[1], par[2], par[3], par[4], par[5]
     )
@@ -204,10 +194,10 @@ class Orifice(Component):
               C_q = C_\infty \tanh\frac{2\lambda}{\lambda_c}, \qquad
               \lambda = \frac{D_h}{\nu}\sqrt{\frac{2 |p_a - p_b|}{\varrho}}
 
-    The flow number ``lambda`` is a Reynolds number that needs no velocity; the hyperbolic tangent
-    gives one smooth law, linear in the pressure at rest.  The usual root alone has an infinite
-    slope there, on which every implicit chamber solver stumbles.  A throat at vapour pressure
-    limits the flow to ``C_c A sqrt(2 rho (p_1 - p_v))`` (Nurick 1976).
+    The flow number ``lambda`` is a Reynolds number without velocity; the hyperbolic tangent makes
+    the law smooth and linear at rest, where the usual root has an infinite slope on which implicit
+    solvers stumble.  A throat at vapour pressure limits the flow to ``C_c A sqrt(2 rho (p_1 -
+    p_v))`` (Nurick 1976).
 
     Positive flow runs from a to b; density and limit are those before the orifice.
 
@@ -263,7 +253,7 @@ class Orifice(Component):
         return pi / 4.0 * self.diameter**2 if self.diameter else self.area or 0.0
 
     def parameters(self, viscosity: float, vapour_pressure: float) -> tuple[float, ...]:
-        """Return what :func:`orifice_step` takes, for a viscosity [Pa s] and pressure [Pa]."""
+        """Parameters of :func:`orifice_step`."""
         size = self.hydraulic_diameter or sqrt(4.0 * self.hole_area / pi)
         area = self.count * self.hole_area
         number = 2.0 * size / (viscosity * self.critical_flow_number)

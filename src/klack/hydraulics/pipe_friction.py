@@ -49,8 +49,8 @@ def _colebrook(x: float, rough: float) -> tuple[float, float]:
 def reynolds_of(x: float, rough: float, first: float) -> tuple[float, float]:
     r"""Reynolds number that belongs to ``x = Re sqrt(f)``, and its slope.
 
-    ``x = D/nu sqrt(2 dp D/(rho L))`` is known from the pressure drop alone; so the implicit law of
-    Colebrook becomes an explicit one:
+    ``x = D/nu sqrt(2 dp D/(rho L))`` follows from the pressure drop, which makes the law of
+    Colebrook explicit:
 
     .. math:: Re = \frac{x^2}{64}\ \text{(laminar)}, \qquad
               Re = -2 x \lg\Bigl(\frac{\varepsilon}{3.7 D} + \frac{2.51}{x}\Bigr)
@@ -79,10 +79,10 @@ def reynolds_of(x: float, rough: float, first: float) -> tuple[float, float]:
 def laminar_doubts(
     component: str, reynolds: float, time: float, drop: float | None
 ) -> Iterator[str]:
-    r"""Sentence on laminar friction beyond its range, where it matters: by 0.01 bar or more.
+    r"""Sentence on laminar friction beyond its range, where it matters by 0.01 bar or more.
 
     In a smooth pipe the turbulent pressure drop is :math:`0.3164\,Re^{3/4}/64` times the laminar
-    one, ``drop`` [Pa] or None where it is not known (Blasius, Mitt. Forschungsarb. 131 (1913)).
+    ``drop`` [Pa] (Blasius, Mitt. Forschungsarb. 131 (1913)); None if unknown.
     """
     times = 0.3164 * reynolds**0.75 / 64.0
     if reynolds <= LAMINAR or (drop is not None and (times - 1.0) * drop < _TOLD):
@@ -148,8 +148,8 @@ class PipeFriction(Component):
               \Bigr)\ (Re \ge 4000)
 
     Hagen-Poiseuille and Colebrook, joined by a straight line in ``Re sqrt(f)``, which the pressure
-    drop gives: no iteration, and monotone.  In a row with an ``inertance`` or a ``line`` (both with
-    ``friction: none``) it makes their flow turbulent; between them each needs a small chamber.
+    drop gives: no iteration, and monotone.  In a row with an ``inertance`` or a ``line``
+    (``friction: none``), with a small chamber between, it makes their flow turbulent.
 
     Limits: steady friction, fully developed; transients of milliseconds from rest remain laminar
     above Re = 2300 (see ``line``).  Viscosity is that at ambient pressure.
@@ -179,7 +179,7 @@ class PipeFriction(Component):
         return self
 
     def parameters(self, viscosity: float) -> tuple[float, ...]:
-        """Return what :func:`pipe_friction_step` takes, for a viscosity [Pa s]."""
+        """Parameters of :func:`pipe_friction_step`."""
         rough = self.roughness / (3.7 * self.diameter)
         first = _LAST
         for _ in range(60):  # Re = 4000: a contraction, by Colebrook's own form
@@ -193,7 +193,7 @@ class PipeFriction(Component):
         self.add_between(rows, rows.port("a"), rows.port("b"), viscosity)
 
     def add_between(self, rows: Rows, a: int, b: int, viscosity: float, label: str = "") -> None:
-        """Add the branch between two nodes of the present component, for a viscosity [Pa s]."""
+        """Add the branch between two nodes of the present component."""
         rows.branch(
             pipe_friction_step,
             a=a,

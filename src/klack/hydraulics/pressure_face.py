@@ -16,11 +16,10 @@ class PressureFace(FaceComponent):
 
     .. math:: F = \pm A\,(p - p_{amb}), \qquad \Delta V = \pm A\,y
 
-    ``+`` for ``direction: opening``: the face looks down, its pressure lifts the body, and a rising
-    body makes room below it.  The same area moves the fluid, so the work on the body is that taken
-    from the fluid.  A stepped needle has one face per pressure; give the diameters of the step as
-    ``outer_diameter`` and ``inner_diameter``.  Closed on its seat the pressure steps at the sealing
-    diameter.
+    ``+`` for ``direction: opening``: the pressure lifts the body, and a rising body makes room
+    below it.  The same area moves the fluid, so the work on the body is that taken from the fluid.
+    A stepped needle has one face per pressure, from ``inner_diameter`` to ``outer_diameter``.
+    Closed on its seat the pressure steps at the sealing diameter.
 
     Limits: one pressure over the whole face.  For the ring of a narrow land between two pressures
     see :class:`~klack.hydraulics.land_face.LandFace`.

@@ -35,9 +35,9 @@ class PressureLoss(Component):
               = \frac{K_1 \mu}{2 D A}\,Q + \frac{\zeta\varrho}{2 A^2}\,Q^2, \qquad
               v = \frac{Q}{A},\quad Re = \frac{\varrho v D}{\mu}
 
-    the two coefficients of Hooper: ``zeta`` at large and ``K_1`` at small Reynolds numbers.  The
-    law is smooth and monotone, with another coefficient for each direction if needed.  A junction
-    of lines is a ``chamber`` of the volume of the crossing with one pressure loss for each branch.
+    with Hooper's coefficients ``zeta`` at large and ``K_1`` at small Reynolds numbers: smooth and
+    monotone, with another coefficient for each direction if needed.  A junction of lines with
+    losses is a ``chamber`` of the volume of the crossing with one pressure loss per branch.
 
     ``zeta`` for round bores: bend of 90 degrees 0.2 to 0.4, sharp 1.1; tee straight on 0.1, as an
     elbow 0.7 to 1; sharp inlet 0.5, outlet into a chamber 1, step from ``A`` to the larger ``A_2``

@@ -13,8 +13,8 @@ Barus      ``alpha c``             196.2 MPa  1
 Roelands   ``ln(mu_0) + 9.67``     196.2 MPa  ``alpha c / B``
 =========  ======================  =========  =====================
 
-``mu_0`` in Pa s.  A laminar gap between two pressures has the flow and the shear of one constant
-viscosity, exactly: the mean :func:`mean_viscosity_ratio`.
+``mu_0`` in Pa s.  A laminar gap between two pressures has exactly the flow and the shear of one
+mean viscosity (:func:`mean_viscosity_ratio`).
 
 Sources: Barus, Am. J. Sci. 45 (1893) 87; Roelands, thesis, Delft 1966; Hamrock, Schmid and
 Jacobson, Fundamentals of Fluid Film Lubrication, 2004, sec. 4.6.
@@ -46,7 +46,7 @@ Values = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PressureViscosity:
-    """How the viscosity of one fluid rises with pressure.
+    """Rise of the viscosity of a fluid with pressure.
 
     Parameters
     ----------
@@ -110,14 +110,14 @@ class PressureViscosity:
 def mean_viscosity_ratio(
     p_a: float, p_b: float, exponent: float, power: float
 ) -> tuple[float, float, float]:
-    r"""Viscosity that acts in a laminar gap between two pressures, over that at one atmosphere.
+    r"""Mean viscosity of a laminar gap over that at one atmosphere [-], and its slopes [1/Pa].
 
     .. math:: \bar r = \frac{p_a - p_b}{\int_{p_b}^{p_a} \mu_0/\mu \, dp}
 
-    Hagen-Poiseuille and Couette flow with ``mu(p)``: :math:`Q = k (p_a - p_b)/\bar r`, and since
-    the pressure falls along the gap as :math:`dx \propto dp/\mu`, the mean of ``mu`` over the
-    length, which the walls feel, is :math:`\mu_0 \bar r` too.  Five points of Gauss: right to 1e-9
-    where the viscosity of Barus changes by a factor of 6 over the gap, to 1e-7 for a factor of 37.
+    Hagen-Poiseuille flow is :math:`Q = k (p_a - p_b)/\bar r`, and since :math:`dx \propto dp/\mu`,
+    the mean of ``mu`` over the length, which the walls feel, is :math:`\mu_0 \bar r` too.  Five
+    points of Gauss: right to 1e-9 where the viscosity of Barus changes by a factor of 6 over the
+    gap, to 1e-7 for a factor of 37.
 
     Parameters
     ----------
@@ -125,10 +125,6 @@ def mean_viscosity_ratio(
         Absolute.
     exponent, power [-]
         Of :class:`PressureViscosity`.
-
-    Returns
-    -------
-    ratio, slope_a, slope_b : float [-], [1/Pa], [1/Pa]
     """
     fluidity = by_a = by_b = 0.0
     for k in range(5):

@@ -6,18 +6,17 @@ A text file with one row per temperature and pressure, its columns in any order:
     293.15, 1e5, 749.7, 1.27e9, 1.49e-3
     293.15, 500e5, 779.2, 1.88e9, 2.7e-3
 
-``sound speed`` may stand instead of ``bulk modulus``, or beside it; ``vapour pressure`` is
-optional.
+``sound speed`` may replace or join ``bulk modulus``; ``vapour pressure`` is optional.
 
-Over pressure the *compressibility* ``1/K`` runs through its points as a monotone cubic, and the
-density is its exact integral from the lowest pressure on, so that both belong together:
+Over pressure the *compressibility* ``1/K`` is a monotone cubic, and the density its exact integral
+from the lowest pressure on:
 
 .. math:: \ln\frac{\rho(p)}{\rho(p_1)} = \int_{p_1}^{p} \frac{dp}{K}
 
-With an isentropic ``K`` (from the speed of sound) that is the isentrope that starts at the lowest
-pressure, as for all fluids of the library.  The densities at higher pressures, of constant
-temperature, then serve as a check.  Over temperature monotone cubics run through density,
-compressibility and the logarithms of viscosity and vapour pressure.
+With an isentropic ``K`` (from the speed of sound) that is the isentrope from the lowest pressure,
+as for all fluids of the library; the densities at higher pressures, of constant temperature, are
+then a check.  Over temperature monotone cubics run through density, compressibility and the
+logarithms of viscosity and vapour pressure.
 """
 
 import warnings
@@ -113,7 +112,7 @@ class CompressedLiquid:
 
     @property
     def pressure_range(self) -> PressureRange:
-        """The table, and as far beyond as the missing rise of the bulk modulus is small."""
+        """The table, and beyond as far as the missing rise of the bulk modulus is small."""
         low, high = float(self.pressure[0]), float(self.pressure[-1])
         first, last = (float(K) for K in self.bulk_modulus(self.pressure[[0, -1]]))
         return PressureRange(
@@ -142,7 +141,6 @@ class PropertyTable:
     Parameters
     ----------
     name
-        Of the file.
     temperature (m,) [K]
         Increasing.
     pressure (n,) [Pa]
@@ -164,10 +162,7 @@ class PropertyTable:
     def at(self, temperature: float) -> FluidState:
         """Properties at a temperature [K]; the viscosity as one exponential over pressure.
 
-        Warns
-        -----
-        AccuracyWarning
-            If the exponential is off by more than 5 % anywhere in the table.
+        Warns if that is off by more than 5 % anywhere in the table.
         """
         viscosity = np.exp(self._between(np.log(self.viscosity), temperature))
         base, slope, error = _exponential(self.pressure, viscosity)
@@ -193,7 +188,7 @@ class PropertyTable:
         )
 
     def definition(self, name: str) -> FluidDefinition:
-        """Return the fluid over the temperatures of the table."""
+        """Fluid over the temperatures of the table."""
         return FluidDefinition(
             name=name,
             properties=self,
@@ -226,13 +221,7 @@ def _exponential(pressure: Values, viscosity: Values) -> tuple[float, float, flo
 
 
 def read_property_table(path: Path) -> PropertyTable:
-    """Read and check a table of properties.
-
-    Raises
-    ------
-    InputError
-        For what is missing or cannot be the properties of one liquid.
-    """
+    """Read a table of properties, and reject what cannot be those of one liquid."""
     head, numbers = _read(path)
     value = dict(zip(head, numbers.T, strict=True))
     T, p = (np.unique(value[name]) for name in ("temperature", "pressure"))
@@ -291,7 +280,7 @@ def _require_rising(where: str, T: Values, p: Values, rho: Values) -> None:
 
 
 def _stiffness(where: str, T: Values, p: Values, columns: dict[str, Values]) -> Values | None:
-    """Bulk modulus of the table, held against sound speed and density."""
+    """Bulk modulus of the table, checked against sound speed and density."""
     K, rho = columns.get("bulk modulus"), columns["density"]
     if "sound speed" in columns:
         by_sound = rho * columns["sound speed"] ** 2
@@ -360,7 +349,7 @@ def _read(path: Path) -> tuple[list[str], Values]:
 
 
 def _head(where: str, cells: list[str]) -> tuple[list[str], list[tuple[float, float]]]:
-    """Names of the columns, and value of 0 and factor of their units."""
+    """Names of the columns, and offset and factor of their units."""
     names, factors = [], []
     for cell in cells:
         name, _, unit = (part.strip(" ]\t\"'") for part in cell.partition("["))

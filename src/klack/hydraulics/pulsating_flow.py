@@ -22,7 +22,7 @@ __all__ = ["FlowHarmonic", "PulsatingFlow", "pulsating_flow_step"]
 def pulsating_flow_step(par: Any, state: Any, inp: Any, out: Any) -> int:
     """Mean over the step of a constant flow and of sines.
 
-    ``par``: size of all, number of sines, constant mass flow, then angular frequency, amplitude and
+    ``par``: size of all, number of sines, constant mass flow, angular frequency, amplitude and
     phase of each, fluid table.  ``state``: places in the fluid table of both ends.
     """
     sines = int(par[1])
@@ -56,11 +56,10 @@ class PulsatingFlow(Component):
 
     .. math:: Q = Q_0 + \sum_k a_k \sin(2\pi f_k t + \varphi_k)
 
-    A step takes the exact mean of it, so that steps of any length deliver the same volume.  As the
-    ``flow-source`` it reaches any pressure, its work is a supply, the volume counts at ambient
-    density, and port a left alone takes the fluid from the surroundings.  The static equilibrium
-    before time zero has the mean flow alone.  A pulsation of *pressure* is a ``pressure-source``
-    with a table.
+    Steps of any length deliver the same volume, by its exact mean.  As the ``flow-source`` it
+    reaches any pressure, its work is a supply, the volume counts at ambient density, and port a
+    left alone takes the fluid from the surroundings.  The static equilibrium has the mean flow.  A
+    pulsation of *pressure* is a ``pressure-source`` with a table.
 
     Limits: no internal impedance: the flow does not answer to the pressure.
     Source: definition; the harmonics of a pump come from measurements as in ISO 10767-1.

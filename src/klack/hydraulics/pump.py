@@ -29,12 +29,7 @@ def swept_share(angle: float, turned: float, pistons: int) -> float:
     .. math:: s = \frac{1}{2z}\sum_{k=0}^{z-1}\int_\varphi^{\varphi + \Delta\varphi}
               \max\bigl(0, \sin(\vartheta + 2\pi k/z)\bigr)\,d\vartheta
 
-    One turn delivers 1, exactly.
-
-    Parameters
-    ----------
-    angle, turned [rad]
-        At the start, any; and by how much it turns, zero or more.
+    One turn delivers 1, exactly.  ``angle`` and ``turned``, zero or more, are in rad.
     """
     turns = int(turned / _TURN)
     rest = turned - turns * _TURN
@@ -56,7 +51,7 @@ def swept_share(angle: float, turned: float, pistons: int) -> float:
 
 @inner(error_model="numpy", forceinline=True)
 def _deliver(par: Any, state: Any, inp: Any, out: Any, mixture: bool) -> None:
-    """Flow at the density of the table, or at that of the mixture before the pump."""
+    """Flow at the density of the table, or of the ``mixture`` before the pump."""
     table = carray(par, (int(par[0]),))[5:]
     t, h, omega = inp[0], inp[1], _TURN * par[2]
     flow = par[1] * par[2]
@@ -112,12 +107,11 @@ class Pump(Component):
               \max\Bigl(0, \sin\bigl(2\pi n t + \varphi_0 + \tfrac{2\pi k}{z}\bigr)\Bigr)
               - \frac{(1 - \eta)\,V_g n}{p_r}\,(p_b - p_a)
 
-    Each of ``z`` pistons delivers half a sine per turn; in sum the mean is exactly ``V_g n`` and
-    the ripple has the order ``z`` of the shaft for an even and ``2 z`` for an odd number.  Its
-    non-uniformity ``(Q_max - Q_min)/Q`` is ``pi/(2 z) tan(pi/(4 z))`` for odd and
-    ``pi/z tan(pi/(2 z))`` for even ``z``.  A step takes the volume swept within it, so nothing of
-    the mean is lost at any step.  The volume is drawn in at the density before the pump: a pump
-    whose inlet cavitates delivers less.  The leakage is laminar and given by the volumetric
+    Each of ``z`` pistons delivers half a sine per turn; the mean is exactly ``V_g n`` and the
+    ripple has the order ``z`` of the shaft for an even and ``2 z`` for an odd number.  Its
+    non-uniformity ``(Q_max - Q_min)/Q`` is ``pi/(2 z) tan(pi/(4 z))`` for odd and ``pi/z tan(pi/(2
+    z))`` for even ``z``.  A step takes the volume swept within it, at the density before the pump:
+    a pump whose inlet cavitates delivers less.  The leakage is laminar and given by the volumetric
     efficiency at one pressure difference.
 
     The work of the pistons is a supply, the leakage a loss.  Left alone, port a takes the fluid

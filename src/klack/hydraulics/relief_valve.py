@@ -1,4 +1,4 @@
-r"""Relief valve by its characteristic: set pressure, gradient, largest area, hysteresis, lag."""
+"""Relief valve by its characteristic."""
 
 from collections.abc import Mapping
 from math import exp, pi, sqrt
@@ -25,7 +25,7 @@ def relief_area(drop: float, setting: float, slope: float, largest: float) -> tu
 
     .. math:: A = \frac{k\,(\Delta p - p_s)}{\sqrt{\Delta p}} \le A_1
 
-    so that a turbulent orifice passes a flow that rises straight from the set pressure.
+    for a turbulent flow that rises straight from the set pressure.
 
     Parameters
     ----------
@@ -83,20 +83,20 @@ class ReliefValve(OpeningComponent):
               \qquad G = \frac{Q_r}{p_r - p_s}
 
     Above the set pressure ``p_s`` (cracking) the flow rises straight through the rated point
-    ``(p_r, Q_r)``, until the valve is fully open and remains an orifice of the area ``A_1``.  The
-    characteristic is turned into an area, ``A = G (dp - p_s) sqrt(rho/2)/(C_q sqrt(dp))``, so that
-    laminar flow, cavitation and the reverse direction (closed) are those of an orifice.
+    ``(p_r, Q_r)``, until the valve is fully open, an orifice of the area ``A_1``.  The
+    characteristic acts as an area, ``A = G (dp - p_s) sqrt(rho/2)/(C_q sqrt(dp))``, so that laminar
+    flow, cavitation and the reverse direction (closed) are those of an orifice.
 
     ``hysteresis``: while the pressure falls the area stays until the drop has fallen by it, then
     follows the same area curve shifted by it (play, as of a poppet with dry friction).
     ``time_constant``: the area follows with a lag of first order, exact over each step for a
     constant pressure.  Both begin at the characteristic of rising pressure.
 
-    Limits: no mass, so it does not chatter.  The lag makes a chamber before it swing, damped: the
-    answer of the flow to the pressure has a positive real part at all frequencies.  For a poppet
-    as a body take ``rigid-mass``, ``seat``, ``pressure-face``, ``spring`` and ``end-stop``.
-    Pressures are differences over the valve; ``Q`` counts at ambient density.
-    Sources: characteristic as in ISO 6403 tests; play operator: Prandtl 1928.
+    Limits: no mass, so it does not chatter.  The lag makes a chamber before it oscillate, damped:
+    the flow answers the pressure with a positive real part at all frequencies.  For a poppet as a
+    body take ``rigid-mass``, ``seat``, ``pressure-face``, ``spring`` and ``end-stop``.  Pressures
+    are differences over the valve; ``Q`` counts at ambient density.  Sources: characteristic as in
+    ISO 6403 tests; play operator: Prandtl 1928.
     """
 
     type: ClassVar[str] = "relief-valve"
@@ -153,7 +153,7 @@ class ReliefValve(OpeningComponent):
         return gradient * sqrt(0.5 * density) / self.discharge
 
     def add_rows(self, rows: Rows) -> None:
-        """Add one branch; its rated point has to lie below the area when fully open."""
+        """Add one branch; its rated point has to need less than the full area."""
         fluid, viscosity = fixed_viscosity(rows)
         slope = self.area_slope(float(fluid.density(rows.ambient.pressure)))
         rated = slope * (self.rated_pressure - self.set_pressure) / sqrt(self.rated_pressure)

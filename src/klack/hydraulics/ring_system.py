@@ -2,17 +2,17 @@ r"""Symmetric positive definite systems of cells in a ring, each coupled to its 
 
 .. math:: \begin{pmatrix} K & B \\ B^T & C \end{pmatrix}
 
-K has a block for every cell and one for each pair of neighbours, the last and the first among them;
-a few unknowns C are shared by all.  The last cell and the shared unknowns are taken as a border of
-the open chain of the others, so that the effort grows with the number of cells.
+K has a block for every cell and for each pair of neighbours, the last and the first among them; all
+share a few unknowns C.  The last cell and the shared unknowns border the open chain of the others,
+so that the effort grows with the number of cells.
 
-Some cells may be **held**: their unknowns move only across a given direction ``n``.  Their block is
-then inverted in that plane,
+The unknowns of **held** cells move only across a given direction ``n``.  Their block is inverted in
+that plane,
 
 .. math:: X - \frac{X n\, n^T X}{n^T X n}, \qquad X = L^{-1},
 
-which leaves the rest of the elimination as it is: what is left of the block of the next cell stays
-positive definite.
+and the rest of the elimination is unchanged: the remaining block of the next cell stays positive
+definite.
 """
 
 import numpy as np
@@ -49,7 +49,7 @@ def _inverse(A: Matrix, X: Matrix) -> None:
 
 @inner(error_model="numpy")
 def _keep_across(X: Matrix, normal: Vector) -> None:
-    """Leave of a symmetric inverse what moves its first unknowns across ``normal`` only."""
+    """Restrict a symmetric inverse to motion of its first unknowns across ``normal``."""
     n, along = X.shape[0], np.zeros(X.shape[0])
     square = 0.0
     for i in range(n):
@@ -85,7 +85,6 @@ def eliminate_ring(
         Of a cell with what all share.
     corner (s, s)
     held (S,)
-        Cells whose unknowns move only across ``normal``.
     normal (o,)
     x, y (S, o, 1), (s, 1)
         In place, as of :func:`solve_ring`.
@@ -93,12 +92,12 @@ def eliminate_ring(
     Returns
     -------
     inverses, passed : array (S - 1, o, o)
-        Of the blocks left of each cell, and the same times the links.
+        Of the remaining blocks, and the same times the links.
     shared : array (S, o, s)
     reduced : array (S - 1, o, o + s)
         Solution of the chain for its coupling with the border.
     closing : array (o + s, o + s)
-        Inverse of what is left of the border.
+        Inverse of the remaining border.
     """
     S, o = blocks.shape[0], blocks.shape[1]
     s = corner.shape[0]
@@ -168,7 +167,7 @@ def eliminate_ring(
 
 @inner(error_model="numpy")
 def _chain(inverses: Cube, passed: Cube, x: Cube) -> None:
-    """Solve for the open chain, in place; ``x`` has a column for each right-hand side."""
+    """Solve for the open chain, in place; one column of ``x`` per right-hand side."""
     m, o = inverses.shape[0], inverses.shape[1]
     columns = x.shape[2]
     hold = np.empty((o, columns))

@@ -43,8 +43,8 @@ def flat_opening(x: float, r: float) -> tuple[float, float]:
 def cone_opening(x: float, r: float, s: float, c: float) -> tuple[float, float]:
     """Area and normal gap of a cone in a sharp edge of radius ``r``; sine and cosine of its angle.
 
-    The frustum between the edge and its foot on the cone; beyond the lift at which that foot is on
-    the axis the area keeps its last value.
+    The area is the frustum between the edge and its foot on the cone, constant from the lift on at
+    which that foot is on the axis.
     """
     gap = x * s
     if gap * c > r:
@@ -68,7 +68,7 @@ def gap_flow(drop: float, linear: float, square: float) -> tuple[float, float]:
               |Q| = \frac{2|\Delta p|}{a + \sqrt{a^2 + 4 b |\Delta p|}}, \qquad
               \frac{dQ}{d\Delta p} = \frac{1}{\sqrt{a^2 + 4 b |\Delta p|}}
 
-    Smooth and monotone; this form of the root has no cancellation.
+    Smooth and monotone, without cancellation.
 
     Parameters
     ----------
@@ -104,8 +104,8 @@ def gap_pass(
     """Flow through an opening at the lift ``x``, and the forces of the flow.
 
     ``area`` of the mantle, ``gap`` of its edge, ``cube`` that of the land to the third power;
-    ``par`` from 5 on and ``state`` are those of :func:`seat_step`; ``law`` is the place in ``par``
-    of the two numbers of the viscosity law, 0 without one.
+    ``par`` from 5 on and ``state`` as of :func:`seat_step`; ``law``: place in ``par`` of the two
+    numbers of the viscosity law, 0 without one.
     """
     p_a, p_b, rho_a, rho_b = inp[2], inp[3], inp[4], inp[5]
     area = min(area, par[5])
@@ -186,7 +186,7 @@ def seat_under_pressure_step(par: Any, state: Any, inp: Any, out: Any) -> int:
 
 @step_function
 def off_axis_seat_step(par: Any, state: Any, inp: Any, out: Any) -> int:
-    """Step of a seat whose needle is off-axis or tilted; centred that of :func:`seat_step`.
+    """Step of a seat whose needle is off-axis or tilted.
 
     ``par``, behind that of :func:`seat_step`: 16-17 sine and cosine of the angle of the face, 18-19
     offset, 20-21 slopes of the face.
@@ -235,15 +235,13 @@ class Seat(Component):
     leak area is left, an orifice in parallel.  Positive flow runs from a to b; the cavitation limit
     is that of an orifice.
 
-    With a section ``off_axis``, of a needle that moves in three dimensions, area and gap are those
-    between edge and face where the needle is (:mod:`~klack.hydraulics.off_axis_seat`), and the
-    pressure pushes it across the axis.
+    With ``off_axis``, for a needle that moves in three dimensions, area and gap are those where the
+    needle is (:mod:`~klack.hydraulics.off_axis_seat`), and the pressure pushes it across the axis.
 
-    With ``viscosity_law`` of the fluid, ``mu`` is the mean that acts between both pressures.
+    With ``viscosity_law`` of the fluid, ``mu`` is the mean between both pressures.
 
-    Limits: concentric without that section, quasi-steady (no inertia of
-    the fluid in the gap), both surfaces rigid.
-    Sources: Merritt 1967, ch. 3 and 5; areas by elementary geometry.
+    Limits: concentric without that section, quasi-steady (no inertia of the fluid in the gap),
+    rigid.  Sources: Merritt 1967, ch. 3 and 5; areas by elementary geometry.
     """
 
     type: ClassVar[str] = "seat"
@@ -314,18 +312,18 @@ class Seat(Component):
 
     @property
     def surface_angle(self) -> float:
-        """Between axis and needle surface at the edge [rad]."""
+        """Angle between axis and needle surface at the edge [rad]."""
         if self.half_angle is not None:
             return self.half_angle
         return acos(self.diameter / self.ball_diameter) if self.ball_diameter else pi / 2
 
     @property
     def normal_factor(self) -> float:
-        """Normal gap over a small lift [-]: ``h = normal_factor x``."""
+        """Normal gap over a small lift [-]."""
         return sin(self.surface_angle)
 
     def parameters(self, viscosity: float, vapour_pressure: float) -> tuple[float, ...]:
-        """Return what :func:`seat_step` takes, for a viscosity [Pa s] and pressure [Pa]."""
+        """Parameters of :func:`seat_step`."""
         r, bore = 0.5 * self.diameter, self.bore_diameter or self.diameter
         shape = (0.0, 0.0)
         if self.half_angle is not None:
@@ -390,7 +388,7 @@ class Seat(Component):
             )
 
     def off_axis_parts(self) -> tuple[OffAxisPart, ...]:
-        """Return the edge, if it is told where it meets the needle."""
+        """The edge, if its place on the needle is given."""
         if self.off_axis is None:
             return ()
         heights = (self.off_axis.height,)

@@ -1,8 +1,8 @@
-r"""Seat of a network whose needle is off its axis: where it is, and the force of the pressure.
+"""Seat of a network whose needle is off-axis: its place, and the force of the pressure.
 
-Its flow is that of :func:`~klack.hydraulics.off_axis_opening.off_axis_opening`, its force across
-the axis that of :func:`~klack.hydraulics.off_axis_seat.pressure_load`.  Along the axis the faces of
-the network act, at a point of the axis of the needle; so the moments are those about that point.
+The flow is that of :func:`~klack.hydraulics.off_axis_opening.off_axis_opening`, the force across
+the axis that of :func:`~klack.hydraulics.off_axis_seat.pressure_load`.  Axial forces of the faces
+act at a point of the axis of the needle, about which the moments are taken.
 """
 
 from dataclasses import dataclass
@@ -70,9 +70,9 @@ class SeatAcross:
         return np.asarray(drop * np.concatenate((push[:2], moments)))
 
     def left_out(self, now: SideInputs) -> float:
-        """Nothing: the flow is that of the position."""
+        """Zero: the flow is that of the position."""
         return 0.0
 
     def room(self, now: SideInputs) -> float:
-        """No end: faces that overlap let nothing through there."""
+        """Infinite: faces may overlap, where nothing flows."""
         return np.inf

@@ -24,7 +24,7 @@ from klack.units import Area, Length, Ratio
 __all__ = ["JET_ANGLE", "SpoolEdge", "notched_edge_step", "spool_edge_step"]
 
 JET_ANGLE = radians(69.0)
-"""Between jet and axis at a sharp edge without clearance (von Mises 1917) [rad]."""
+"""Angle [rad] between jet and axis at a sharp edge without clearance (von Mises 1917)."""
 
 
 @inner(error_model="numpy")
@@ -44,9 +44,9 @@ def _edge(par: Any, state: Any, inp: Any, out: Any, x: float) -> None:
 def spool_edge_step(par: Any, state: Any, inp: Any, out: Any) -> int:
     """Flow at the mean position of the step, and the forces of the flow.
 
-    ``par``: 0 sign of the motion that opens, 1 overlap, 2 width, 3 clearance, 4 unused, 5 largest
-    area, 6 ``C_q``, 7 ``12 mu/(w c^3)`` of the closed gap, 8 ``lambda_c mu/8``, 9 contraction, 10
-    vapour pressure, 11-13 no leak, 14 ``C_v cos(theta)``, 15 damping length.
+    ``par``: 0 sign of the motion that opens, 1 overlap, 2 width, 3 clearance, 5 largest area,
+    6 ``C_q``, 7 ``12 mu/(w c^3)`` of the closed gap, 8 ``lambda_c mu/8``, 9 contraction, 10 vapour
+    pressure, 11-13 no leak, 14 ``C_v cos(theta)``, 15 damping length.
     ``state``: opening, area, jet force, mass flow, 1 once that flow is known.
     """
     x = par[0] * 0.5 * (inp[6] + inp[7] - inp[8] - inp[9]) - par[1]
@@ -118,18 +118,18 @@ class SpoolEdge(OpeningComponent):
               b = \frac{\varrho}{2 (C_q A)^2}
 
     with the opening ``x = s (y_spool - y_body) - overlap``, the radial clearance ``c`` and the
-    width ``w`` of the slots, ``pi d`` of a full annulus.  The slot runs aslant over the clearance,
-    so its area is exactly that of the shortest surface between both edges.  Closed, the same edge
-    of area ``w c`` and the covered length of the gap ``-x`` are in series: laminar leakage that
-    falls with the overlap.  Flow and slopes are continuous at ``x = 0``.
+    width ``w`` of the slots, ``pi d`` of a full annulus.  The area is exactly that of the shortest
+    surface between both edges.  Closed, the edge of area ``w c`` and the covered length of the gap
+    ``-x`` are in series: laminar leakage that falls with the overlap.  Flow and slopes are
+    continuous at ``x = 0``.
 
     The jet pulls the spool shut with ``rho Q v cos(theta)``, as in a ``seat``; its angle is 69
     degrees by default, and the force fades with ``x/sqrt(x^2 + c^2)`` where the slot is narrower
     than the clearance.  A negative ``overlap`` is an underlap.
 
-    ``notches`` open ahead of the edge and pass their flow beside the rest of it: the narrowest
-    section of each (:mod:`~klack.hydraulics.notch`) by the same law, with the friction along the
-    notch and through a covered tip in ``a``.  Each jet pulls with its own ``rho Q v cos(theta)``.
+    ``notches`` open ahead of the edge, in parallel: the narrowest section of each
+    (:mod:`~klack.hydraulics.notch`) by the same law, with the friction along the notch and through
+    a covered tip in ``a``, and its own jet force.
 
     Limits: sharp edges, coaxial spool (``eccentricity`` counts for the leakage), rectangular slots;
     no side force.  Rounded edges act as a clearance larger by about their radius.
@@ -233,7 +233,7 @@ class SpoolEdge(OpeningComponent):
         return self.radial_clearance**3 * eccentricity_factor(self.eccentricity)
 
     def notch_parameters(self, viscosity: float) -> tuple[float, ...]:
-        """Return what :func:`notched_edge_step` takes in addition; nothing without notches."""
+        """Further parameters of :func:`notched_edge_step`; none without notches."""
         if not self.notches:
             return ()
         numbers = (number for notch in self.notches for number in notch.numbers)
@@ -242,7 +242,7 @@ class SpoolEdge(OpeningComponent):
         return len(self.notches), 12.0 * viscosity, self._gap_cubed, gap_as_edge, *numbers
 
     def parameters(self, viscosity: float, vapour_pressure: float) -> tuple[float, ...]:
-        """Return what :func:`spool_edge_step` takes, for a viscosity [Pa s] and pressure [Pa]."""
+        """Parameters of :func:`spool_edge_step`."""
         force, leak = self.flow_force, self.land_width * self._gap_cubed
         return (
             1.0 if self.direction == "opening" else -1.0,

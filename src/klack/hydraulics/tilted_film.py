@@ -2,16 +2,16 @@ r"""Squeeze film of a ring or disc that tilts: Reynolds' equation over sectors a
 
 .. math:: \nabla\cdot\Bigl(\frac{h^3}{12\mu}\nabla p\Bigr) = \dot h
 
-The land is cut into ``S`` sectors.  Each has its own height, or several, on ``N`` circles, with
-straight lines between them.  Over the radius the pressure is a sum of given functions, the first
-one the exact pressure of parallel faces; their amplitudes differ from sector to sector (finite
-volumes round the circumference, Galerkin's method over the radius).  So parallel faces have exactly
-the force of :class:`~klack.hydraulics.film.RingFilm` or :class:`~klack.hydraulics.film.DiscFilm`
-for any number of sectors and circles.
+Each of ``S`` sectors of the land has its own height, or several, on ``N`` circles, with straight
+lines between.  Over the radius the pressure is a sum of given functions, the first one that of
+parallel faces; their amplitudes differ from sector to sector (finite volumes round the
+circumference, Galerkin's method over the radius).  So parallel faces have exactly the force of
+:class:`~klack.hydraulics.film.RingFilm` or :class:`~klack.hydraulics.film.DiscFilm` for any number
+of sectors and circles.
 
-Forces are those that do the work of the pressure on the heights.  With the amplitudes ``P``,
-``K P = L^T V`` and ``F = L P``, the power ``F V = P^T K P`` is never negative, and with a limited
-tension (an obstacle problem for the mean pressure of every sector) it is ``P^T K P`` or more.
+Forces do the work of the pressure on the heights.  With the amplitudes ``P``, ``K P = L^T V`` and
+``F = L P``, the power ``F V = P^T K P`` is never negative, and with a limited tension (an obstacle
+problem for the mean pressure of every sector) it is ``P^T K P`` or more.
 """
 
 from dataclasses import dataclass
@@ -57,12 +57,12 @@ class SectorFilm:
     angles (S,) [rad]
         Middles of the sectors.
     radii (N,) [m]
-        Of the circles on which heights are given; of a single one the centre of the pressure of
-        parallel faces.
+        Of the circles with heights; a single one is at the centre of the pressure of parallel
+        faces.
     spread [-]
         Mean of ``cos`` over a sector, over that of its middle.
     shared
-        How many of the functions of the radius have one amplitude for all sectors.
+        Functions of the radius with one amplitude for all sectors.
     between (G, N) [-]
         Shares of the circles in the height of the points of quadrature.
     along, around (G, Q, Q) [-]
@@ -103,10 +103,10 @@ class SectorFilm:
         return self.radii.size
 
     def rows(self) -> Array:
-        r"""Heights per unit of lift and of both tilts; shape (S N, 3) [-], [m], [m].
+        """Heights per lift and both tilts; shape (S N, 3) [-], [m], [m].
 
-        Lift along +z, tilts so that ``h = z + r (tilt_x cos + tilt_y sin)``.  These rows,
-        transposed, times the forces are force and moments with the same work.
+        Lift along +z, ``h = z + r (tilt_x cos + tilt_y sin)``.  These rows, transposed, times the
+        forces are force and moments with the same work.
         """
         reach = self.spread * self.radii
         rows = np.empty((self.sectors, self.circles, 3))
@@ -127,8 +127,8 @@ def sector_film(
     sectors
         At least 4; 36 are within 0.5 % of many.
     circles
-        1: one height across a narrow land; 2: a straight line between both edges, which a rigid
-        tilt is; more for faces that bend.
+        1 for a narrow land; 2 for a rigid tilt, straight between both edges; more for faces that
+        bend.
     """
     require_nonnegative("sector_film: inner_radius", inner_radius, "m")
     require_positive("sector_film: width", outer_radius - inner_radius, "m")
@@ -247,28 +247,22 @@ def sector_step(
     inner_pressure: float = 0.0,
     outer_pressure: float = 0.0,
 ) -> tuple[Array, Array]:
-    r"""Mean forces [N] over a step, shape (S, N), and their slopes with the heights at its end.
+    r"""Mean forces (S, N) [N] over a step, and slopes (S N, S N) [N/m] with the heights after.
 
     A point that goes from ``x_0`` to ``x_1`` has the mobility of the height with
 
     .. math:: \bar h^3 = \frac{2 x_0^2 x_1^2}{x_0 + x_1},
 
-    the mean of ``1/h^3`` over its way.  So the work ``F (x_0 - x_1)`` is dissipated exactly, at
-    every step size, and parallel faces lose the momentum of their film impulse.
+    the mean of ``1/h^3``.  So the work ``F (x_0 - x_1)`` is dissipated exactly, at every step size,
+    and parallel faces lose the momentum of their film impulse.
 
     Parameters
     ----------
     film, viscosity, tension, inner_pressure, outer_pressure
         As of :func:`sector_forces`.
     before, after (S, N) [m]
-        Heights at both ends of the step, above 0.
+        Heights, above 0.
     step [s]
-
-    Returns
-    -------
-    forces : array (S, N) [N]
-    slopes : array (S N, S N) [N/m]
-        Forces over heights at the end.
     """
     for name, heights in (("before", before), ("after", after)):
         _require_heights(f"sector_step: {name}", film, heights)
@@ -281,7 +275,7 @@ def sector_step(
 
 
 def mean_mobility(before: Array, after: Array, viscosity: float) -> Array:
-    """Mobility [m^3/(Pa s)] of points over a step between two heights: :func:`sector_step`."""
+    """Mobility [m^3/(Pa s)] of points between two heights: see :func:`sector_step`."""
     return np.asarray(before**2 * after**2 / (6.0 * viscosity * (before + after)))
 
 
@@ -323,7 +317,7 @@ def _require_heights(where: str, film: SectorFilm, heights: Array) -> None:
 
 
 class Land(NamedTuple):
-    """Arrays of a :class:`SectorFilm` that its pressure is made of."""
+    """Arrays of a :class:`SectorFilm` for its pressure."""
 
     between: Array
     along: Array
@@ -340,7 +334,7 @@ def land_of(film: SectorFilm) -> Land:
 
 
 class Pressed(NamedTuple):
-    """Pressure over a land: what its change with the heights is made of.
+    """Pressure over a land.
 
     ``amplitudes`` (S, Q) [Pa]; ``ring`` and ``links`` of
     :func:`~klack.hydraulics.ring_system.eliminate_ring`; ``held``: sectors at the limit of tension;
@@ -364,18 +358,17 @@ def film_pressure(
     tension: float,
     held: NDArray[np.bool_],
 ) -> tuple[Array, Pressed]:
-    """Forces on the circles, shape (S, N) [N], and the pressure that makes them.
+    """Forces on the circles, shape (S, N) [N], and the pressure.
 
     Parameters
     ----------
     mobility (S, G) [m^3/(Pa s)]
         ``h^3/12 mu`` at the points of all sectors.
-    closing (S, N) [m/s]
-    head, still : array (G, Q) [Pa m^2], (N,) [N]
+    closing (S, N) [m/s] head, still (G, Q) [Pa m^2], (N,) [N]
         Of the pressures at the edges.
     tension [Pa]
     held (S,)
-        In: sectors with which the search for those at the limit of tension begins; out: those.
+        Sectors at the limit of tension; in: first guess.
     """
     shared = land.shared
     S, N = closing.shape
@@ -441,19 +434,18 @@ def film_slopes(
     rate: float,
     ways: Array,
 ) -> Array:
-    """How the forces change along some ways of the heights, shape (S N, w) [N per unit].
+    """Change of the forces along some directions of the heights, shape (S N, w) [N per unit].
 
     Parameters
     ----------
     land, mobility, head
         As of :func:`film_pressure`.
-    pressed
-        Its pressure.
     change (S, G) [m^2/(Pa s)]
         Slope of the mobility with the height.
     rate [1/s]
         How the closing falls with the heights: 1 over a step.
     ways (S N, w)
+        The directions.
     """
     between, along, around, shared = land.between, land.along, land.around, land.shared
     S, G = mobility.shape
@@ -531,7 +523,7 @@ def film_slopes(
 
 @inner(error_model="numpy")
 def _loads(land: Land) -> Array:
-    """Forces on the circles per unit of each function of the radius, shape (N, Q) [m^2]."""
+    """Forces on the circles per function of the radius, shape (N, Q) [m^2]."""
     G, N = land.between.shape
     L = np.zeros((N, land.load.shape[1]))
     for p in range(G):
@@ -543,7 +535,7 @@ def _loads(land: Land) -> Array:
 
 @inner(error_model="numpy")
 def _stiffness(land: Land, mobility: Array) -> tuple[Array, Array, Array, Array]:
-    """Blocks and links of the ring, its coupling with what all share, and that itself."""
+    """Blocks and links of the ring, its coupling with the shared part, and that part."""
     along, around, shared = land.along, land.around, land.shared
     S, G = mobility.shape
     Q = land.load.shape[1]
@@ -587,7 +579,7 @@ def _regroup(
     held: NDArray[np.bool_],
     one: bool,
 ) -> bool:
-    """Hold sectors whose tension is beyond its limit, release those that are pulled at.
+    """Hold sectors with tension beyond its limit, release those that are pulled at.
 
     ``base + mean P >= 0`` with ``K P = drive + mean lift``, ``lift >= 0``, one of them zero: a
     primal-dual active set (Hintermueller, Ito and Kunisch 2003), or with ``one`` the least-index

@@ -10,7 +10,7 @@ __all__ = ["check_table", "step_table", "value_at_start"]
 
 
 def check_table(time: Sequence[float], values: Sequence[float], name: str) -> None:
-    """Raise :class:`CaseProblem` unless times rise and every one has a value."""
+    """Reject times that do not rise or do not each have a value."""
     if len(time) != len(values) or not time:
         raise CaseProblem(
             (name,),

@@ -61,9 +61,8 @@ class VariableOrifice(OpeningComponent):
 
     Straight between the points, constant beyond the first and the last one; laminar at small flow
     and limited by cavitation as the ``orifice``, with the hydraulic diameter of a circle of that
-    area.  For measured or computed areas of any shape, and for openings that something outside of
-    the network drives.  Over the lift, ``needle`` is the body and ``body`` what it moves against,
-    the ground if it is not joined.
+    area.  For measured or computed areas of any shape, and for openings driven from outside of the
+    network.  Over the lift, ``needle`` moves against ``body``, the ground if that is not joined.
 
     Limits: quasi-steady; no force on the body (for geometry with forces take ``seat`` or
     ``spool-edge``).  A jump in the table over time is written as a short ramp.

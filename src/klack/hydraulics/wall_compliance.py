@@ -26,22 +26,16 @@ def tube_compliance(
               (1+\nu)\,b^2 + (1 - \nu)\,a^2 & \text{no axial force}
               \end{cases}
 
-    after Lame, with the radii ``a`` inside and ``b`` outside; for thin walls ``c D/(E s)`` with
-    ``c = 1 - nu/2``, ``1 - nu^2`` and 1.  Closed ends lengthen by ``(1 - 2 nu) a^2/(E (b^2 -
-    a^2))``, so that a thin closed tube holds ``(5/4 - nu) D/(E s)`` more.  Without axial force
-    joints make up for its length.
+    after Lame, with the radii ``a`` inside and ``b`` outside; for thin walls ``c D/(E s)`` with ``c
+    = 1 - nu/2``, ``1 - nu^2`` and 1.  Closed ends lengthen by ``(1 - 2 nu) a^2/(E (b^2 - a^2))``,
+    so that a thin closed tube holds ``(5/4 - nu) D/(E s)`` more.
 
     Parameters
     ----------
     diameter, thickness [m]
-        Inside; of the wall, ``inf`` for a bore in a large body.
+        Of the bore; of the wall, ``inf`` for a bore in a large body.
     modulus [Pa]
     poisson [-]
-    ends : "closed", "fixed" or "sliding"
-
-    Returns
-    -------
-    area, length : float [1/Pa]
 
     Examples
     --------
@@ -62,15 +56,14 @@ def tube_compliance(
 
 
 class Wall(Section):
-    r"""Elastic wall, by its bulk modulus or as a tube.
+    """Elastic wall, by its bulk modulus or as a tube.
 
     ``1/K_eff = 1/K_fluid + 1/K_wall``, where ``K_wall`` is measured (hoses), or that of a tube of
-    any thickness after Lame (:func:`tube_compliance`); a chamber grows in area and length, a line
-    in area, as its fluid moves with it.
+    any thickness (:func:`tube_compliance`); a chamber grows in area and length, a line in area, as
+    its fluid moves with it.
 
-    Limits: linear elastic, in step with the pressure, and no longer once the wall yields: hoses
-    are stiffer at high and dynamic pressures, take the modulus measured there.
-    Sources: Lame; Wylie & Streeter 1993, ch. 1.
+    Limits: linear elastic, in step with the pressure; hoses are stiffer at high and dynamic
+    pressures, take the modulus measured there.  Sources: Lame; Wylie & Streeter 1993, ch. 1.
     """
 
     bulk_modulus: Modulus | None = Field(

@@ -14,7 +14,7 @@ __all__ = ["factor_of_area", "factor_of_conductance"]
 
 
 def factor_of_area(gas: Gas) -> float:
-    """Mass flow of a choked ideal nozzle times ``sqrt(T_1)/(A p_1)`` [s K^0.5/m]."""
+    """Choked ideal mass flow times ``sqrt(T_1)/(A p_1)`` [s K^0.5/m]."""
     return nozzle_factor(gas.kappa) / sqrt(gas.gas_constant)
 
 

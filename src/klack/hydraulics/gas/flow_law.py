@@ -9,8 +9,8 @@ absolute pressures behind and before it, and ``r_c = 1 - dp_c/p_1``,
           \Bigl[1 - \bigl(\frac{r - b}{r_c - b}\bigr)^2\Bigr]^m & b < r < r_c \\
           0 & r \ge r_c \end{cases}
 
-Its slope is infinite where the flow ends.  In the last thousandth of the pressure ratio the flow is
-laminar, as a straight line that joins the law above.
+Its slope is infinite where the flow ends; so in the last thousandth of the pressure ratio the flow
+is laminar, a straight line that joins this law.
 """
 
 from math import exp, log, sqrt
@@ -21,7 +21,7 @@ from klack.machine.compiling.jit import inner, njit
 __all__ = ["GAP", "LAMINAR", "VALVE", "flow_through", "gap_flow", "restriction_flow"]
 
 LAMINAR = 1e-3
-"""Of the pressure ratio: where the flow is a straight line to none."""
+"""Share of the pressure ratio in which the flow is a straight line to zero."""
 
 VALVE, GAP = 0.0, 1.0
 """Kinds of restrictions of :func:`flow_through`."""
@@ -31,23 +31,17 @@ VALVE, GAP = 0.0, 1.0
 def restriction_flow(
     p1: float, p2: float, T1: float, factor: float, b: float, m: float, crack: float
 ) -> tuple[float, float, float, float]:
-    """Mass flow from the higher pressure to the lower one.
+    """Mass flow [kg/s] from the higher pressure to the lower one, its slopes with p1, p2 and T1.
 
     Parameters
     ----------
     p1, p2 [Pa]
-        Before and behind, ``p1 >= p2``.
+        ``p1 >= p2``.
     T1 [K]
-        Before.
     factor [kg K^0.5/(s Pa)]
         ``C rho_0 sqrt(T_0)``.
     b, m [-]
     crack [Pa]
-        Cracking pressure.
-
-    Returns
-    -------
-    flow, by_p1, by_p2, by_T1 : float [kg/s], [kg/(s Pa)], [kg/(s Pa)], [kg/(s K)]
     """
     if p1 <= crack or p1 <= 0.0:
         return 0.0, 0.0, 0.0, 0.0
@@ -80,9 +74,9 @@ def restriction_flow(
 
 @njit(error_model="numpy")
 def gap_flow(p1: float, p2: float, T1: float, factor: float) -> tuple[float, float, float, float]:
-    r"""Laminar isothermal flow through a narrow gap, ``G (p_1^2 - p_2^2)/T_1``.
+    """Laminar isothermal flow through a narrow gap, ``G (p_1^2 - p_2^2)/T_1``.
 
-    Parameters and results as of :func:`restriction_flow`; ``factor`` [kg K/(s Pa^2)].
+    As :func:`restriction_flow`, with ``factor`` [kg K/(s Pa^2)].
     """
     flow = factor * (p1 - p2) * (p1 + p2) / T1
     return flow, 2.0 * factor * p1 / T1, -2.0 * factor * p2 / T1, -flow / T1
@@ -94,7 +88,7 @@ def flow_through(
 ) -> tuple[float, float, float, float, float]:
     """Mass flow from a to b, its slopes with both pressures and both temperatures.
 
-    ``par[at:]``: kind, factor, b, m, cracking pressure, 1 where it does not let gas from b to a.
+    ``par[at:]``: kind, factor, b, m, cracking pressure, 1 where it blocks gas from b to a.
     ``opening`` scales the factor.
     """
     forward = p_a >= p_b

@@ -29,10 +29,10 @@ class Gas:
         Dynamic, at 20 degC and 1 bar.
     highest_pressure [Pa]
         Up to it the compressibility factor at 20 degC is within 5 % of 1.
-    temperatures : (float, float) [K]
+    temperatures [K]
         Between them ``kappa`` is within 2 % of its value, and the gas far from boiling.
-    pressures, compressibility : tuple of float [Pa], [-]
-        Compressibility factor ``Z = p V / (m R T)`` of the real gas at 20 degC; may be empty.
+    pressures, compressibility [Pa], [-]
+        Factor ``Z = p V / (m R T)`` of the real gas at 20 degC; may be empty.
     """
 
     name: str
@@ -62,7 +62,7 @@ class Gas:
         return REFERENCE_PRESSURE / (self.gas_constant * REFERENCE_TEMPERATURE)
 
     def compressibility_at(self, pressure: float) -> float | None:
-        """Compressibility factor of the real gas at 20 degC; None where it is not known."""
+        """Compressibility factor of the real gas at 20 degC; None where unknown."""
         if not self.pressures:
             return None
         return float(np.interp(pressure, self.pressures, self.compressibility))

@@ -24,10 +24,10 @@ class GasChamber(Component):
               \frac{dU}{dt} = \sum \dot m\,c_p T_{up} - p\frac{dV}{dt} + hA\,(T_w - T), \qquad
               p = (\kappa - 1)\frac{U}{V}, \quad T = \frac{U}{m c_v}
 
-    States are mass and internal energy, so nothing drifts.  Gas that comes in brings the enthalpy
-    of where it comes from: a chamber that is filled gets warm, one that is emptied cold.  Without
-    ``heat_conductance`` it is adiabatic, with ``isothermal`` as warm as its wall.  A polytropic
-    exponent is not a choice: it lies between both and follows from the heat.
+    States are mass and internal energy, so nothing drifts.  Gas brings the enthalpy of its source:
+    filling warms, emptying cools.  Without ``heat_conductance`` it is adiabatic, with
+    ``isothermal`` as warm as its wall; a polytropic exponent lies between both and follows from the
+    heat.
 
     Walls that move are ``gas-face``.
 
@@ -72,7 +72,7 @@ class GasChamber(Component):
         return self
 
     def add_rows(self, rows: Rows) -> None:
-        """Make the node a volume of gas; two of them at one node are refused."""
+        """Make the node a volume of gas; a second one at it is rejected."""
         network_gas(rows)
         node = rows.port("gas")
         before = rows.gas_rows.chambers.get(node)

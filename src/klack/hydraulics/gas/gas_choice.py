@@ -20,8 +20,8 @@ _NUMBERS = ("gas_constant", "kappa", "viscosity", "highest_pressure")
 class GasChoice(NamedSection):
     """The gas of a network: a name of the library alone, or a gas of your own.
 
-    Your own needs ``gas_constant``, ``kappa`` and ``viscosity``.  It is ideal, with constant heat
-    capacities.
+    Your own, ideal with constant heat capacities, needs ``gas_constant``, ``kappa`` and
+    ``viscosity``.
     """
 
     name: Text = Field(description=f"Of the library: {one_of(GASES)}; or of your own gas.")

@@ -1,4 +1,4 @@
-"""Rows of gas made into the one element that the solver runs, with its start and its limits."""
+"""Rows of gas made into the one element that the solver runs."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -55,7 +55,7 @@ class GasNetwork:
         """Parameters of :func:`~klack.hydraulics.gas.gas_step.gas_step`.
 
         With ``steady`` only these chambers have states, as warm as their walls; all others are
-        sources of the pressure that they have at the start.
+        sources of their pressure at the start.
         """
         rows, gas = self.rows, self.gas
         chambers, sources = dict(rows.chambers), dict(rows.sources)
@@ -88,14 +88,14 @@ class GasNetwork:
         return np.array([*numbers, *tables], dtype=float)
 
     def states(self, chambers: int | None = None, sources: int | None = None) -> int:
-        """Length of the state, with the memory that a step works in."""
+        """Length of the state, with the working memory of a step."""
         n = len(self.rows.chambers) if chambers is None else chambers
         s = len(self.rows.sources) if sources is None else sources
         work = WORK_OF_CHAMBER * n + 4 * n * n + 2 * n
         return OF_CHAMBER * n + s + len(self.rows.branches) + work
 
     def volumes(self, y: Vector) -> dict[int, float]:
-        """Volume of each chamber [m^3] where the ports are at ``y``."""
+        """Volume of each chamber [m^3] with the ports at ``y``."""
         found = {handle: row.volume for handle, row in self.rows.chambers.items()}
         for place, wall in enumerate(self.rows.walls):
             if wall.node in found:
@@ -103,7 +103,7 @@ class GasNetwork:
         return found
 
     def start(self, y: Vector, *, steady: bool = False) -> Vector:
-        """First states where the ports rest at ``y``; ``steady``: no pressure is stated."""
+        """First states with the ports at rest at ``y``; ``steady``: no pressure is stated."""
         free = {
             handle: row
             for handle, row in self.rows.chambers.items()
@@ -119,7 +119,7 @@ class GasNetwork:
         return state
 
     def _steady(self, free: Mapping[int, GasChamberRow], y: Vector) -> dict[int, float]:
-        """Pressures of steady flow, in ever longer implicit steps of gas as warm as its walls."""
+        """Pressures of steady flow, by growing implicit steps of gas as warm as its walls."""
         par, gas, n = self.parameters(free), self.gas, len(free)
         states = self.states(n, len(self.rows.sources) + len(self.rows.chambers) - n)
         state, volumes = np.zeros(states), self.volumes(y)
@@ -164,7 +164,7 @@ def _held(row: GasChamberRow) -> GasSourceRow:
 
 
 def close_gas(rows: Rows) -> None:
-    """Make one element of all rows of gas; the last thing that happens to them."""
+    """Make one element of all rows of gas; the last change of the rows."""
     gas, found = rows.gas, rows.gas_rows
     assert isinstance(gas, Gas)
     if not found.chambers and not found.walls:
@@ -213,7 +213,7 @@ def close_gas(rows: Rows) -> None:
 def _inflow(chamber: int, heat: float, cv: float, state: Vector) -> dict[int, float]:
     """Rates of mass and energy for gas as warm as that in the chamber.
 
-    It carries ``c_p T``; of that ``R T`` goes into the wall where the gas stays as warm as that.
+    It carries ``c_p T``; ``R T`` of that goes into the wall in an isothermal chamber.
     """
     at = OF_CHAMBER * chamber
     return {at: 1.0, at + 1: heat * float(state[at + 1]) / (float(state[at]) * cv)}
@@ -244,7 +244,7 @@ def _channels(rows: GasRows) -> list[Channel]:
 
 
 def _limits(net: GasNetwork) -> list[LimitRow]:
-    """Volumes that a stroke may not use up; pressures and temperatures of an ideal gas."""
+    """Limits of volumes, and of pressures and temperatures of an ideal gas."""
     rows, gas = net.rows, net.gas
     limits = []
     for handle, chamber in rows.chambers.items():

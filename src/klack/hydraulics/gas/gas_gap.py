@@ -24,8 +24,8 @@ class GasGap(Component):
     .. math:: \dot m = \frac{\pi d c^3}{24\,\mu\,l\,R\,T_1}\,
               \bigl(1 + \tfrac32\varepsilon^2\bigr)\,(p_a^2 - p_b^2)
 
-    Plane Poiseuille flow of an ideal gas as warm as it enters: the mass flow is that of the mean
-    density.  It warns where the flow is faster than laminar, ``Re = 2 m_dot/(pi d mu)`` above 1000.
+    Plane Poiseuille flow of an ideal gas as warm as it enters, at its mean density.  It warns where
+    ``Re = 2 m_dot/(pi d mu)`` is above 1000.
 
     Limits: laminar, isothermal in the gap, viscosity at 20 degC; no drag on the needle.  Gaps below
     about 1 um leak more than this, since the gas slips at the walls (free path 0.07 um at 1 bar).

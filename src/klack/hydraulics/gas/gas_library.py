@@ -108,13 +108,7 @@ GASES = {gas.name: gas for gas in (AIR, NITROGEN, HYDROGEN, METHANE, HELIUM)} | 
 
 
 def library_gas(name: str) -> Gas:
-    """Gas of this name.
-
-    Raises
-    ------
-    InputError
-        For an unknown name, with the nearest one.
-    """
+    """Gas of this name."""
     return require_entry(
         "network.gas", name, GASES, "give gas_constant, kappa and viscosity of your own gas."
     )

@@ -26,7 +26,7 @@ class GasOrifice(RestrictionComponent):
     with ``r_c = 1 - dp_c/p_1``, at the reference atmosphere of 100 kPa and 293.15 K.  Give either
     the sonic ``conductance`` and ``critical_ratio`` of a data sheet, which are measured with air,
     or the diameter or area, of which ``discharge`` acts as an ideal nozzle.  In the last thousandth
-    of the pressure ratio the flow is laminar: a straight line to none.
+    of the pressure ratio the flow is laminar.
 
     Positive flow runs from a to b; reversed, it has the same law.
 

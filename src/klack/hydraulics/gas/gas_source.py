@@ -18,8 +18,8 @@ __all__ = ["GasSource"]
 class GasSource(PressureHistory):
     """Prescribed pressure of gas: constant, with a step, or from a table.
 
-    Stands for a supply line or a tank: it gives and takes any flow.  Gas that leaves it has its
-    ``temperature``.  Its pressure is *absolute*: 6 bar above the surroundings are 7.013 bar; a
+    Stands for a supply line or a tank: it gives and takes any flow, gives gas of its
+    ``temperature``, and its pressure is *absolute*: 6 bar above the surroundings are 7.013 bar; a
     vacuum is written as 1 Pa.  The surroundings need no source: connect to ``ambient``.
     """
 

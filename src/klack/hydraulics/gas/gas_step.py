@@ -1,22 +1,21 @@
 r"""All gas of a network in one time step: chambers, restrictions and moving faces together.
 
-Each chamber holds mass and internal energy,
+The laws are those of :class:`~klack.hydraulics.gas.gas_chamber.GasChamber`,
 
 .. math:: \frac{dm}{dt} = \sum \dot m, \qquad
           \frac{dU}{dt} = \sum \dot m\,c_p T_{up} - p \dot V + hA\,(T_w - T), \qquad
           U = \frac{p V}{\kappa - 1}, \quad T = \frac{U}{m c_v} .
 
 A step is implicit, for all chambers at once, by Newton's method for the pressures and temperatures
-at its end; what acts in it is :math:`\hat p = \theta p_1 + (1 - \theta) p_0` and
-:math:`\hat T` likewise, with :math:`\theta` = 0.51, or :math:`1 - 1/(k H)` where flows balance a
-pressure at a rate :math:`k` that the step does not resolve.  Masses and energies are then sums of
-what flowed: both are conserved to round-off, whatever is left of the iteration.  A step in which
-the iteration does not settle is divided, into parts that grow again.
+at its end; in it act :math:`\hat p = \theta p_1 + (1 - \theta) p_0` and likewise :math:`\hat T`,
+with :math:`\theta` = 0.51, or :math:`1 - 1/(k H)` where flows balance a pressure at a rate
+:math:`k` that the step does not resolve.  Masses and energies are then sums of what flowed,
+conserved to round-off whatever is left of the iteration.  A step in which the iteration does not
+settle is divided, into parts that grow again.
 
-The network is one element: its parameters describe the topology, its states are those of all
-chambers.  Entries of the energy balance count from gas at the ambient state: the store of a
-chamber is :math:`U - m c_p T_{amb} + p_{amb} V`, zero there, and an enthalpy
-:math:`\dot m\,c_p (T - T_{amb})` is a supply.
+The network is one element, with the topology as parameters.  Entries of the energy balance count
+from gas at the ambient state: the store of a chamber is :math:`U - m c_p T_{amb} + p_{amb} V`, zero
+there, and an enthalpy :math:`\dot m\,c_p (T - T_{amb})` is a supply.
 """
 
 from typing import Any
@@ -39,8 +38,9 @@ __all__ = [
 ]
 
 ISOTHERMAL, STEADY = -1.0, -2.0
-"""In place of a heat conductance: gas as warm as its wall; the same on the way to steady flow,
-where its mass is that of its pressure, since the sum over so long a step has lost all digits."""
+"""In place of a heat conductance: gas as warm as its wall; the same on the way to steady flow, with
+the mass of its pressure, since the sum over so long a step has lost all digits.
+"""
 
 HEAD = 14
 """Numbers before the rows: chambers, sources, branches, walls, ports, R, cv, cp, ambient pressure
@@ -87,7 +87,7 @@ def _node(par: Any, work: Any, node: int, middle: float) -> tuple[float, float]:
 
 @inner(error_model="numpy")
 def _opening(par: Any, at: int, inp: Any, share: float) -> float:
-    """Opening of a branch where its lift is at this share of the step; 1 without a table."""
+    """Opening of a branch at this share of the step; 1 without a table."""
     points = int(par[at + 11])
     if points == 0:
         return 1.0
@@ -102,7 +102,7 @@ def _opening(par: Any, at: int, inp: Any, share: float) -> float:
 
 @inner(error_model="numpy")
 def _solve(A: Any, r: int, n: int) -> bool:
-    """Gauss with pivoting of rows that were scaled; ``A`` holds ``n`` rows, the right side at r."""
+    """Gauss with pivoting of ``n`` scaled rows ``A``, the right side at r."""
     for i in range(n):
         largest = 0.0
         for j in range(n):
@@ -140,7 +140,7 @@ def _solve(A: Any, r: int, n: int) -> bool:
 
 @inner(error_model="numpy")
 def _place_walls(par: Any, work: Any, inp: Any, share: float, place: int) -> bool:
-    """Volumes where all faces are at this share of the step; False if one is gone."""
+    """Volumes with all faces at this share of the step; False if one is gone."""
     chambers = int(par[0])
     for i in range(chambers):
         work[WORK_OF_CHAMBER * i + place] = par[int(par[10]) + CHAMBER * i]
@@ -158,7 +158,6 @@ def _place_walls(par: Any, work: Any, inp: Any, share: float, place: int) -> boo
 
 @inner(error_model="numpy")
 def _between(work: Any, i: int) -> None:
-    """Pressure and temperature that act in the step."""
     c = WORK_OF_CHAMBER * i
     theta = work[c + 2]
     work[c] = work[c + 9] + theta * (work[c + 3] - work[c + 9])
@@ -167,7 +166,7 @@ def _between(work: Any, i: int) -> None:
 
 @inner(error_model="numpy")
 def _set_up(par: Any, now: Any, work: Any, inp: Any, middle: float, share: float, h: float) -> None:
-    """Residuals of all chambers and their slopes with pressures and temperatures at the end."""
+    """Residuals of all chambers and their slopes with the unknowns."""
     chambers, R, cv, cp = int(par[0]), par[5], par[6], par[7]
     size = 2 * chambers
     A = shift(work, WORK_OF_CHAMBER * chambers)
@@ -235,7 +234,7 @@ def _set_up(par: Any, now: Any, work: Any, inp: Any, middle: float, share: float
 
 @inner(error_model="numpy")
 def _limited(value: float, change: float) -> float:
-    """Value after a Newton step that leaves it above zero and of a size that it can have."""
+    """Value after a Newton step, kept positive and of a possible size."""
     if value + change < _FALL * value:
         return _FALL * value
     if value + change > value / (_FALL * _FALL) and change > 0.0:
@@ -245,7 +244,7 @@ def _limited(value: float, change: float) -> float:
 
 @inner(error_model="numpy")
 def _newton(par: Any, now: Any, work: Any, inp: Any, middle: float, share: float, h: float) -> bool:
-    """Pressures and temperatures at the end of the step; False if they do not settle."""
+    """Pressures and temperatures at the end of the step; False without convergence."""
     chambers, settled = int(par[0]), False
     size = 2 * chambers
     A = shift(work, WORK_OF_CHAMBER * chambers)
@@ -285,7 +284,7 @@ def _finish(
     part: float,
     h: float,
 ) -> tuple[bool, float, float]:
-    """Masses, energies and forces from what flowed; supply of enthalpy and of heat."""
+    """Masses, energies and forces; supply of enthalpy and of heat."""
     chambers, R, cv, cp, ambient, T_ref = int(par[0]), par[5], par[6], par[7], par[8], par[9]
     supply, warmth = 0.0 * par[8], 0.0 * par[8]
     for i in range(chambers):
@@ -375,7 +374,7 @@ def _advance(
 
 @step_function
 def gas_step(par: Any, state: Any, inp: Any, out: Any) -> int:
-    """All gas of a network; status 1: it does not settle, 2: a chamber has no volume left."""
+    """All gas of a network; status 1: no convergence, 2: a chamber has no volume left."""
     chambers, sources, ports = int(par[0]), int(par[1]), int(par[4])
     numbers = OF_CHAMBER * chambers + sources + int(par[2])
     now = shift(out, ports)

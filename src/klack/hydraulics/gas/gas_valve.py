@@ -33,7 +33,7 @@ class GasValve(RestrictionComponent):
 
     .. math:: A = \pi h\,(d - h \cos\alpha), \quad h = x \sin\alpha, \qquad A \le \pi d^2/4 .
 
-    The opening is that in the middle of the step.  Closed, the ``leak`` remains.
+    Closed, the ``leak`` remains.
 
     Limits: no force on the needle: what the gas pushes is given by ``gas-face``, of the sealing
     diameter when closed.  The jet lowers the pressure at the rim of a face; that share is part of
@@ -97,7 +97,7 @@ class GasValve(RestrictionComponent):
         return self
 
     def table(self) -> NDArray[np.float64]:
-        """Lifts [m] in the first row; sonic conductances or effective areas [m^2] in the second."""
+        """Lifts [m], then sonic conductances or effective areas [m^2]."""
         if self.lift is not None:
             return np.array([self.lift, self.conductance])
         diameter = self.diameter or 0.0

@@ -10,13 +10,7 @@ __all__ = ["add_restriction", "network_gas"]
 
 
 def network_gas(rows: Rows) -> Gas:
-    """Gas of the network; the surroundings are a source of it.
-
-    Raises
-    ------
-    InputError
-        If the network has none.
-    """
+    """Gas of the network; the surroundings are a source of it.  InputError if there is none."""
     if not isinstance(rows.gas, Gas):
         raise InputError(
             f"{rows.component or 'component'}: gas",

@@ -32,7 +32,6 @@ class RestrictionComponent(Component):
     one_way: bool = Field(default=False, description="Lets no gas pass from b to a.")
 
     def _require_with(self, names: tuple[str, ...], chosen: str, why: str) -> Self:
-        """Raise if one of the keys ``names`` is missing beside ``chosen``."""
         for name in names:
             if getattr(self, name) is None:
                 raise CaseProblem(
