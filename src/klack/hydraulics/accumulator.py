@@ -34,8 +34,8 @@ class Accumulator(Component):
 
     Limits: one exponent: ``n`` = 1 for slow, 1.4 for fast changes of nitrogen at moderate pressure;
     above 200 bar real gas is stiffer (n up to 1.8).  The pressure inside follows by an implicit
-    step of first order, whose loss is counted: fine for changes that take many steps.  Source:
-    Findeisen, Oelhydraulik, 5th ed. 2006, ch. on accumulators; polytropic change of state.
+    step of first order, whose loss is counted: fine for changes that take many steps.
+    Source: Findeisen, Oelhydraulik, 5th ed. 2006, ch. on accumulators; polytropic change of state.
     """
 
     type: ClassVar[str] = "accumulator"

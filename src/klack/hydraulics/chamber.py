@@ -34,7 +34,8 @@ class Chamber(Component):
     the share of the wall in the compliance.
 
     Limits: one pressure, so shorter than 1/20 of a wave; isothermal.  A volume that vanishes as
-    faces move in stops the run.  Source: Merritt 1967, sec. 3-8.
+    faces move in stops the run.
+    Source: Merritt 1967, sec. 3-8.
     """
 
     type: ClassVar[str] = "chamber"

@@ -7,8 +7,8 @@ viscosity is one exponential over pressure, least squares up to 350 bar at const
 for the pure fluids of the library.
 
 Limits: pure fluids; no freezing under pressure; the viscosity above 350 bar, see
-:mod:`~klack.hydraulics.pressure_viscosity`.  Source: Bell, Wronski, Quoilin and Lemort, Ind. Eng.
-Chem. Res. 53 (2014) 2498.
+:mod:`~klack.hydraulics.pressure_viscosity`.
+Source: Bell, Wronski, Quoilin and Lemort, Ind. Eng. Chem. Res. 53 (2014) 2498.
 """
 
 from dataclasses import dataclass

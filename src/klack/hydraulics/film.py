@@ -142,7 +142,10 @@ class Film(Section):
         return _CUT_OFF_HEIGHTS * self.roughness if self.roughness else SMOOTH_CUT_OFF
 
     def film_row(self, viscosity: float, tension: float) -> FilmRow:
-        """Row of the film; ``tension`` [Pa]: pressure around it less that at which it cavitates."""
+        """Row of the film in a fluid of this ``viscosity`` [Pa s].
+
+        ``tension`` [Pa] is the pressure around it less that at which it cavitates.
+        """
         cubic, linear = self.coefficients()
         factor = 1.0
         if self.roughness:

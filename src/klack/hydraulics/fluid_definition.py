@@ -315,9 +315,12 @@ class FluidDefinition:
     ) -> Fluid:
         """Fluid at one temperature, with entrained gas.
 
-        Parameters ---------- temperature [K] gas_fraction, gas_exponent, release_pressure,
-        saturation_pressure, release_time, absorption_time
+        Parameters
+        ----------
+        temperature [K]
+        gas_fraction, gas_exponent, release_pressure, saturation_pressure
             See :class:`~klack.hydraulics.mixture.EntrainedGas`; the fraction is at one atmosphere.
+        release_time, absorption_time [s]
         boiling_half_width [Pa]
             See :class:`~klack.hydraulics.mixture.Vapour`.
         """

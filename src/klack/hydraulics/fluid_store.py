@@ -30,7 +30,7 @@ _SETTLED = 1e-14
 def gas_store(
     p: float, ambient: float, precharge: float, whole: float, exponent: float, least: float
 ) -> tuple[float, float, float]:
-    r"""Volume of fluid beside a gas, its slope with pressure, and the energy of the gas.
+    r"""Volume [m^3] of fluid beside a gas, its slope [m^3/Pa], and the energy [J] of the gas.
 
     .. math:: V = V_0\Bigl(1 - \bigl(\tfrac{p_0}{p}\bigr)^{1/n}\Bigr), \qquad
               U = \int_{p_0}^{p} (p - p_{amb})\,dV

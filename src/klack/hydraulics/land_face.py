@@ -17,7 +17,7 @@ __all__ = ["LandFace", "land_areas"]
 
 
 def land_areas(inner: float, outer: float) -> tuple[float, float]:
-    r"""Areas with which the pressures inside and outside of a land push its ring.
+    r"""Areas [m^2] with which the pressures inside and outside of a land push its ring.
 
     .. math:: A_1 = \pi\,(s - r_1^2), \qquad A_2 = \pi\,(r_2^2 - s), \qquad
               s = \frac{r_2^2 - r_1^2}{2 \ln(r_2/r_1)}

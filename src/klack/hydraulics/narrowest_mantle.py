@@ -15,7 +15,8 @@ beyond the foot of the perpendicular towards the axis, where the frustum is smal
 sum of the radii of vertex and foot.  On a rounded edge regula falsi finds the end where the area
 has no slope along the arc.
 
-Limit: nothing beyond the ends of the contours may be nearer.  Source: elementary geometry.
+Limit: nothing beyond the ends of the contours may be nearer.
+Source: elementary geometry.
 """
 
 from math import cos, inf, pi, sin, sqrt

@@ -24,7 +24,9 @@ Point = tuple[float, float]
 class NeedleContour:
     """Contour in the half plane of radius and height; height 0 is the edge.
 
-    Parameters ---------- points [m], [m]
+    Parameters
+    ----------
+    points [m], [m]
         From the axis up; the last one far away.
     edge_start [m]
         Radius where the cone of the tip ends.

@@ -159,7 +159,9 @@ def notch_opening(
     flank of a triangular or round tip, strip by strip; a gap of length ``l_e`` resists as the edge
     does.
 
-    Parameters ---------- par
+    Parameters
+    ----------
+    par
         From ``base`` on: kind, count, width [m], depth [m], length [m], width at the edge [m].
     x, c, more [m]
         Opening, clearance, ``l_e``.

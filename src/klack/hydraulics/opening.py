@@ -36,7 +36,7 @@ def opening_flow(
     contraction: float,
     vapour: float,
 ) -> tuple[float, float, float, float]:
-    r"""Mass flow [kg/s], its slopes with both pressures [kg/(s Pa)], and with the area.
+    r"""Mass flow [kg/s], its slopes with both pressures [kg/(s Pa)] and the area [kg/(s m^2)].
 
     Area and flow number change together, ``D_h = sqrt(4 A/pi)``:
 
@@ -92,7 +92,7 @@ class OpeningComponent(Component):
     def opening_constants(
         self, viscosity: float, vapour_pressure: float
     ) -> tuple[float, float, float, float]:
-        """Last four parameters of :func:`opening_flow`."""
+        """Last four of :func:`opening_flow` from viscosity [Pa s] and vapour pressure [Pa]."""
         contraction = NOT_CHOKED if self.cavitation is None else self.cavitation
         number = 2.0 / (viscosity * self.critical_flow_number)
         return self.discharge, number, contraction, vapour_pressure

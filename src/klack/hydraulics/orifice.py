@@ -253,7 +253,7 @@ class Orifice(Component):
         return pi / 4.0 * self.diameter**2 if self.diameter else self.area or 0.0
 
     def parameters(self, viscosity: float, vapour_pressure: float) -> tuple[float, ...]:
-        """Parameters of :func:`orifice_step`."""
+        """Parameters of :func:`orifice_step` from viscosity [Pa s] and vapour pressure [Pa]."""
         size = self.hydraulic_diameter or sqrt(4.0 * self.hole_area / pi)
         area = self.count * self.hole_area
         number = 2.0 * size / (viscosity * self.critical_flow_number)

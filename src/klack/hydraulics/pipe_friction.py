@@ -179,7 +179,7 @@ class PipeFriction(Component):
         return self
 
     def parameters(self, viscosity: float) -> tuple[float, ...]:
-        """Parameters of :func:`pipe_friction_step`."""
+        """Parameters of :func:`pipe_friction_step` from the viscosity [Pa s]."""
         rough = self.roughness / (3.7 * self.diameter)
         first = _LAST
         for _ in range(60):  # Re = 4000: a contraction, by Colebrook's own form

@@ -95,8 +95,8 @@ class ReliefValve(OpeningComponent):
     Limits: no mass, so it does not chatter.  The lag makes a chamber before it oscillate, damped:
     the flow answers the pressure with a positive real part at all frequencies.  For a poppet as a
     body take ``rigid-mass``, ``seat``, ``pressure-face``, ``spring`` and ``end-stop``.  Pressures
-    are differences over the valve; ``Q`` counts at ambient density.  Sources: characteristic as in
-    ISO 6403 tests; play operator: Prandtl 1928.
+    are differences over the valve; ``Q`` counts at ambient density.
+    Sources: characteristic as in ISO 6403 tests; play operator: Prandtl 1928.
     """
 
     type: ClassVar[str] = "relief-valve"

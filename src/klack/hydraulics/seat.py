@@ -241,7 +241,8 @@ class Seat(Component):
     With ``viscosity_law`` of the fluid, ``mu`` is the mean between both pressures.
 
     Limits: concentric without that section, quasi-steady (no inertia of the fluid in the gap),
-    rigid.  Sources: Merritt 1967, ch. 3 and 5; areas by elementary geometry.
+    rigid.
+    Sources: Merritt 1967, ch. 3 and 5; areas by elementary geometry.
     """
 
     type: ClassVar[str] = "seat"
@@ -323,7 +324,7 @@ class Seat(Component):
         return sin(self.surface_angle)
 
     def parameters(self, viscosity: float, vapour_pressure: float) -> tuple[float, ...]:
-        """Parameters of :func:`seat_step`."""
+        """Parameters of :func:`seat_step` from viscosity [Pa s] and vapour pressure [Pa]."""
         r, bore = 0.5 * self.diameter, self.bore_diameter or self.diameter
         shape = (0.0, 0.0)
         if self.half_angle is not None:

@@ -242,7 +242,7 @@ class SpoolEdge(OpeningComponent):
         return len(self.notches), 12.0 * viscosity, self._gap_cubed, gap_as_edge, *numbers
 
     def parameters(self, viscosity: float, vapour_pressure: float) -> tuple[float, ...]:
-        """Parameters of :func:`spool_edge_step`."""
+        """Parameters of :func:`spool_edge_step` from viscosity [Pa s] and vapour pressure [Pa]."""
         force, leak = self.flow_force, self.land_width * self._gap_cubed
         return (
             1.0 if self.direction == "opening" else -1.0,

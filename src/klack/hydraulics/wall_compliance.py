@@ -63,7 +63,8 @@ class Wall(Section):
     its fluid moves with it.
 
     Limits: linear elastic, in step with the pressure; hoses are stiffer at high and dynamic
-    pressures, take the modulus measured there.  Sources: Lame; Wylie & Streeter 1993, ch. 1.
+    pressures, take the modulus measured there.
+    Sources: Lame; Wylie & Streeter 1993, ch. 1.
     """
 
     bulk_modulus: Modulus | None = Field(

@@ -89,7 +89,7 @@ class FlatSystem:
 
 
 def flatten(system: ReducedSystem, velocities: Mapping[str, float], step: float) -> FlatSystem:
-    """Build the kernel's arrays; ``velocities`` as in :func:`simulate`."""
+    """Build the kernel's arrays for a ``step`` [s]; ``velocities`` as in :func:`simulate`."""
     blocks, omega, zeta, pushes, speeds = [], [], [], [], []
     first = 0
     for body in system.bodies:

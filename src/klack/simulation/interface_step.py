@@ -211,7 +211,7 @@ def open_film(
     e0: float,
     guess: float,
 ) -> tuple[float, float, float]:
-    """Film of an interface that stays open over a known motion: mean force [N], compression, loss.
+    """Mean force [N], compression [m] and loss [J] of a film that stays open over a known motion.
 
     Arguments as of :func:`solve_interface`; the gap with the compression stays above 0.
     """

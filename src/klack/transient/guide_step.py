@@ -107,7 +107,9 @@ def stopping_force(
 ) -> tuple[float, float]:
     """Friction of one height over a step [N], at most ``most``.
 
-    Parameters ---------- C [m/N]
+    Parameters
+    ----------
+    C [m/N]
         Slip per force, row by row; symmetric.
     s0, s1 [m]
         Slip without the force.

@@ -56,7 +56,7 @@ class InterfaceSolve(Protocol):
 
 
 def interface_solve(factorization: Factorization, G: csr_array) -> InterfaceSolve:
-    """Choose the cheapest method for a factorisation of S (n, n) and G (nc, n)."""
+    """Choose the cheapest method for a factorisation of S (n, n) [N/m] and G (nc, n)."""
     if isinstance(factorization, Halves):
         return SplitSolve(factorization, G)
     return WholeSolve(factorization, G)

@@ -31,7 +31,7 @@ VALVE, GAP = 0.0, 1.0
 def restriction_flow(
     p1: float, p2: float, T1: float, factor: float, b: float, m: float, crack: float
 ) -> tuple[float, float, float, float]:
-    """Mass flow [kg/s] from the higher pressure to the lower one, its slopes with p1, p2 and T1.
+    """Mass flow [kg/s] from p1 to p2, its slopes with both [kg/(s Pa)] and with T1 [kg/(s K)].
 
     Parameters
     ----------
