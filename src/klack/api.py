@@ -1,7 +1,24 @@
 """Interface for notebooks: cases, runs and results, exported by :mod:`klack`.
 
-Every function takes a case as text names it (a file, a shipped case) or as :func:`load_case`
-returned it, and returns a :class:`Result`.
+Every function takes a case by name (a file, a shipped case) or as :func:`load_case` returned it,
+and returns a :class:`Result`.  Where it takes them:
+
+components
+    The user's own, which the case may name.
+study
+    File with a section ``study``; that of the case by default.
+folder
+    Where computed points or trials are kept, so that an interrupted run resumes.
+threads
+    All available cores by default.
+workers
+    Processes in place of threads; in a script, the call stands under
+    ``if __name__ == "__main__":``.
+dask
+    Cluster of distributed in place of threads, also the address of its scheduler, or a file with
+    that.
+
+An :class:`InputError` comes before the first run, with file, line and key.
 """
 
 import json
@@ -65,10 +82,8 @@ class CaseOnHand:
 
     Parameters
     ----------
-    checked : Case or ValveCase
+    checked
         Typed, all numbers in SI: ``case.checked.motion.speed``.
-    tree
-        The text.
     """
 
     checked: Case | ValveCase
@@ -106,13 +121,8 @@ class CaseOnHand:
         ----------
         key
             From the top of the case: ``"network.components.spring.preload"``.
-        value : str or number
+        value
             As the case file would have it: ``"14 N"``.
-
-        Raises
-        ------
-        InputError
-            If there is no such key, or the case does not allow the value.
 
         Examples
         --------
@@ -163,7 +173,7 @@ class Number:
 
     Parameters
     ----------
-    value : float, int, bool or None
+    value
         In ``unit``; None where the run does not have it.
     unit
         SI, ``"1"`` for a pure number.
@@ -189,8 +199,9 @@ class Result:
 
     Parameters
     ----------
-    record : ImpactStudy, StrokeStudy, ShotsStudy, NoiseStudy, ...
-        Everything, as arrays and small records, in SI.
+    record
+        Everything, as arrays and small records, in SI: ImpactStudy, StrokeStudy, ShotsStudy,
+        NoiseStudy, ...
     analysis
         How it is stored and told.
     """
@@ -231,16 +242,13 @@ class Result:
     def to_xarray(self, run: str | None = None) -> Any:
         """Curves and numbers of one level or variant as an ``xarray.Dataset``.
 
+        Coordinates are the axes of the run; ``units``, ``long_name`` and ``comment`` are attributes
+        of every variable.
+
         Parameters
         ----------
         run
             Level or variant; the one that is the answer by default.
-
-        Returns
-        -------
-        xarray.Dataset
-            Coordinates are the axes of the run; ``units``, ``long_name`` and ``comment`` are
-            attributes of every variable.
 
         Raises
         ------
@@ -301,19 +309,7 @@ Given = str | Path | CaseOnHand
 
 
 def load_case(case: str | Path, components: Iterable[type[Component]] = ()) -> CaseOnHand:
-    """Read and check a case: a file, or the name of a shipped one.
-
-    Parameters
-    ----------
-    case : str or Path
-    components : iterable of type
-        Components of the user's own that the case may name.
-
-    Raises
-    ------
-    InputError
-        With file, line and key.
-    """
+    """Read and check a case: a file, or the name of a shipped one."""
     own = tuple(components)
     path = find_case(Path(case))
     tree = read_case_tree(path, own)
@@ -321,13 +317,7 @@ def load_case(case: str | Path, components: Iterable[type[Component]] = ()) -> C
 
 
 def load_result(folder: str | Path) -> Result:
-    """Read what a command, or :meth:`Result.save`, wrote.
-
-    Raises
-    ------
-    InputError
-        If there is no result, or a part of it is missing.
-    """
+    """Read what a command, or :meth:`Result.save`, wrote."""
     analysis = analysis_in(Path(folder))
     return Result(analysis.load(Path(folder)), analysis)
 
@@ -415,8 +405,7 @@ def run_many(
 
     Parameters
     ----------
-    case : str, Path or CaseOnHand
-    points : sequence of mappings, or mapping of sequences
+    points
         Keys of the case to values with their units, for each point; or lists of values by key.
     measures
         ``"opening_time"``; of the first impact on the stop ``seat`` ``"seat.peak_force"``, of the
@@ -426,20 +415,12 @@ def run_many(
     level
         Of an impact; ``"reduced"`` by default.
     threads
-        All available cores by default; always 1 with components in Python and FMUs, and for
-        impacts.
-    workers
-        Processes in place of threads; in a script, the call stands under
-        ``if __name__ == "__main__":``.
-    dask : str, Client or Cluster of distributed, optional
-        Cluster in place of threads, also the address of its scheduler, or a file with that.
-    progress
-        Called with a stage and the share of the points that are done.
+        Always 1 with components in Python and FMUs, and for impacts.
+    workers, dask
+        See :mod:`klack.api`.
 
     Raises
     ------
-    InputError
-        For a key, unit or measure that does not exist, before the first run.
     RunsInterrupted
         On Ctrl-C: a :class:`KeyboardInterrupt` whose ``table`` holds what was computed.
 
@@ -479,30 +460,16 @@ def run_study(
 ) -> Result:
     """Compute measures of a stroke or an impact at the points of a study, as ``klack study`` does.
 
+    See :mod:`klack.api` for ``folder``, ``threads``, ``workers`` and ``dask``.
+
     Parameters
     ----------
-    case : str, Path or CaseOnHand
-        Of a whole valve, or of an impact.
-    study : path, optional
-        File with a section ``study``; that of the case by default.
     made
         Instead of the design of the study: so many valves made after the case, with the scatter of
         its section ``robust``.
-    folder : path, optional
-        Where computed points are kept, so that an interrupted study resumes.
-    threads
-        All available cores by default.
     workers
-        Processes in place of threads: faster for impacts, and where measures of the noise, or
-        several geometries, are asked for.  In a script, the call stands under
-        ``if __name__ == "__main__":``.
-    dask : str, Client or Cluster of distributed, optional
-        Cluster in place of threads, also the address of its scheduler, or a file with that.
-
-    Raises
-    ------
-    InputError
-        Before the first run, with file, line and key.
+        Faster than threads for impacts, and where measures of the noise, or several geometries, are
+        asked for.
     """
     from klack.analyses.study.run import run_study as run
     from klack.analyses.study.where import Where
@@ -523,7 +490,7 @@ def optimise(
 ) -> Result:
     """Search the ranges of a study for the best points, as ``klack optimise`` does.
 
-    Arguments and errors are those of :func:`run_study`; the study has objectives.
+    Arguments are those of :func:`run_study`; the study has objectives.
     """
     from klack.analyses.study.optimise import run_optimisation
     from klack.analyses.study.where import Where
@@ -550,16 +517,12 @@ def sensitivities(
 
     Parameters
     ----------
-    case : str, Path or CaseOnHand
-    study : path, optional
-        File with a section ``study``, whose parameters and measures are meant; that of the case by
-        default.
+    study
+        Its parameters and measures are meant.
     parameters
         Keys of the case, or some of the parameters of the study.
     measures
         ``"closing_time"``, ``"seat.peak_force"``.
-    variant
-        Of a stroke.
     level
         Of an impact; ``"reduced"`` by default.
     check
@@ -656,12 +619,7 @@ def run_shots(
 def noise_of(*results: Result, names: Sequence[str] = (), progress: Progress = silent) -> Result:
     """Estimate the sound of impacts and strokes, side by side.
 
-    Parameters
-    ----------
-    *results
-        Of impacts and strokes; the first one is the one to compare with.
-    names
-        Of the designs.
+    The first of ``results`` is the one to compare with; ``names`` are those of the designs.
     """
     from klack.analyses.noise.analysis import NOISE
     from klack.analyses.noise.run import run_noise
@@ -681,14 +639,7 @@ def calibrate(
 ) -> Result:
     """Fit the parameters of a valve to measured strokes, as ``klack calibrate`` does.
 
-    Parameters
-    ----------
-    case : str, Path or CaseOnHand
-        With a section ``calibration``.
-    measurement : path or sequence of paths
-        Recordings.
-    folder : path, optional
-        Where finished trials are kept, so that an interrupted fit resumes.
+    The case has a section ``calibration``; ``measurement`` are recordings.
     """
     from klack.analyses.calibration.analysis import CALIBRATION
     from klack.analyses.calibration.run import calibration_of, run_calibration
@@ -723,8 +674,9 @@ def compare(
     ----------
     result
         Of :func:`run_stroke`, :func:`run_shots` or :func:`run_impact`.
-    measurement : path, sequence of paths, or mapping of variant to path
-    case : str, Path or CaseOnHand, optional
+    measurement
+        Paths, or a path by variant.
+    case
         Whose section ``measurement`` is used; that of the result by default.
     level, output
         Of an impact; its output may be left out where there is one.

@@ -37,7 +37,7 @@ class InputError(KlackError, ValueError):
     where
         File, line, key or function and argument.
     got, expected
-        What came and what can be used, with units.
+        With units.
     hint
         What to try, one sentence.
     """
@@ -49,7 +49,7 @@ class InputError(KlackError, ValueError):
 
 
 def _shortened(text: str) -> str:
-    """Leave out the middle of what is longer than a message should be: a line of a megabyte."""
+    """Text without its middle where it is too long for a message: a line of a megabyte."""
     if len(text) <= _LONGEST:
         return text
     head, tail = text[: _LONGEST - 200].rsplit(" ", 1)[0], text[-150:].split(" ", 1)[-1]

@@ -1,9 +1,9 @@
 """Quantities with units on input: text such as ``80 um`` in, SI numbers inside.
 
-Inside klack every number is SI; only case files and tables meet units.  A number without a unit is
-refused where a unit matters, because a wrong guess there is a factor of a thousand that is never
-noticed.  Units that differ by 2 pi (rad/s and Hz) or are all "without dimension" (deg, rad, %) are
-taken from short tables instead of by dimension, so that one cannot pass for the other.
+A number without a unit is refused where a unit matters, because a wrong guess there is a factor of
+a thousand that is never noticed.  Units that differ by 2 pi (rad/s and Hz) or are all "without
+dimension" (deg, rad, %) are taken from short tables instead of by dimension, so that one cannot
+pass for the other.
 """
 
 import re
@@ -100,13 +100,13 @@ class Kind:
     name
         With its article, as an error says it: ``"a length"``.
     unit
-        SI unit of the number that klack computes with.
+        SI unit that klack computes with.
     common
         Units that an error proposes.
     factors
-        Complete list of accepted units, for kinds that their dimension does not tell apart.
+        All accepted units, for kinds that their dimension does not tell apart.
     bare
-        True if a number without a unit is meant.
+        Whether a number without a unit is accepted.
     smallest, largest
         Bounds of the size of a value that is not zero, in ``unit``: wider than anything a valve,
         a building or a laboratory has, and so narrow that areas, volumes, energies and their
@@ -265,12 +265,10 @@ class QuantityError(InputError):
 
     Parameters
     ----------
-    value
-        What came.
     hint
         May hold the example of the kind, which whoever knows the key can exchange.
     came
-        More about what came.
+        More about ``value``.
     """
 
     def __init__(
@@ -287,16 +285,7 @@ class QuantityError(InputError):
 def parse_quantity(value: object, kind: Kind, where: str = "quantity") -> float:
     """Turn ``"80 um"`` into SI; a bare 0 passes, any other bare number needs a unit.
 
-    Parameters
-    ----------
-    value : str, int, float or Computed
-        What the user wrote, or what an expression gave.
-    where
-        Key or argument, for the error.
-
-    Returns
-    -------
-    float [``kind.unit``]
+    ``where`` is the key or argument, for the error.
 
     Examples
     --------
@@ -342,7 +331,7 @@ def _of_expression(value: Computed, kind: Kind, where: str) -> float:
 
 
 def _number(value: float) -> float:
-    """Floating-point number of a plain one; a whole one of 400 digits is infinite."""
+    """Number as float; a whole one of 400 digits is infinite."""
     try:
         return float(value)
     except OverflowError:
@@ -415,8 +404,7 @@ _BASE = {
 def base_powers(unit: str) -> tuple[tuple[str, Fraction], ...]:
     """Powers of the SI base units in a coherent SI unit, ordered by name.
 
-    A number without unit, ``"-"`` or ``"1"``, has none.
-    Hz is 1/s here and rad is 1: what these two mean beyond that is with whoever asks.
+    A number without unit, ``"-"`` or ``"1"``, has none; Hz is 1/s and rad is 1.
 
     Raises
     ------
@@ -509,12 +497,13 @@ _SIZES = {
     for unit in units.split()
 }
 """Sizes in SI of the units that an error proposes, to the last digit those of pint, which takes
-0.7 s to load: most cases have no other units."""
+0.7 s to load: most cases have no other units.
+"""
 
 
 @lru_cache(maxsize=1000)
 def _in_si(unit: str, si: str) -> float:
-    """Size of one unit in another one; a case has few units, and a calibration reads it often."""
+    """Size of one unit in another one; kept, since a calibration reads it often."""
     return float(_registry().Quantity(1.0, unit).to(si).magnitude)
 
 
@@ -537,7 +526,7 @@ def _came(unit: str) -> str:
 
 @cache
 def _registry() -> Any:
-    """Build the unit registry of pint when the first unit is read (0.4 s with its import)."""
+    """Unit registry of pint, built when the first unit is read (0.4 s with its import)."""
     import pint
 
     return pint.UnitRegistry()
@@ -562,7 +551,7 @@ def is_level(unit: str) -> bool:
 
 
 def percent_text(share: float) -> str:
-    """Write a share as people read it: no powers of ten, and nothing exact that is huge.
+    """Write a share without powers of ten, and nothing huge exactly.
 
     >>> percent_text(0.0473), percent_text(0.9996), percent_text(2.8e5)
     ('4.7 %', '100 %', 'more than 1000 %')
@@ -667,7 +656,7 @@ def parse_temperature(value: str, where: str = "temperature") -> float:
 
 
 def _length_unit(value: object) -> float:
-    """Metres in one of the unit that a file or an outline is drawn in: ``mm`` -> 0.001."""
+    """Metres in the unit that a file or an outline is drawn in: ``mm`` -> 0.001."""
     if not isinstance(value, str) or not re.fullmatch(_ATOM, value):
         hint = "write the unit alone: mm."
         raise InputError("unit", got=f"'{value}'", expected="a unit of length", hint=hint)

@@ -1,6 +1,7 @@
-"""All commands and their parser, which knows each by its function.
+"""All commands and their parser.
 
-Nothing heavy is imported here or at the top of the command modules, so that ``--help`` is quick.
+Nothing heavy is imported here or at the top of the command modules, so that ``--help`` is
+quick.
 """
 
 import os
@@ -107,7 +108,7 @@ def _password(file: Path | None) -> str | None:
 
 
 def _open(address: str) -> None:
-    """Open a browser by a file of the user's own: command lines can be read by everybody."""
+    """Open a browser by a file of the user's own: everybody can read command lines."""
     import tempfile
     import webbrowser
 
@@ -198,7 +199,6 @@ def demo(
 
 
 def _has_display() -> bool:
-    """Whether there is a display for a browser."""
     if not sys.stdout.isatty():
         return False
     if sys.platform in ("darwin", "win32"):
@@ -463,7 +463,6 @@ COMMANDS: Mapping[Callable[..., int], str] = {
     warm: "klack warm",
     app: "klack app my-valves",
 }
-"""Every command, with the example that its help shows."""
 
 for _command, _example in COMMANDS.items():
     parser.command(_command, help=f"{getdoc(_command)}\n\nExample: {_example}")

@@ -203,7 +203,6 @@ def _with_pulses(
 
 
 def _low_pass_in(case: Path, study: "ImpactStudy", sensor: _Sensor) -> "LowPass | None":
-    """Low pass of the same output in another case."""
     from klack.analyses.comparison.impacts import gauge_of
     from klack.case.reader import find_case, load_case
 
@@ -231,7 +230,7 @@ def _require_file(text: str, path: Path, expected: str) -> None:
 
 
 def _files(given: Sequence[str], usual: str) -> Mapping[str, list[Path]]:
-    """Files by variant; all of them must be there."""
+    """Files by variant; all must exist."""
     from klack.case.levels import VARIANTS
 
     files: dict[str, list[Path]] = {}

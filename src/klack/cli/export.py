@@ -1,4 +1,4 @@
-"""``klack export``: models, decks and results for other programs, through one door."""
+"""``klack export``: models, decks and results for other programs."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -64,7 +64,7 @@ _FRAMES = 50
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class Choice:
-    """What of a source is exported, and how; what was not asked for is None."""
+    """What of a source is exported, and how; None for what was not asked for."""
 
     part: Annotated[
         Literal["body", "pair"] | None,
@@ -284,7 +284,7 @@ def _impact_only(case: Any, to: str) -> Any:
 def _export_calculix(
     case: "Case", folder: Path, numbers: tuple[float | None, ...], run: bool, wanted: Wanted
 ) -> Written:
-    """Write the deck of an impact; with ``run``, let the installed program compute it."""
+    """Write the deck of an impact; with ``run``, run CalculiX on it."""
     from klack.exchange.calculix_case import calculix_impact, calculix_settings
     from klack.exchange.calculix_deck import write_deck
     from klack.exchange.calculix_run import require_calculix, run_calculix
@@ -320,7 +320,6 @@ def _export_calculix(
 def _export_models(
     case: "Case | ValveCase", to: str, folder: Path, choice: Choice, wanted: Wanted
 ) -> Written:
-    """Reduce the bodies of a case and write them."""
     from klack.exchange.case_models import case_models
 
     if to == "fmu":
@@ -377,7 +376,6 @@ def _described(model: "ModalModel") -> str:
 
 
 def _export_result(study: Any, to: str, folder: Path) -> Written:
-    """Write the histories of a stored result, or the points of a study."""
     from klack.analyses.impact.record import ImpactStudy
     from klack.analyses.stroke.record import StrokeStudy
     from klack.analyses.study.record import StudyRecord
@@ -446,7 +444,6 @@ def _parquet_is_for_studies(got: str) -> InputError:
 
 
 def _export_point(source: Path, point: int | None, out: Path | None) -> tuple[str, Written]:
-    """Write the case file of a point of a stored study."""
     from klack.analyses.catalogue import load_result
     from klack.analyses.ending import is_result
     from klack.analyses.study.point_case import case_of_point
@@ -471,7 +468,7 @@ def _export_point(source: Path, point: int | None, out: Path | None) -> tuple[st
 def _run_and_export(
     case: "Case | ValveCase", to: str, folder: Path, wanted: Wanted
 ) -> tuple[Written, Exception | None]:
-    """Run a case, write its result, and pass on why a run ended early."""
+    """Run a case, write its result, and return why a run ended early."""
     from klack.analyses.impact.run import run_impact
     from klack.analyses.incomplete import IncompleteImpactError
     from klack.analyses.stroke.record import IncompleteStrokeError

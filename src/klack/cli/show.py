@@ -102,7 +102,6 @@ def _draw_schematic(
 
 
 def _draw_stored(source: Path, out: Path | None, wanted: Shown) -> int:
-    """The schematic that a result of a stroke holds."""
     from klack.analyses.catalogue import load_result
 
     study = load_result(source)
@@ -291,7 +290,7 @@ def _ports(item: "DescribedType") -> str:
 
 
 def _keys(keys: "Mapping[str, DescribedKey]") -> str:
-    """Those that must be given first, with their units."""
+    """Required keys first, with their units."""
     order = sorted(keys, key=lambda name: not keys[name].required)
     return ", ".join(
         _key(name, keys[name]) if keys[name].required else f"({_key(name, keys[name])})"

@@ -33,7 +33,7 @@ _SOON = 0.2  # [s]; out of the callback by then
 
 
 class Terminated(KeyboardInterrupt):
-    """SIGTERM received: everything is released as after Ctrl-C."""
+    """SIGTERM received; as after Ctrl-C, everything is released."""
 
 
 def stop_code(stop: KeyboardInterrupt) -> int:
@@ -45,9 +45,9 @@ def stop_code(stop: KeyboardInterrupt) -> int:
 def terminable() -> Iterator[None]:
     """Raise :class:`Terminated` on SIGTERM, which would end the process otherwise.
 
-    A stop that comes inside a callback, as LLVM calls them while functions are compiled, is dropped
-    there.  It is raised again shortly after, and an error that the library ends with instead, for
-    want of what the callback was to do, is a stop too; both for Ctrl-C as well.
+    A stop inside a callback, as LLVM makes them while functions are compiled, is dropped there.
+    It is raised again shortly after, and an error that the library ends with instead is a stop
+    too; both for Ctrl-C as well.
     """
     if threading.current_thread() is not threading.main_thread():  # only there may signals be set
         yield
@@ -115,8 +115,8 @@ _WORDS: Mapping[int, str] = {
 def prepare_streams() -> None:
     """Make all characters printable, and output to closed streams harmless.
 
-    A terminal that has no umlaut shows its number; a program started with its output closed would
-    otherwise get the first file that it opens for its output.
+    A terminal without umlauts shows their numbers; a program started with its output closed
+    would otherwise get the first file that it opens for its output.
     """
     for name in ("stdin", "stdout", "stderr"):
         stream: TextIO | None = getattr(sys, name)
@@ -129,8 +129,8 @@ def prepare_streams() -> None:
 def keep_bytecode() -> None:
     """Keep what Python compiles in a folder of klack, where a variable forbids it beside sources.
 
-    Each command would compile klack and its libraries anew, for some seconds.  Left as it is where
-    their bytecode is there already, and where another folder is set.
+    Otherwise each command would compile for some seconds.  Nothing changes where the bytecode
+    is there already, or another folder is set.
     """
     if not os.environ.get("PYTHONDONTWRITEBYTECODE") or sys.pycache_prefix:
         return
@@ -147,10 +147,7 @@ def keep_bytecode() -> None:
 
 
 def prepare_compiling() -> None:
-    """Keep compiled functions for one command where no folder for them can be written to.
-
-    Its processes share them; without a home of the user every command compiles anew.
-    """
+    """Keep compiled functions for one command and its processes where they have no folder."""
     from klack.machine.compiling.compiled_folder import FOLDER_VARIABLE, compiled_folder, is_usable
 
     folder = compiled_folder()
@@ -191,7 +188,7 @@ def in_words(error: OSError) -> str | None:
 
 
 def close_quietly() -> None:
-    """Give up an output that takes no more; Python would complain about it at its end."""
+    """Give up a closed output; Python would complain about it at its end."""
     try:
         sys.stdout.flush()
     except OSError:

@@ -27,13 +27,7 @@ _WIDTH = 100
 
 
 def print_groups() -> None:
-    """One sentence per group.
-
-    A check needs its name, its source and five numbers; side by side they do not fit into the 100
-    columns of a terminal, and hundreds of rows hide the one that matters.  So the table has one row
-    per group; what failed and what came closest to its tolerance follows in full; ``--all`` prints
-    all checks in that form, and ``--html`` makes a table of them that can be searched.
-    """
+    """One sentence per group."""
     width = max(map(len, COVERS)) + 2
     for group, sentence in COVERS.items():
         indent = " " * width
@@ -41,7 +35,11 @@ def print_groups() -> None:
 
 
 def print_checks(checks: Sequence["Check"], *, every: bool = False, to_stderr: bool) -> None:
-    """Print the summary per group, then the failed checks and the closest, or all of them."""
+    """Print a row per group, then the failed checks and the closest, or all of them.
+
+    A check needs its name, its source and five numbers: too wide for 100 columns, and too many
+    rows to find the one that matters.
+    """
     from klack.verification.check import summary
 
     groups = dict.fromkeys(check.group for check in checks)

@@ -1,4 +1,4 @@
-"""Objects that release memory, files, locks or processes after a ``with`` block."""
+"""Objects that a ``with`` block closes."""
 
 from abc import ABC, abstractmethod
 from types import TracebackType

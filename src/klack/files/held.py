@@ -1,8 +1,8 @@
 """A folder held open, so that renaming or replacing it does not affect its entries.
 
-Between a look at a path and the use of it, another user who may write to a folder above can put a
-link in its place.  So the folder is opened once, and everything in it is reached from there by a
-single name, which is never followed if it is a link.
+Another user who may write to a folder above can put a link in a path after a look at it.  So
+the folder is opened once, and everything in it is reached from there by a single name, which is
+never followed if it is a link.
 """
 
 import errno
@@ -27,17 +27,13 @@ _NO_LINK = getattr(os, "O_NOFOLLOW", 0)
 
 
 class HeldFolder(Closing):
-    """A folder, held until :meth:`close`.
-
-    Parameters
-    ----------
-    path
-        An existing folder, or a link to one.
+    """A folder, held until :meth:`close`; ``path`` may be a link to one.
 
     Raises
     ------
     OSError
-        If it is not there, is no folder or may not be read; of every method, if the system refuses.
+        If it is not there, is no folder or may not be read; of every method, if the system
+        refuses.
     """
 
     def __init__(self, path: Path) -> None:
@@ -61,7 +57,7 @@ class HeldFolder(Closing):
 
     @property
     def steady_path(self) -> Path:
-        """Path by which this process reaches this folder even if it is renamed."""
+        """Path for this process that stays valid if the folder is renamed."""
         if self.handle is not None:
             path = Path(f"/proc/self/fd/{self.handle}")
             with suppress(OSError):
@@ -74,14 +70,14 @@ class HeldFolder(Closing):
         return self.path.lstat() if self.handle is None else os.fstat(self.handle)
 
     def state(self, name: str) -> os.stat_result | None:
-        """State of an entry, of the link itself if it is one; None if there is none."""
+        """State of an entry, of the link itself if it is one."""
         try:
             return os.stat(self._at(name), dir_fd=self.handle, follow_symlinks=False)
         except FileNotFoundError:
             return None
 
     def mark(self, name: str) -> Mark | None:
-        """Identity of an entry, distinct from earlier ones of the same name."""
+        """Identity of an entry, distinct from earlier ones of its name."""
         state = self.state(name)
         return None if state is None else (state.st_ino, state.st_mtime_ns)
 
@@ -99,7 +95,7 @@ class HeldFolder(Closing):
         os.mkdir(self._at(name), mode, dir_fd=self.handle)
 
     def move(self, name: str, to: "HeldFolder") -> None:
-        """Move an entry into another folder; a file of the same name there is replaced."""
+        """Move an entry; a file of the same name is replaced."""
         os.replace(self._at(name), to._at(name), src_dir_fd=self.handle, dst_dir_fd=to.handle)
 
     def rename(self, name: str, new: str) -> None:
@@ -137,7 +133,7 @@ class HeldFolder(Closing):
         os.rmdir(self._at(name), dir_fd=self.handle)
 
     def open(self, name: str, flags: int) -> int:
-        """Handle of a file in it, which is made readable by the caller alone; not behind a link."""
+        """Handle of a file in it, never behind a link; made readable by the caller alone."""
         return os.open(self._at(name), flags | SAFELY, 0o600, dir_fd=self.handle)
 
     def open_own_file(self, name: str, flags: int) -> int:
@@ -145,7 +141,7 @@ class HeldFolder(Closing):
         return open_own_file(self._at(name), flags, folder=self.handle)
 
     def synchronise(self) -> None:
-        """Have its list of entries on the disk."""
+        """Write its list of entries to the disk."""
         if self.handle is not None:
             synchronise(self.handle)
 
@@ -154,7 +150,7 @@ class HeldFolder(Closing):
 
 
 def synchronise(handle: int) -> None:
-    """Have an open file or folder on the disk, where the file system can."""
+    """Write an open file or folder to the disk, where the file system can."""
     try:
         os.fsync(handle)
     except OSError as error:

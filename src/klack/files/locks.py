@@ -1,11 +1,11 @@
 """Locks that no other user can hold, released by the system however a process ends.
 
-Whoever may read a file can lock it.  So nothing is locked but files and folders that klack has made
-for its user alone: of a folder of results, a hidden file in it that goes when the lock is given
-back.  Users do not keep each other out.
+Whoever may read a file can lock it.  So only files and folders that klack has made for its user
+alone are locked: of a folder of results, a hidden file in it that goes with the lock.  Users do
+not keep each other out.
 
-No process number is stored: one may come again, and a folder may be shared by containers that
-count their processes apart.
+No process number is stored: one may come again, and containers that share a folder count their
+processes apart.
 """
 
 import errno
@@ -34,9 +34,8 @@ def try_lock(handle: int | None) -> bool | None:
     Returns
     -------
     bool or None
-        True if this process has the lock, False if another one has it; None on systems and file
-        systems that know no such locks: then no process is kept out, and nothing is known of
-        others.
+        False if another process has the lock; None where there are no such locks: then no
+        process is kept out, and nothing is known of others.
     """
     try:
         import fcntl
@@ -55,10 +54,9 @@ def try_lock(handle: int | None) -> bool | None:
 
 @contextmanager
 def locked(folder: HeldFolder, patience: float = _PATIENCE) -> Iterator[None]:
-    """Do something while no other process of this user does so in this folder; wait for it.
+    """Keep other processes of this user out of a folder meanwhile; wait for them.
 
-    Where a lock cannot be had, since there is none or its name is taken by another user,
-    no process is kept out.
+    Without effect where there are no locks, or another user has taken the name of this one.
 
     Raises
     ------
@@ -86,7 +84,7 @@ def own_lock_name() -> str:
 
 @dataclass(frozen=True, slots=True)
 class _LockFile:
-    """A locked file; no handle where no lock is to be had."""
+    """A locked file; no handle where there are no locks."""
 
     handle: int | None
 

@@ -1,7 +1,7 @@
-"""Files that klack reopens: regular files of the caller, never links, pipes or planted files.
+"""Files that klack reopens: regular files of the caller.
 
-In a folder that others may write to, a name that klack expects may be a symbolic link to a file of
-the caller, a named pipe that blocks, or a second name (hard link) of something else.
+In a folder that others may write to, an expected name may be a symbolic link to a file of the
+caller, a named pipe that blocks, or a second name (hard link) of something else.
 """
 
 import os
@@ -23,7 +23,7 @@ _PRIVATE = 0o600
 
 
 def caller() -> int | None:
-    """Number of the user whose rights this process has; None where the system has no such."""
+    """User whose rights this process has; None on systems without user numbers."""
     return os.geteuid() if hasattr(os, "geteuid") else None
 
 
@@ -32,25 +32,19 @@ def open_own_file(path: Path | str, flags: int, *, folder: int | None = None) ->
 
     Parameters
     ----------
-    path : Path or str
+    path
         Its last part is not followed if it is a link.
     flags
-        Of ``os.open``; with ``os.O_CREAT`` it is made if it is not there.  What is made here
-        (``os.O_EXCL``) is of the caller, also where the file system shows another user.
+        Of ``os.open``.  What is made here (``os.O_EXCL``) is of the caller, also where the file
+        system shows another user.
     folder
         Open folder that a relative path starts at.
-
-    Returns
-    -------
-    int
-        Handle.
 
     Raises
     ------
     InputError
-        For a link, a pipe, a folder, a device, a file of another user or one with a second name.
-    OSError
-        If it is not there or may not be opened.
+        For a link, a pipe, a folder, a device, a file of another user or one with a second
+        name.
     """
     try:
         handle = os.open(path, flags | SAFELY, _PRIVATE, dir_fd=folder)
@@ -72,7 +66,7 @@ def open_own_file(path: Path | str, flags: int, *, folder: int | None = None) ->
 
 
 def require_own_file(path: Path | str, state: os.stat_result) -> None:
-    """Raise :class:`InputError` unless the state is that of a regular file of the caller."""
+    """Raise :class:`InputError` for all but a regular file of the caller."""
     got = None
     if not stat.S_ISREG(state.st_mode):
         got = kind_of(state)
@@ -91,10 +85,10 @@ def require_own_file(path: Path | str, state: os.stat_result) -> None:
 
 
 def planted(path: Path) -> str | None:
-    """Description of an entry planted at a name by another user; None if there is none.
+    """Description of a link or pipe that another user has planted; None if there is none.
 
-    A link or a pipe in a folder that others may write to, neither of the caller nor of the owner of
-    the folder: the rule by which Linux protects links (``protected_symlinks``), for all systems.
+    Planted is what stands in a folder that others may write to, neither of the caller nor of
+    the owner of the folder: the rule by which Linux protects links (``protected_symlinks``).
     """
     try:
         state, folder = path.lstat(), path.absolute().parent.stat()

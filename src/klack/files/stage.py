@@ -10,9 +10,9 @@ A stage is a folder of the caller alone (mode 0700) with a random name::
         moves           what they replace, and what goes
         old/            what was replaced, until all is in its place
 
-No archive and no copy can bring a seal that fits its manifest, since no user chooses the number and
-the time of change of a file.  So a stage whose seal fits, of the caller, closed to others, is one
-that a klack of the caller has made in this place.  All others are left alone, and named.
+No archive and no copy can bring a seal that fits its manifest, since no user chooses these
+numbers. So a stage of the caller, closed to others, whose seal fits was made by klack in this
+place. All others are left alone, and named.
 """
 
 import errno
@@ -57,15 +57,7 @@ class _Moves:
 class Stage(Closing):
     """A new stage, or that of a dead process (:func:`dead_stage`); locked until :meth:`close`.
 
-    Parameters
-    ----------
-    folder
-        That the files come into.
-
-    Raises
-    ------
-    OSError
-        If it cannot be made, or not be entered.
+    ``folder`` is where the files go.
     """
 
     def __init__(self, folder: HeldFolder) -> None:
@@ -92,7 +84,7 @@ class Stage(Closing):
     # ------------------------------------------------------------------ making and removing
 
     def _made(self) -> bool:
-        """Make it; False if another process took it for a dead one, which it removes."""
+        """Make it; False if another process removed it as a dead one."""
         self.name = PREFIX + secrets.token_hex(8)
         self.folder.make(self.name, 0o700)
         try:
@@ -134,7 +126,7 @@ class Stage(Closing):
             time.sleep(_PAUSE)
 
     def refusal(self) -> str | None:
-        """Why this folder may be none that klack has made; None if it is one."""
+        """Why klack may not have made this folder; None if it has."""
         state = self.held.own_state()
         if state.st_uid != caller():
             return f"of another user (number {state.st_uid})"
@@ -173,7 +165,7 @@ class Stage(Closing):
             synchronise(file.fileno())
 
     def _read(self, name: str) -> Any:
-        """Content of a file of JSON; None if it is damaged or not there."""
+        """None if a JSON file is damaged or not there."""
         try:
             with os.fdopen(self.held.open(name, os.O_RDONLY), "rb") as file:
                 return json.loads(file.read(_LARGEST))
@@ -185,12 +177,8 @@ class Stage(Closing):
     def put(self, beside: Mapping[str, Mark]) -> None:
         """Bring all new files to their place, as a whole, and remove what is outdated.
 
-        Nothing moves where one of the names in ``beside`` is not that of the same file any more.
-
-        Raises
-        ------
-        OSError
-            If the system refuses one of them; then all is as it was.
+        Nothing moves where a file named in ``beside`` has been replaced, or where the system
+        refuses.
         """
         with self.held.inner(NEW) as new:
             put = {name: (_mark(new, name), self.folder.mark(name)) for name in new.names()}
@@ -204,10 +192,7 @@ class Stage(Closing):
         self.folder.synchronise()
 
     def finish(self) -> None:
-        """Bring to its end what a process had made ready that was killed then.
-
-        Nothing is moved if one of the files has been replaced since.
-        """
+        """Complete what a killed process had made ready, unless a file has been replaced since."""
         moves = self._read_moves()
         if moves is not None and self.held.has_folder(_READY) and self.held.has_folder(_OLD):
             self._move(moves)
@@ -246,7 +231,7 @@ class Stage(Closing):
         return True
 
     def _exchange(self, name: str, new: Mark, ready: HeldFolder, old: HeldFolder) -> None:
-        """Move a file or folder to its place, and what was there to ``old``."""
+        """Move an entry to its place, and what was there to ``old``."""
         state = self.folder.state(name)
         if state is None:
             ready.move(name, self.folder)
@@ -286,7 +271,7 @@ class Stage(Closing):
         return [str(name) for name in self._read(_GONE) or []]
 
     def _read_moves(self) -> _Moves | None:
-        """Planned moves; None if unknown or for another folder."""
+        """None if unknown or for another folder."""
         try:
             put, gone, beside = self._read(_MOVES)
             moves = _Moves(
@@ -303,13 +288,7 @@ class Stage(Closing):
 
 
 def dead_stage(folder: HeldFolder, name: str) -> Stage | str | None:
-    """Stage of a dead process of the caller; why it is none; None while its process lives.
-
-    Raises
-    ------
-    OSError
-        If it goes at this moment.
-    """
+    """Stage of a dead process of the caller; why it is none; None while its process lives."""
     state = folder.state(name)
     if state is None:
         return None
@@ -345,7 +324,7 @@ def name_outdated(content: Path, names: Iterable[str]) -> None:
 
 
 def _of_one_user(folder: os.stat_result, file: os.stat_result) -> bool:
-    """Whether a folder belongs to, and is only writable by, the user who made a file in it.
+    """Whether the maker of a file owns the folder and alone can write to it.
 
     Compared with the file, since some file systems show one user and one mode for everything.
     """

@@ -1,4 +1,4 @@
-"""Exchange of two names in one step, where the system supports it."""
+"""Exchange of two names in one step."""
 
 import ctypes
 import errno
@@ -15,20 +15,7 @@ _UNABLE = (errno.ENOSYS, errno.EINVAL, errno.ENOTSUP, errno.EOPNOTSUPP)
 
 
 def swap_names(first_folder: int, first: str, second_folder: int, second: str) -> bool:
-    """Exchange two files or folders; False, and nothing done, where the system cannot.
-
-    Parameters
-    ----------
-    first_folder, second_folder
-        Open folders.
-    first, second
-        Names in them; both exist.
-
-    Raises
-    ------
-    OSError
-        If the system can and refuses.
-    """
+    """Exchange entries of two folders; False, and nothing done, where the system cannot."""
     call = _system_call()
     if call is None:
         return False

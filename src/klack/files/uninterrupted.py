@@ -1,4 +1,4 @@
-"""Short work that is completed before Ctrl-C or SIGTERM stops the program."""
+"""Work that is completed before Ctrl-C or SIGTERM stops the program."""
 
 import signal
 import threading
@@ -15,12 +15,11 @@ _STOPS = (signal.SIGINT, signal.SIGTERM)
 def uninterrupted() -> Iterator[None]:
     """Hold back the signals that stop a program until the block has ended, well or not.
 
-    For what must not end in the middle: files that move to their place, a folder that is made and
-    remembered, one that is removed.  Without effect in other threads than the main one, which no
-    signal interrupts, and on signals that Python leaves to the system.
+    Without effect in other threads than the main one, which no signal interrupts, and on
+    signals that Python leaves to the system.
 
-    A mask of signals would not do: the system gives a masked signal to another thread, and Python
-    then raises in the main one all the same.
+    A mask of signals would not do: the system gives a masked signal to another thread, and
+    Python then raises in the main one all the same.
     """
     came: list[tuple[int, FrameType | None]] = []
 

@@ -2,18 +2,16 @@
 
 New files are written into a hidden folder beside their place (:mod:`klack.files.stage`):
 
-1. they are filled in, and the disk is told to keep them (fsync), since a power cut may otherwise
-   leave the new name with an empty file behind it;
+1. they are filled in and synchronised (fsync), since a power cut may otherwise leave the new
+   name with an empty file;
 2. one rename makes them *ready*: from here on they count;
 3. what is replaced moves out of the way, what is new to its place, and the stage goes.
 
-A process that is killed before step 2 changes nothing.  Killed after it, the next klack of the same
-user that reads or writes the folder brings step 3 to its end first (:func:`completed`), unless
-the files have been replaced since.  What stands in the folder is the one truth for all readers:
-nothing is ever read from a stage.
+A process that is killed before step 2 changes nothing.  Killed after it, the next klack of the
+same user that reads or writes the folder completes step 3 first (:func:`completed`), unless the
+files have been replaced since.  Nothing is ever read from a stage.
 
-Written by hand: packages for atomic writing replace one file; here several that belong together
-change at once, and what a killed process left half done is finished by the next.
+Packages for atomic writing replace one file; here several that belong together change at once.
 """
 
 import errno
@@ -41,15 +39,7 @@ _MOST_NAMED = 3
 def whole_file(path: Path, refuse: Refusal | None = None) -> Iterator[Path]:
     """Temporary path of the same name that replaces ``path`` on success.
 
-    Parameters
-    ----------
-    refuse
-        Turns the error of the system into that of the caller.
-
-    Raises
-    ------
-    InputError
-        If the place cannot be written to.
+    ``refuse`` turns the error of the system into that of the caller, InputError by default.
     """
     say = refuse or _refuse
     with whole_files(path.parent, lambda _, error: say(path, error)) as stage:
@@ -62,23 +52,16 @@ def whole_files(
 ) -> Iterator[Path]:
     """Give a hidden folder whose contents move into ``folder`` when all of it is complete.
 
-    Files and folders of the same names are replaced, everything else in ``folder`` stays, but for
-    names given to :func:`outdated`.  Folders that were made for it go again where nothing came into
-    them.  Of two processes that write the same names, the one that ends last stays, as a whole.
-    Ctrl-C is held back while files move and stages are made and removed.
+    Entries of the same names are replaced, everything else in ``folder`` stays, but for names
+    given to :func:`outdated`.  Folders made for it go again where nothing came into them.  Of
+    two processes that write the same names, the one that ends last stays, as a whole.
 
     Parameters
     ----------
     refuse
-        Turns the error of the system into that of the caller.
-    beside : mapping of str to mark, optional
-        Files that must still be there (:func:`mark_of`) when the new ones move; nothing moves
-        where another process has replaced one of them.
-
-    Raises
-    ------
-    InputError
-        If the place cannot be written to.
+        See :func:`whole_file`.
+    beside
+        Nothing moves where one of these files (:func:`mark_of`) has been replaced.
     """
     made = [p for p in (folder, *folder.absolute().parents) if not p.exists()]
     held: HeldFolder | None = None
@@ -135,7 +118,7 @@ def completed(folder: Path) -> Path:
 
 
 def mark_of(path: Path) -> Mark | None:
-    """Identity of a file or folder, distinct from others of its name; None if there is none."""
+    """Identity of a file or folder, distinct from others of its name."""
     try:
         state = path.lstat()
     except OSError:
@@ -144,7 +127,7 @@ def mark_of(path: Path) -> Mark | None:
 
 
 def in_exchange(folder: Path) -> bool:
-    """Whether a process writes to a folder at this moment, or was killed while doing so."""
+    """Whether a process writes to a folder now, or was killed while doing so."""
     try:
         return any(True for _ in folder.glob(f"{PREFIX}*"))
     except OSError:
@@ -152,7 +135,7 @@ def in_exchange(folder: Path) -> bool:
 
 
 def _complete(folder: HeldFolder) -> None:
-    """Bring what killed processes of this user left to its end; name what looks like it."""
+    """Complete what killed processes of this user left; name what looks like it."""
     if not _stage_names(folder):
         return
     with locked(folder):
@@ -177,7 +160,7 @@ def _stage_names(folder: HeldFolder) -> list[str]:
 
 
 def _brought_to_end(folder: HeldFolder, name: str) -> str | None:
-    """Finish and remove a stage whose process is dead; why it is left alone, if it is none."""
+    """Finish and remove a stage whose process is dead; else return why it is left alone."""
     try:
         found = dead_stage(folder, name)
         if not isinstance(found, Stage):
@@ -193,7 +176,7 @@ def _brought_to_end(folder: HeldFolder, name: str) -> str | None:
 
 
 def _keep(folder: Path) -> None:
-    """Have everything below a folder on the disk."""
+    """Write everything below a folder to the disk."""
     for place, _, files in os.walk(folder, topdown=False):
         for path in (*(Path(place, name) for name in files), Path(place)):
             with suppress(IsADirectoryError, PermissionError):  # Windows opens no folders

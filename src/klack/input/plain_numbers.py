@@ -12,10 +12,7 @@ __all__ = ["plain_numbers"]
 def plain_numbers(text: bytes, kind: type = float) -> NDArray[Any] | None:
     """Numbers between blanks and line ends, or None if there is anything else in the text.
 
-    Parameters
-    ----------
-    kind : type
-        float, or int for whole numbers.
+    ``kind`` is float, or int for whole numbers.
 
     Examples
     --------

@@ -15,8 +15,8 @@ class CaseProblem(InputError):
 
     Parameters
     ----------
-    key : tuple of str and int
-        Path from the section that found the problem to the key that causes it.
+    key
+        Path of keys and numbers from the section that found the problem.
     on_key
         True if the key itself is wrong, False if its value is.
     """

@@ -54,8 +54,6 @@ class Computed:
     value [SI]
     dimension
         Says by ``fits`` whether the value is a quantity with an SI unit, and in words what it is.
-    text
-        The expression.
     """
 
     value: float
@@ -138,7 +136,7 @@ class Section(BaseModel):
         return value
 
     def _exactly_one(self, names: tuple[str, ...], what: str) -> str:
-        """Name of the only one of these keys that is given; raise if none or several are."""
+        """The only key among ``names`` that is given; raise if none or several are."""
         given = [name for name in names if getattr(self, name) is not None]
         if len(given) != 1:
             raise CaseProblem(
@@ -164,7 +162,7 @@ class Section(BaseModel):
 
 
 def _no_mapping(value: Any, known: Mapping[str, FieldInfo]) -> tuple[str, str]:
-    """What stands there in place of a section, and what to write."""
+    """What stands in place of a section, and what to write."""
     if isinstance(value, list):
         return "a list", "remove the dashes or brackets around its keys."
     if isinstance(value, str):
@@ -205,10 +203,7 @@ _LFS_POINTER = b"version https://git-lfs.github.com/spec/"
 
 
 def refuse_lfs_pointer(path: Path) -> None:
-    """Raise for the short text that git leaves in place of a large file.
-
-    A file that does not exist is left to the reader.
-    """
+    """Raise for the short text that git leaves in place of a large file."""
     try:
         with path.open("rb") as stream:
             start = stream.read(len(_LFS_POINTER))
@@ -226,7 +221,7 @@ def refuse_lfs_pointer(path: Path) -> None:
 def instead_of_file(path: Path) -> str:
     """Description of what is in place of a file; empty for a file.
 
-    A name may also be too long for the system, or lie in a folder that is closed to this user.
+    A name may also be too long, or lie in a folder that is closed to this user.
     """
     try:
         if stat.S_ISREG(path.stat().st_mode):

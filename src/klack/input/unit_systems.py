@@ -1,7 +1,7 @@
 """Consistent unit systems of finite-element models, which their files do not state.
 
-A model is consistent when one unit each of length, mass and time gives all others: with mm, t and
-s a force is in N and a pressure in MPa.
+A model is consistent when its units of length, mass and time give all others: with mm, t and s a
+force is in N and a pressure in MPa.
 """
 
 from dataclasses import dataclass
@@ -16,16 +16,7 @@ __all__ = ["UNIT_SYSTEMS", "UnitSystem", "UnitSystemName", "unit_system"]
 
 @dataclass(frozen=True, slots=True)
 class UnitSystem:
-    """Units of a model in SI.
-
-    Parameters
-    ----------
-    name
-        Length, mass and time: ``"mm t s"``.
-    length [m]
-    mass [kg]
-    time [s]
-    """
+    """Units of a model in SI; ``name`` has length, mass and time: ``"mm t s"``."""
 
     name: str
     length: float
@@ -74,13 +65,6 @@ UNIT_SYSTEMS = {
 def unit_system(name: str, where: str = "units") -> UnitSystem:
     """Find a unit system by its name; spaces, commas and hyphens may separate its units.
 
-    Raises
-    ------
-    InputError
-        For a name that is not among :data:`UNIT_SYSTEMS`.
-
-    Examples
-    --------
     >>> unit_system("mm-t-s").force
     1.0
     """

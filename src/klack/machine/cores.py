@@ -1,4 +1,4 @@
-"""Processor cores available to this process, and work that shares them."""
+"""Processor cores of this process, and work that shares them."""
 
 import os
 from collections.abc import Callable, Sequence
@@ -12,10 +12,7 @@ _FEW_UNKNOWNS = 100_000  # up to which several threads cost more than they save
 
 
 def available_cores() -> int:
-    """Cores that the scheduler allows this process; all of the machine if unknown.
-
-    Fewer than the machine has inside of a container or batch job that is bound to some of them.
-    """
+    """Cores that the scheduler allows this process; all of the machine if unknown."""
     if hasattr(os, "sched_getaffinity"):  # not on macOS and Windows
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
@@ -39,8 +36,8 @@ def side_by_side(tasks: Sequence[Callable[[], _T]], *, at_once: bool = True) -> 
 
     Parameters
     ----------
-    tasks : sequence of callable
-        What takes long in them runs outside of the interpreter: solves and products.
+    tasks
+        They gain where they spend their time outside of the interpreter: solves, products.
     at_once
         Each with one thread of BLAS; if not, one after the other with all that there are.
     """

@@ -1,7 +1,6 @@
 """Available memory, and rejection of what would not fit.
 
-The operating system kills a process that takes too much, or lets the machine crawl.  What is known
-to be large is therefore estimated first and refused with numbers and a way out.
+The operating system kills a process that takes too much, or slows the machine to a crawl.
 """
 
 import os
@@ -30,8 +29,8 @@ class AvailableMemory:
 def available_memory() -> AvailableMemory:
     """Smallest of: free memory of the machine, limit of its control group, limit of the process.
 
-    Memory that the system uses as a cache of files counts as free.  Swap does not: a factorisation
-    in it takes days.
+    The system's cache of files counts as free.  Swap does not: a factorisation in it takes
+    days.
     """
     import psutil
 
@@ -47,21 +46,14 @@ def fits(needed: float) -> bool:
 
 
 def require_memory(where: str, needed: float, *, what: str, hint: str) -> None:
-    """Refuse what would not fit.
+    """Raise :class:`InputError` for what would not fit.
 
     Parameters
     ----------
     needed [byte]
-        Estimate of what is taken on top of what is taken now.
+        On top of what is taken now.
     what
         What takes it, for the message.
-    hint
-        The way out.
-
-    Raises
-    ------
-    InputError
-        With the estimate, what is there, and the way out.
     """
     if fits(needed):
         return
@@ -84,7 +76,7 @@ def in_words(size: float) -> str:
 
 
 def _control_groups() -> list[AvailableMemory]:
-    """Memory left by the control groups of a container or batch system (Linux, version 1 and 2)."""
+    """Memory left by control groups of a container or batch system (Linux, version 1 and 2)."""
     try:
         lines = _OWN_CGROUPS.read_text(encoding="utf-8").splitlines()
     except OSError:

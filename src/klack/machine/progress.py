@@ -18,12 +18,10 @@ def remark(progress: Progress, line: str) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class PointCount:
-    """How an evaluation of points gets on.
+    """Progress of an evaluation of points.
 
     Parameters
     ----------
-    done, most
-        Points that have their values, and all that there will be at most.
     left [s]
         At the rate so far; None before there is one.
     best

@@ -27,7 +27,7 @@ __all__ = [
 ]
 
 FAILURES = (KlackError, np.linalg.LinAlgError, MemoryError)
-"""Errors that a calculation may end with that are not internal errors."""
+"""Errors of a calculation that are not internal errors."""
 
 WITH_CACHED = ", with cached results"
 """Suffix of the name of a stage that used results of earlier runs."""
@@ -124,10 +124,7 @@ def show(caught: Iterable[warnings.WarningMessage]) -> None:
 def for_comparison(what: str, compute: Callable[[], Found]) -> Found | None:
     """Compute something used only for comparison: a failure warns and returns None.
 
-    Parameters
-    ----------
-    what
-        What is left out then, begin of a sentence.
+    ``what`` is left out then; it begins the sentence of the warning.
     """
     try:
         return compute()

@@ -1,8 +1,8 @@
 """Chart described once, and drawn by any renderer.
 
 ``klack.report.interactive`` draws it with plotly for the browser, ``klack.report.printed`` with
-matplotlib for paper.  Curves are told apart by line style as well as by colour, so that a black and
-white copy stays readable; the colours are those of Okabe & Ito (2008), safe for colour-blind eyes.
+matplotlib for paper.  Curves differ by line style as well as by colour, for copies in black and
+white; the colours are those of Okabe & Ito (2008), safe for colour-blind eyes.
 """
 
 from collections.abc import Iterable
@@ -57,14 +57,12 @@ class RingFrames:
         In ``time_unit``.
     values (k, S)
         Sector ``s`` has its middle at the angle ``2 pi s / S`` from x towards y.
-    marked : array of bool, shape (k, S)
-        Sectors drawn in grey.
-    mark
-        What grey means.
+    marked (k, S)
+        Sectors drawn in grey; ``mark`` says what that means.
     captions
-        What stands with each moment beside its time.
+        Of each moment, beside its time.
     prefix
-        What stands before the time.
+        Stands before the time.
     """
 
     name: str
@@ -140,7 +138,7 @@ DASHES: dict[Style, tuple[float, ...]] = {
 AREA_OPACITY = 0.3
 
 LABEL_STEP = 0.13
-"""Labels of vertical marks are placed below each other, this share of the panel apart."""
+"""Labels of vertical marks are this share of the panel below each other."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -178,11 +176,16 @@ class AxisSpec:
 class Curve:
     """One line: x and y in the units of the axes; nan breaks the line.
 
-    ``drawn`` as ``line``, ``steps`` (value k holds from x_k to x_k+1), ``points``, or ``area``: the
-    points go round it.
-    A curve without ``label`` has no entry in the legend and no number under the pointer; one that
-    is not ``listed`` has the number alone.  ``names`` are words for the single points, shown under
-    the pointer with both numbers.
+    Parameters
+    ----------
+    label
+        A curve without one has no entry in the legend and no number under the pointer.
+    drawn
+        In ``steps`` value k holds from x_k to x_k+1; for an ``area`` the points go round it.
+    listed
+        False leaves it out of the legend alone.
+    names
+        Words for the single points, shown under the pointer with both numbers.
     """
 
     x: NDArray[np.float64]
@@ -236,16 +239,12 @@ class Panel:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Chart:
-    """Panels above each other over one common x axis.
+    """Panels above each other over one common x axis, from top to bottom.
 
     Parameters
     ----------
     name
         Word for links and file names.
-    title
-        What is shown.
-    panels
-        From top to bottom.
     note
         What the reader has to know and to look for.
     """
@@ -269,7 +268,7 @@ class BarPart:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BarChart:
-    """Lying stacked bars, one per row, from top to bottom."""
+    """Horizontal stacked bars, one per row, from top to bottom."""
 
     name: str
     title: str
@@ -303,14 +302,8 @@ class ParallelChart:
     """Parallel axes: every point of many dimensions is a line from axis to axis.
 
     Inselberg, A. (1985), The plane with parallel coordinates.  In the browser a range of an axis
-    can be marked, and only the lines that pass it stay.
-
-    Parameters
-    ----------
-    axes
-        From left to right.
-    coloured
-        Axis whose values give the lines their colours.
+    can be marked, and only the lines that pass it stay.  ``coloured`` is the axis whose values give
+    the lines their colours.
     """
 
     name: str
@@ -321,7 +314,7 @@ class ParallelChart:
 
     @property
     def lines(self) -> NDArray[np.float64]:
-        """Values of the lines that have one on every axis, shape (lines, axes)."""
+        """Values (lines, axes) of the lines that have one on every axis."""
         return self._table[self.places]
 
     @property
@@ -355,7 +348,7 @@ def dots(
 def stems(
     x: NDArray[np.float64], y: NDArray[np.float64], floor: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Upright strokes from ``floor`` to each point, as the x and y of one broken line.
+    """Upright strokes from ``floor`` to each point, as one broken line.
 
     >>> x, y = stems(np.array([1.0, 2.0]), np.array([5.0, 6.0]), 0.0)
     >>> [float(v) for v in y]

@@ -1,14 +1,14 @@
 """What a viewer sees of solids in parallel projection, pixel by pixel, cut open by a quarter.
 
 Each pixel has a line of sight, ``x = u a + v b + d f`` with unit vectors to the right, upwards and
-away from the viewer.  The nearest triangle of the surface that faces the viewer is seen there.  The
-quarter ``n1 (x - c) > 0, n2 (x - c) > 0`` on the side of the viewer is taken away: a line of sight
-leaves it at one depth, and where it is inside a body at that depth the cut face of this body is
-seen.  It is inside where more triangles face the viewer than face away before that depth, so that
-the cut needs no mesh of its own.  Surfaces are closed, triangles anticlockwise from outside.
+away from the viewer.  It shows the nearest triangle that faces the viewer.  The quarter
+``n1 (x - c) > 0, n2 (x - c) > 0`` on the side of the viewer is taken away: a line of sight leaves
+it at one depth, and where it is inside a body there, the cut face of this body is seen.  It is
+inside where more triangles face the viewer than face away before that depth, so that the cut needs
+no mesh of its own.  Surfaces are closed, triangles anticlockwise from outside.
 
-A triangle covers the pixels whose centre it contains; on a side that two triangles share, one of
-them has it.
+A triangle covers the pixels whose centre it contains; of two triangles that share a side, one has
+the pixels on it.
 """
 
 from collections.abc import Sequence
@@ -26,18 +26,12 @@ _GRAZING = 1e-9
 """Share of a triangle's area below which its projection is a line."""
 
 _ON_CUT = 1e-6
-"""Of the size of the window: surfaces so near the cut belong to what is cut away."""
+"""Surfaces so near the cut [size of the window] belong to what is cut away."""
 
 
 @dataclass(frozen=True, slots=True)
 class Camera:
-    """Direction from which a viewer looks, in parallel projection.
-
-    Parameters
-    ----------
-    azimuth, elevation [rad]
-        Of the viewer, seen from the bodies; z is upwards.
-    """
+    """Direction [rad] of the viewer of a parallel projection, from the bodies; z is upwards."""
 
     azimuth: float
     elevation: float
@@ -54,13 +48,7 @@ class Camera:
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """Part of the picture plane, from its lower left corner.
-
-    Parameters
-    ----------
-    left, bottom, pixel [m]
-        ``pixel`` is the side of one.
-    """
+    """Part of the picture plane, from its lower left corner; ``pixel`` is the side of one [m]."""
 
     left: float
     bottom: float
@@ -77,7 +65,7 @@ class Quarter:
     ----------
     corner (3,) [m]
     normals (2, 3)
-        Both have to point towards the viewer.
+        Point towards the viewer.
     """
 
     corner: Floats
@@ -86,17 +74,17 @@ class Quarter:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Seen:
-    """What each pixel shows; row 0 is at the bottom.
+    """What each pixel shows, (rows, columns) each; row 0 is at the bottom.
 
     Parameters
     ----------
-    body (rows, columns)
+    body
         Place of the body; -1 where there is none.
-    triangle (rows, columns)
+    triangle
         Of that body; -1 on a cut face.
-    cut (rows, columns)
+    cut
         Which plane of the quarter is seen, 0 or 1; -1 on a surface.
-    depth (rows, columns) [m]
+    depth [m]
         Along the line of sight; infinite where there is nothing.
     """
 

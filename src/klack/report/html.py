@@ -1,8 +1,8 @@
 """Self-contained page: figures, plotly and texts in a single file.
 
-The page loads nothing from anywhere; its content security policy forbids it.  The plotly library
-is packed with gzip, which browsers undo themselves (``DecompressionStream``, in all of them since
-2023): 2 instead of 5 MB in every report.
+The content security policy of the page forbids to load anything.  The plotly library is packed with
+gzip, which browsers unpack (``DecompressionStream``, in all of them since 2023): 2 instead of 5 MB
+in every report.
 """
 
 import gzip
@@ -49,7 +49,7 @@ def render_html(content: Content) -> str:
 
 @cache
 def _plotly() -> dict[str, str]:
-    """Version and packed text of the library; the same bytes every time."""
+    """Version and packed text of the library, the same every time."""
     version = get_plotlyjs_version()
     packed = remembered(
         result_cache(),

@@ -1,8 +1,4 @@
-"""Charts for the browser: the plain data that plotly.js draws.
-
-Only the JSON description is made here; the plotly library itself is copied into the page by
-:mod:`klack.report.html`.
-"""
+"""Charts for the browser: the plain data that plotly.js draws."""
 
 from html import escape
 from math import log10
@@ -38,13 +34,7 @@ _EACH = 120  # [ms]
 
 
 def plotly_ring(chart: RingFrames, layout: dict[str, Any]) -> dict[str, Any]:
-    """Figure with ``data``, ``layout`` and ``frames`` for ``Plotly.newPlot``.
-
-    Parameters
-    ----------
-    layout
-        Looks that all figures share.
-    """
+    """Figure with ``data``, ``layout`` and ``frames`` for ``Plotly.newPlot``."""
     count, unit = chart.sectors, escape(chart.unit)
     low, high = (float(v) for v in squeezed(chart, np.array(chart.ends)))
     ring: dict[str, Any] = {
@@ -248,7 +238,7 @@ def plotly_bars(chart: BarChart) -> dict[str, Any]:
 def parallel_axes(chart: ParallelChart) -> dict[str, Any]:
     """Data of parallel axes, which the page draws itself.
 
-    Those of plotly compile code as they go, which the security policy of the page forbids.
+    Those of plotly compile code, which the security policy of the page forbids.
     """
     lines, places = chart.lines, chart.places
     axes = [

@@ -1,4 +1,4 @@
-"""How curves and parts of bars look: told apart by style or hatch as well as by colour."""
+"""How curves and parts of bars look: different by style or hatch as well as by colour."""
 
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -22,7 +22,7 @@ __all__ = [
 
 
 class Look(NamedTuple):
-    """Of a curve; the width is that of paper and screen [px]."""
+    """Of a curve; the width [px] holds for paper and screen."""
 
     colour: Colour
     style: Style
@@ -31,7 +31,7 @@ class Look(NamedTuple):
     def curve(
         self, x: NDArray[np.float64], y: NDArray[np.float64], label: str = "", **more: Any
     ) -> Curve:
-        """A curve that looks so; ``more`` are fields of :class:`klack.report.chart.Curve`."""
+        """A curve that looks so; ``more`` are other fields of the curve."""
         return Curve(
             x=x, y=y, label=label, colour=self.colour, style=self.style, width=self.width, **more
         )
@@ -61,7 +61,6 @@ PART_LOOKS: tuple[tuple[Colour, str], ...] = (
     ("yellow", "."),
     ("grey", "-"),
 )
-"""Colour and hatch of the parts of a bar."""
 
 
 LINE_LOOKS: tuple[tuple[Colour, Style], ...] = (
@@ -105,7 +104,7 @@ def thinned(
         Rising.
     y (n,)
         nan breaks the curve; it is not thinned then.
-    window : (low, high), optional
+    window
         Only this part of x is kept.
 
     Examples

@@ -1,7 +1,7 @@
 """Content of a report before its layout: the same texts for screen and paper.
 
-Everything here is plain text; each renderer escapes it in its own way, because titles, names and
-the text of the case come from the user.
+Each renderer escapes this plain text in its own way, because titles, names and the text of the case
+come from the user.
 """
 
 import re
@@ -44,10 +44,10 @@ class Sound:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Section:
-    """A heading with what belongs under it: text, sounds, picture, charts, tables.
+    """A heading with what belongs under it.
 
     A ``wide`` picture keeps its size on the screen, and has a page of its own at the end of the
-    paper, which lies on its side if the picture is wider than high.
+    paper, in landscape if the picture is wider than high.
     """
 
     title: str
@@ -64,7 +64,7 @@ class NextStep:
     """What can be done with a result next: why, and the command.
 
     In the command ``RESULT`` stands for the folder of the result and ``CASE`` for what it was
-    computed from, until :meth:`Content.placed` writes them.
+    computed from; :meth:`Content.placed` writes them.
     """
 
     purpose: str
@@ -96,12 +96,9 @@ class Content:
     next_steps: tuple[NextStep, ...] = ()
 
     def placed(self, *, result: str = "", case: str = "") -> Self:
-        """Write folder and case into the next steps; those that need an unknown one are left out.
+        """Write folder and case, as typed at a terminal, into the next steps.
 
-        Parameters
-        ----------
-        result, case
-            As typed at a terminal; empty if not known.
+        Steps that need one that is not known (empty) are left out.
         """
         known = {"RESULT": result, "CASE": case}
 

@@ -1,6 +1,6 @@
 """The report on paper, set by typst from the same content as the page.
 
-All words travel as JSON and are printed as strings: typst never reads them as markup.
+Words travel as JSON and are printed as strings: typst never reads them as markup.
 """
 
 import hashlib
@@ -91,7 +91,7 @@ def _section(section: Section, name: str, work: Path) -> dict[str, Any]:
 
 
 def _drawn(chart: AnyChart) -> bytes:
-    """SVG of a chart; of one that was drawn before from the cache, in a hundredth of the time."""
+    """SVG of a chart; one that was drawn before comes from the cache in a hundredth of the time."""
 
     def draw() -> bytes:
         from klack.report.printed import svg_chart  # with matplotlib, which takes long to import
@@ -118,6 +118,6 @@ def _drawing() -> str:
 
 
 def _lies(image: bytes) -> bool:
-    """Whether an SVG is wider than high, by its view box."""
+    """Whether an SVG is wider than high."""
     box = ElementTree.fromstring(image).get("viewBox", "0 0 1 1").split()
     return float(box[2]) > float(box[3])

@@ -46,7 +46,7 @@ _GREY = "#8A8F98"
 
 
 def printed_ring(chart: RingFrames, width: float) -> Figure:
-    """Draw the moments at even distances in the list, the highest value among them."""
+    """Draw the moments that :func:`_shown` chooses."""
     shown = _shown(chart)
     rows = -(-len(shown) // _COLUMNS)
     figure = Figure(figsize=(width, 0.55 + 1.42 * rows), layout="constrained")
@@ -113,7 +113,7 @@ _WIDTH = 6.7
 """Width of the text of an A4 page [in]."""
 
 _NEAR_END = 0.88
-"""Share of the axis above which the label of a line stands to its left, or it would be cut."""
+"""Share of the axis beyond which the label of a line stands to its left."""
 
 STYLE: dict[str, Any] = {
     "font.family": "DejaVu Sans",
@@ -142,7 +142,7 @@ def plain(text: str) -> str:
 def svg(figure: Figure, *, dpi: float = 200.0) -> bytes:
     """Write a figure as SVG; rasterised parts with ``dpi`` dots per inch.
 
-    Drawn once: ``savefig`` draws a figure with a layout twice, the first time for its layout alone.
+    ``savefig`` would draw a figure with a layout twice, the first time for its layout alone.
     """
     figure.dpi = dpi
     stream = BytesIO()
@@ -167,7 +167,7 @@ def png_chart(chart: AnyChart) -> bytes:
 
 
 def write_charts(charts: Iterable[AnyChart], folder: Path) -> tuple[str, ...]:
-    """Write each chart as SVG and as pixels into a folder; returns the names of the files."""
+    """Write each chart as SVG and as pixels into a folder; return the names of the files."""
     names = []
     for chart in charts:
         for end, draw in (("svg", svg_chart), ("png", png_chart)):
@@ -185,7 +185,6 @@ def _drawn(chart: AnyChart, width: float) -> Figure:
 
 
 def _parallel(chart: ParallelChart, width: float) -> Figure:
-    """Lines between upright axes, each from its lowest to its highest value."""
     lines, ends = chart.lines, np.array([axis.ends for axis in chart.axes])
     heights = (lines - ends[:, 0]) / (ends[:, 1] - ends[:, 0])
     order = np.argsort(-heights[:, chart.coloured])
@@ -235,7 +234,7 @@ def _curves(chart: Chart, width: float) -> Figure:
 
 
 def _bars(chart: BarChart) -> Figure:
-    """Lying stacked bars; shares that are wide enough carry their number."""
+    """Horizontal stacked bars; wide shares carry their number."""
     with rc_context({"axes.grid.axis": "x"}):
         figure = Figure(figsize=(_WIDTH, 1.1 + 0.36 * len(chart.rows)), layout="constrained")
         axes = figure.subplots()
@@ -291,7 +290,7 @@ def _draw_panel(axes: Any, panel: Panel, x: AxisSpec) -> None:
 
 
 def _share_of_axis(x: AxisSpec, value: float) -> float:
-    """Place of a value between the ends of an axis, 0 to 1; 0 where the axis has no range."""
+    """Place of a value on an axis, 0 to 1; 0 where the axis has no range."""
     if x.range is None:
         return 0.0
     low, high = x.range

@@ -1,7 +1,7 @@
 """A chart in words, with its main numbers, for those who do not see it.
 
-Made from the plain data that plotly.js draws, so that reports and the pages of ``klack app`` share
-it.  Every named curve is told with its ends and with where it is highest and lowest.
+Made from the data that plotly.js draws, for reports and the pages of ``klack app``.  Every named
+curve is told with its ends and its extremes.
 """
 
 import re
@@ -20,10 +20,7 @@ _MOST = 8  # curves, or bars, that one would listen to
 def spoken(figure: dict[str, Any]) -> str:
     """Text in place of a chart.
 
-    Parameters
-    ----------
-    figure
-        With ``data`` and ``layout`` of ``Plotly.newPlot``, or with parallel ``axes``.
+    ``figure`` has ``data`` and ``layout`` of ``Plotly.newPlot``, or parallel ``axes``.
 
     Examples
     --------
@@ -104,5 +101,4 @@ def _title(axis: dict[str, Any]) -> str:
 
 
 def _plain(text: str) -> str:
-    """Without the marks that Plotly reads in a text."""
     return " ".join(unescape(re.sub("<[^<>]*>", " ", text)).split())

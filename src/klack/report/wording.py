@@ -36,8 +36,8 @@ _THIN, _FIXED = "\N{NARROW NO-BREAK SPACE}", "\N{NO-BREAK SPACE}"
 def quantity(value: float, unit: str, digits: int = 4) -> str:
     """Value with a prefix that keeps the number between 1 and 1000; no line breaks within.
 
-    Pure numbers, levels and measures of sound have no prefixes, nor do units that no prefix
-    multiplies (:func:`klack.units.takes_prefix`); masses are in grams, areas in mm^2 or m^2.
+    Pure numbers, levels, measures of sound and units that no prefix multiplies
+    (:func:`klack.units.takes_prefix`) have none; masses are in grams, areas in mm^2 or m^2.
 
     >>> quantity(1.4823e-5, "s").split(), quantity(0.99996e3, "N").split()
     (['14.82', 'µs'], ['1.000', 'kN'])

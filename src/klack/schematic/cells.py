@@ -1,7 +1,6 @@
 """Cells of a schematic: a component with its symbol, its texts and its ports, not placed yet.
 
-A cell has its ports at its left and right edge.  Rows of ports are :data:`ROW` apart, so that the
-name of a port fits above its line.
+Ports are at the left and right edge, :data:`ROW` apart, so that a name fits above its line.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -35,8 +34,7 @@ _MARK, _GAP, _WAVE = 14.0, 6.0, 26.0
 class PlannedPort:
     """A port and where it leads to.
 
-    ``node`` is the number of its node, None for one that is drawn as a ``mark``: ``ground``,
-    ``ambient`` or ``open``.
+    ``node`` is None for one that is drawn as a ``mark``: ``ground``, ``ambient`` or ``open``.
     """
 
     name: str
@@ -58,7 +56,7 @@ class Pin:
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """Everything of one component, from its own left upper corner.
+    """Drawing of one component, from its own left upper corner.
 
     ``name`` is empty for the passage of a wire through a column.
     """
@@ -120,7 +118,7 @@ def _lead_width(ports: Sequence[PlannedPort]) -> float:
 def _lead(
     component: str, port: PlannedPort, side: Side, edge: float, inner: float, y: float
 ) -> "_Drawn":
-    """Line, name, pin and mark of a port; ``edge`` is the outer end, ``inner`` the symbol."""
+    """Line, name, pin and mark of a port, from the ``edge`` to the symbol at ``inner``."""
     way = 1.0 if side == "left" else -1.0
     start = edge + way * _MARK if port.mark else edge
     text, joint = _port_text(port), f"{component}.{port.name}"
@@ -303,7 +301,6 @@ def _level(
 
 
 def _framed(name: str, part: Component, ports: Sequence[PlannedPort]) -> Cell:
-    """Symbol in a frame with any number of ports at its sides."""
     left, right = _on(ports, "left"), _on(ports, "right")
     texts = _texts(name, part)
     wide, high = _text_size(texts)

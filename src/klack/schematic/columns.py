@@ -1,10 +1,10 @@
 """Columns of a schematic: bodies in the middle, hydraulics to their left, magnets to their right.
 
-The middle column 0 has the bodies, column 1 what pushes them without fluid, column 2 drivers of
-coils.  Column -1 has what joins fluid and bodies: seats, gaps, faces under pressure.  Further left
-the hydraulics follow in steps of one node: column -2 has the chambers that column -1 meets, -3 the
-restrictions and lines to those chambers, and so on, so that the sources come to the far left.  A
-wire then leads from one column to the next, and seldom through one.
+Column 0 has the bodies, column 1 what pushes them without fluid, column 2 drivers of coils.
+Column -1 has what joins fluid and bodies: seats, gaps, faces under pressure.  Further left the
+hydraulics follow in steps of one node: column -2 has the chambers that column -1 meets, -3 the
+restrictions and lines to those, and so on to the sources.  So most wires lead from one column to
+the next.
 """
 
 from collections import deque
@@ -36,10 +36,8 @@ class Plan:
 
     Parameters
     ----------
-    columns
-        Of every component.
-    ports : mapping of str to tuple of PlannedPort
-        Of every component, in the order of its class.
+    ports
+        In the order of the class of the component.
     nodes
         Those that are drawn as wires.
     homes
@@ -53,7 +51,7 @@ class Plan:
 
 
 def plan_of(network: Network) -> Plan:
-    """Give every component a column, and every port the sides on which it is joined."""
+    """Column of every component, and sides on which every port is joined."""
     nodes = {node.index: node for node in network.nodes if not node.word}
     words = {str(joint): node.word for node in network.nodes for joint in node.joints if node.word}
     at = {str(joint): index for index, node in nodes.items() for joint in node.joints}

@@ -1,7 +1,7 @@
 """Symbols of the component types, as strokes; after ISO 1219-1 where it has one.
 
-Symbols with two ends lie along x from the origin to :data:`LENGTH`; all others are drawn round
-their middle, as large as :data:`FRAME`.  Types without an entry get a plain box.
+Symbols with two ends lie along x from the origin to :data:`LENGTH`; others are drawn round their
+middle, as large as :data:`FRAME`.  Types without an entry get a plain box.
 """
 
 from collections.abc import Mapping
@@ -174,7 +174,7 @@ without a symbol, for the legend."""
 
 
 def two_ended_strokes(part: Component) -> tuple[Stroke, ...] | None:
-    """Symbol from end to end; None for a type that has none."""
+    """Symbol from end to end, if the type has one."""
     if part.type == "end-stop":
         film = (Stroke("M13,-11 H23 V11 H13 Z", "fluid"),) if getattr(part, "film", None) else ()
         bars = Stroke("M13,-12 V12 M23,-12 V12", "heavy")
@@ -186,7 +186,7 @@ def two_ended_strokes(part: Component) -> tuple[Stroke, ...] | None:
 
 
 def framed_strokes(part: Component) -> tuple[Stroke, ...] | None:
-    """Symbol round its middle; None for a type that has none."""
+    """Symbol round its middle, if the type has one."""
     if part.type == "seat":
         return _SEATS.get(str(getattr(part, "shape", "")))
     if part.type == "conical-seat":
@@ -208,7 +208,7 @@ def framed_strokes(part: Component) -> tuple[Stroke, ...] | None:
 
 
 def _face(closing: bool, outer: float) -> tuple[Stroke, ...]:
-    """Plate with the pressure on it; ``outer`` is the share of it at the edges."""
+    """Plate under pressure; ``outer`` is the share of it at the edges."""
     way = 1 if closing else -1
     arrows = "".join(
         f"M{x},{way * (4 - 18 * share):g} V{way * 4} m-3,{-4 * way} l3,{4 * way} l3,{-4 * way} "

@@ -33,10 +33,7 @@ __all__ = ["Schematic", "schematic_of", "schematic_svg", "with_legend"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Schematic:
-    """A drawn network, in px.
-
-    Read from left to right: sources, lines and chambers of the fluid, what joins fluid and bodies,
-    the bodies, springs, stops and magnets, drivers.  See :mod:`klack.schematic.columns`.
+    """A drawn network, in px; its order is that of :mod:`klack.schematic.columns`.
 
     Parameters
     ----------
@@ -46,8 +43,6 @@ class Schematic:
         From the edges of the cells to the symbols.
     wires
         One for each node with two ports or more.
-    box
-        Round all of it.
     """
 
     symbols: tuple[Symbol, ...]
@@ -97,7 +92,7 @@ def schematic_of(network: Network) -> Schematic:
 
 
 def _shift(cell: Cell, column: Column, i: int, columns: list[Column]) -> float:
-    """Place of a cell in its column: to the side of the bodies, and in between on its middle."""
+    """Place of a cell in its column: on the side of the bodies, or in the middle between."""
     spare = column.width - cell.width
     sides = {pin.side for pin in cell.pins}
     if sides == {"left"}:
@@ -157,7 +152,7 @@ _NOTE = "(0): at the start"
 def with_legend(drawn: Schematic, network: Network, title: str = "") -> Schematic:
     """Add a title, a legend of what occurs, and a margin.
 
-    The legend names the fluid, its temperature and the pressure of the surroundings.
+    The legend names the fluid, its temperature and the ambient pressure.
     """
     symbols: list[Symbol] = []
     labels: list[Label] = []
@@ -242,7 +237,7 @@ _INKS = {
 
 
 def svg_of(drawn: Schematic, name: str = "") -> str:
-    """Picture as text; ``name`` is what a reader for the blind says."""
+    """Picture as text; ``name`` is for screen readers."""
     box = drawn.box
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{box.width:g}" height="{box.height:g}" '
@@ -316,7 +311,7 @@ def _safe(text: str) -> str:
 
 
 def schematic_svg(network: Network, title: str = "") -> str:
-    """Draw a network with its legend, and a title if there is one; the same text every time.
+    """Draw a network with its legend; the same text every time.
 
     >>> from klack.mechanics.rigid_mass import RigidMass
     >>> from klack.mechanics.spring import Spring

@@ -2,8 +2,8 @@
 
 Each column is sorted by where the other ends of its wires are (the barycentre heuristic of
 Sugiyama, K.; Tagawa, S.; Toda, M. (1981), IEEE Trans. SMC 11, 109-125), back and forth over all
-columns.  Bodies keep an order of their own: what an end stop calls the upper part is above.  In
-the end cells move down until no two wires of different nodes lie on one line between two columns.
+columns.  Bodies keep an order of their own: what an end stop calls the upper part is above.  At
+last cells move down until no wires of different nodes lie on one line between two columns.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -104,7 +104,7 @@ def _by_role(network: Network, name: str, ports: Sequence[PlannedPort]) -> tuple
 
 
 def _is_stop(part: Component) -> bool:
-    """Whether it keeps an upper and a lower part asunder."""
+    """Whether it keeps an upper and a lower part apart."""
     kinds = part.port_kinds()
     return all(name in kinds and kinds[name].domain == "mechanical" for name in ("upper", "lower"))
 
@@ -160,7 +160,7 @@ def _stop_ranks(network: Network) -> dict[tuple[str, str], int]:
 
 
 def _from_above(network: Network, names: Sequence[str]) -> list[str]:
-    """Bodies from top to bottom, as their end stops say; else in the order of the case."""
+    """Bodies from top to bottom as their end stops say, or in the order of the case."""
     upper: dict[str, str] = {}
     lower: dict[str, str] = {}
     for node in network.nodes:
@@ -183,7 +183,6 @@ def _from_above(network: Network, names: Sequence[str]) -> list[str]:
 
 
 def _next(found: Sequence[str], free: Sequence[str], above: Mapping[str, set[str]]) -> str:
-    """What hangs together with the last body comes next."""
     if found:
         for name in free:
             if found[-1] in above[name]:
@@ -195,7 +194,7 @@ def _next(found: Sequence[str], free: Sequence[str], above: Mapping[str, set[str
 
 
 def _sort(columns: Sequence[Column], middle: int) -> list[Column]:
-    """Sort and place all columns back and forth; the best of what comes by is taken."""
+    """Sort and place all columns back and forth; return the best that occurs."""
     columns = [column.copy() for column in columns]
     outward = [*range(middle - 1, -1, -1), *range(middle + 1, len(columns))]
     found: list[list[Column]] = []
@@ -212,7 +211,7 @@ def _sort(columns: Sequence[Column], middle: int) -> list[Column]:
 def _ended(
     columns: Sequence[Column], middle: int, outward: Sequence[int], *, sort: bool
 ) -> list[Column]:
-    """Columns placed from the middle outward for the last time, with all wires apart."""
+    """Columns placed for the last time from the middle outward, with all wires apart."""
     ended = [column.copy() for column in columns]
     for i in outward:
         _settle(ended, i, [i + 1 if i < middle else i - 1], sort=sort)
@@ -243,7 +242,7 @@ def _ends(
 
 
 def _settle(columns: list[Column], i: int, near: Iterable[int], *, sort: bool = True) -> None:
-    """Put the cells of a column where their wires are as short and straight as may be."""
+    """Place the cells of a column so that their wires are as short and straight as possible."""
     column = columns[i]
     ends, others = _ends(columns, i, near), _ends(columns, i, _beside(columns, i))
     wishes = []
@@ -267,10 +266,10 @@ def _beside(columns: Sequence[Column], i: int) -> list[int]:
 
 
 def _packed(wishes: Sequence[float], heights: Sequence[float]) -> list[float]:
-    """Heights as near as may be to the wishes, in the given order without overlap.
+    """Heights nearest to the wishes, in the given order without overlap.
 
-    Cells that would overlap form blocks; a block lies where the median of its wishes is met, so
-    that at least one of its wires is straight.
+    Cells that would overlap form blocks; a block lies at the median of its wishes, so that at least
+    one of its wires is straight.
     """
     blocks: list[tuple[list[float], float]] = []  # wishes for its upper edge, height
     for wish, height in zip(wishes, heights, strict=True):

@@ -1,9 +1,8 @@
 """Wires between two columns: each node has one upright trunk, and level stubs to its ports.
 
-Trunks that pass each other lie on tracks of their own.  Of two neighbours the one comes first that
-crosses fewer stubs of the other.  No two wires of different nodes run along each other: stubs of
-one side are at different heights, those that meet head on were kept apart
-(:mod:`klack.schematic.placing`).
+Trunks that pass each other lie on tracks of their own, in the order with fewer crossings.  Wires of
+different nodes never run along each other: stubs of one side are at different heights, and those
+that meet head on were kept apart (:mod:`klack.schematic.placing`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -26,9 +25,9 @@ class Run:
     Parameters
     ----------
     left, right
-        Heights of its ports in the left and in the right column.
+        Heights of its ports in these columns.
     low, high
-        Upper and lower end of its trunk.
+        Ends of its trunk.
     """
 
     node: int
@@ -38,7 +37,6 @@ class Run:
     high: float = field(init=False)
 
     def __post_init__(self) -> None:
-        """Look up both ends of the trunk, which are asked for often."""
         ends = (*self.left, *self.right)
         object.__setattr__(self, "low", min(ends))
         object.__setattr__(self, "high", max(ends))
@@ -65,7 +63,7 @@ def runs_between(
 
 
 def crossings(runs: Sequence[Run]) -> int:
-    """How often the wires of different nodes cross, with the tracks in their order."""
+    """Crossings between wires of different nodes, with the tracks in their order."""
     straight = [run.low for run in runs if run.is_straight]
     order = _trunks(runs)
     over = sum(run.low < y < run.high for run in order for y in straight)
@@ -74,7 +72,6 @@ def crossings(runs: Sequence[Run]) -> int:
 
 
 def _trunks(runs: Sequence[Run]) -> list[Run]:
-    """Runs that need a trunk, from left to right."""
     bent = [run for run in runs if not run.is_straight]
     return _ordered(sorted(bent, key=lambda run: (run.low + run.high, run.node)))
 
@@ -114,7 +111,7 @@ def _ordered(runs: Sequence[Run]) -> list[Run]:
 
 
 def _crossings(first: Run, second: Run) -> int:
-    """How often two nodes cross if the trunk of the first lies to the left."""
+    """Crossings of two nodes if the trunk of the first lies to the left."""
     over = sum(second.low < y < second.high for y in first.right)
     return over + sum(first.low < y < first.high for y in second.left)
 

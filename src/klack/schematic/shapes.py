@@ -34,10 +34,7 @@ _NARROW = {"²": 0.44, "³": 0.44, "µ": 0.74, "°": 0.5, "·": 0.38, "Ω": 0.85
 
 @lru_cache(maxsize=4096)
 def text_width(text: str, size: float, *, bold: bool = False) -> float:
-    """Width [px] that a line of text takes at most.
-
-    The widths are those of DejaVu Sans, the widest of the fonts that a viewer is told to use; in
-    another one the text is narrower.
+    """Width [px] that a line of text takes at most: that in DejaVu Sans, the widest font in use.
 
     >>> text_width("needle", 10.0) < text_width("needle", 10.0, bold=True) < 60.0
     True
@@ -54,7 +51,7 @@ def _letter(letter: str) -> float:
 
 
 def cut(text: str, most: int = _MOST) -> str:
-    """Text of a bearable length.
+    """Text shortened to a length.
 
     >>> cut("a_rather_long_name", 8)
     'a_rathe…'
@@ -101,7 +98,7 @@ def bounds(boxes: "list[Box]") -> Box:
 
 @dataclass(frozen=True, slots=True)
 class Label:
-    """One line of text; ``y`` is the line that the letters stand on."""
+    """One line of text; ``y`` is its baseline."""
 
     text: str
     x: float
@@ -134,7 +131,7 @@ class Stroke:
 
 @dataclass(frozen=True, slots=True)
 class Symbol:
-    """Strokes round an origin, turned clockwise by ``turn`` degrees, and the box that they fill."""
+    """Strokes round an origin, turned clockwise by ``turn`` degrees, and their box."""
 
     strokes: tuple[Stroke, ...]
     x: float
@@ -167,9 +164,9 @@ class Lead:
 
 @dataclass(frozen=True, slots=True)
 class Wire:
-    """Lines of one node of the network, all upright or level, and the points where they branch.
+    """Upright and level lines of one node of the network, and the points where they branch.
 
-    ``joints`` are the ports that it joins, as ``component.port``.
+    ``joints`` are its ports, as ``component.port``.
     """
 
     node: int

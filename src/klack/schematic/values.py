@@ -65,7 +65,7 @@ _ALWAYS = frozenset(("start_current",))
 
 
 def value_lines(part: Component, name: str = "") -> tuple[str, ...]:
-    """Lines such as ``"diameter 0.4 mm"``; what is left at its default is not told.
+    """Lines such as ``"diameter 0.4 mm"``, without keys left at their default.
 
     ``p(0)`` and its like are the state at the start.  What only repeats the ``name`` of the
     component is left out.
@@ -111,7 +111,7 @@ def _course(course: Section) -> Iterator[str]:
 
 
 def _text(value: Any, kind: Kind | None) -> str:
-    """Value in words; ranges of rows of numbers; empty for what one line cannot say."""
+    """Value in words; ranges of rows of numbers; empty for what needs more than one line."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, int | float):
@@ -174,4 +174,4 @@ _WRITTEN: Mapping[str, Callable[[float], str]] = {
     "m^3": _volume,
     "m^3/s": lambda value: f"{6e4 * value:.4g} l/min",
 }
-"""How values of units are written that have no usual prefixes of their own."""
+"""How values are written whose units have no usual prefixes."""

@@ -91,7 +91,7 @@ Levels = Annotated[
 
 
 def imported(words: Sequence[str] | None) -> "tuple[type[Component], ...]":
-    """Import the classes that the user named by ``--component``."""
+    """Classes that the user named by ``--component``."""
     if not words:
         return ()
 
@@ -121,13 +121,7 @@ def require_files(option: str, files: Sequence[Path]) -> None:
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class Shown:
-    """Options ``--json`` and ``--quiet``; the target is checked before the long work begins.
-
-    Raises
-    ------
-    InputError
-        If the target cannot be written.
-    """
+    """Options ``--json`` and ``--quiet``; raise where the target cannot be written."""
 
     json: Json = None
     quiet: Quiet = False

@@ -29,13 +29,7 @@ _MOST_NAMES = 8
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """Files written by a command, and the lines that report them.
-
-    Parameters
-    ----------
-    files
-        Names in it, sorted.
-    """
+    """Files written to a folder, sorted, and the lines that report them."""
 
     folder: Path
     files: tuple[str, ...]
@@ -43,13 +37,13 @@ class Written:
 
     @classmethod
     def of(cls, folder: Path, stage: Path, *lines: str) -> Self:
-        """Content of the stage of a folder; without lines, one that lists it."""
+        """Content of the stage of a folder; without lines, with one that lists it."""
         files = tuple(sorted(path.name for path in stage.iterdir()))
         return cls(folder, files, lines or (f"Written to {folder}: {listing(files)}",))
 
 
 def require_json_target(path: Path | None) -> None:
-    """Refuse a target of ``--json`` that cannot be written, before the long work begins."""
+    """Refuse a target of ``--json`` that cannot be written."""
     if str(path) != "-":
         require_file_target("--json", path)
 
@@ -107,7 +101,7 @@ _FILES = frozenset(
 
 
 def require_folder(folder: Path) -> None:
-    """Refuse a target of ``--out`` that cannot be written, before the long work begins."""
+    """Refuse a target of ``--out`` that cannot be written."""
     if (found := planted(folder)) is not None:
         raise _refuse("--out", folder, found, "a folder, or a path for one")
     existing = next(p for p in (folder, *folder.absolute().parents) if p.exists())
@@ -136,8 +130,7 @@ def listing(names: Iterable[str]) -> str:
 def staged_folder(folder: Path, beside: Mapping[str, Mark] | None = None) -> Iterator[Path]:
     """Give a hidden folder whose contents move to ``folder`` when all of them are complete.
 
-    What stands in ``folder`` under the same names is replaced, everything else there stays.
-    Nothing moves where one of the files in ``beside`` was replaced meanwhile.
+    See :func:`klack.files.whole.whole_files`.
     """
 
     def refuse(path: Path, error: OSError) -> InputError:

@@ -19,7 +19,7 @@ from klack.machine.progress import PointCount, Progress, silent
 __all__ = ["PROGRESS_FILE", "show_progress"]
 
 PROGRESS_FILE = "KLACK_PROGRESS_FILE"
-"""Environment variable with the file that gets the progress instead of the terminal."""
+"""Environment variable: file for the progress instead of the terminal."""
 
 _PATIENCE = 2.0  # s that a stage may take without a line
 _LASTS = 5.0  # s after which a stage that has not ended is named
@@ -54,7 +54,7 @@ def show_progress(quiet: bool = False) -> Iterator[Progress]:
 
 
 class _ToFile:
-    """Stage, fraction and points in a file, for a program that shows them (``klack app``)."""
+    """Stage, fraction and points in a file, for ``klack app``."""
 
     def __init__(self, path: Path) -> None:
         self._path, self._stage, self._next = path, "", 0.0
@@ -183,12 +183,9 @@ def _described(stage: str, words: str) -> str:
 
 
 class _Compiling:
-    """Detects when numba compiles a function that is not cached, or another process does.
+    """Detects when numba, or another process, compiles a function that is not cached.
 
-    Parameters
-    ----------
-    tell
-        Called with the words for what begins; with none when it is over.
+    ``tell`` is called with the words for what begins, and with none when it is over.
     """
 
     def __init__(self, tell: Callable[[str], None]) -> None:
@@ -197,11 +194,10 @@ class _Compiling:
 
     @property
     def words(self) -> str:
-        """What is going on now; empty if nothing is compiled."""
         return next((_KINDS[kind] for kind, depth in self._depth.items() if depth), "")
 
     def watch(self) -> None:
-        """Listen from now on, if numba is there already: its import alone takes a second."""
+        """Listen from now on, if numba is imported already, which takes a second."""
         if self._listener is not None or "numba" not in sys.modules:
             return
         from numba.core import event

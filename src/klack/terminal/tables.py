@@ -9,7 +9,7 @@ __all__ = ["Notes", "TextTable", "plain_math", "print_table", "printable"]
 
 
 def printable(text: str) -> str:
-    r"""Text with its signs that steer a terminal made visible: ``\x1b`` for an escape.
+    r"""Text with the characters that steer a terminal made visible: ``\x1b`` for an escape.
 
     A name in an untrusted file could otherwise clear the screen or fake an answer.
     """
@@ -61,9 +61,7 @@ _SIMPLE = re.compile(r"[A-Za-z0-9αβγζθλΛΘµνπρεφψωΔ∂.'_]+")
 
 
 def plain_math(latex: str) -> str:
-    r"""One line of text.
-
-    Made for the LaTeX that docstrings of components use; what it does not know stays as it is.
+    r"""LaTeX of docstrings of components as one line of text; unknown commands stay as they are.
 
     >>> plain_math(r"F = \frac{\mu \pi d l}{c} (v_n - v_b), \qquad m \ddot y = \sum_p F_p")
     "F = (µ π d l)/c (v_n - v_b),  m y'' = Σ_p F_p"
@@ -133,10 +131,7 @@ def print_table(
     left: int = 1,
     to_stderr: bool = False,
 ) -> None:
-    """Print rows of text; the first ``left`` columns are texts, the others numbers.
-
-    The words ``ok`` and ``FAILED`` get their colours on a terminal that has some.
-    """
+    """Print a :class:`TextTable`; ``ok`` and ``FAILED`` are coloured where the terminal can."""
     from rich.box import SIMPLE_HEAD
     from rich.console import Console
     from rich.table import Table

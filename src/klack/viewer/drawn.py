@@ -1,7 +1,4 @@
-"""Views of cases, meshes and results: bodies in their places, motion, contacts, curves.
-
-Nothing is solved; bodies are meshed where they are not yet.
-"""
+"""Views of cases, meshes and results; nothing is solved."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -39,12 +36,7 @@ __all__ = ["body_view", "view_of_case", "view_of_mesh", "view_of_result"]
 
 
 def view_of_case(case: Case | ValveCase, progress: Progress = silent) -> View:
-    """Bodies of a case in their places, with their supports, contacts and network.
-
-    Parameters
-    ----------
-    case : Case or ValveCase
-    """
+    """Bodies of a case in their places, with their supports, contacts and network."""
     view = View(
         name=case.name,
         title=case.title or case.name,
@@ -129,13 +121,7 @@ def _bodies(case: CaseFile, meshes: Mapping[str, Mesh]) -> tuple[BodyView, ...]:
 
 
 def body_view(name: str, mesh: Mesh, held: NDArray[np.int64], about: str) -> BodyView:
-    """A body as its mesh is.
-
-    Parameters
-    ----------
-    held
-        Nodes.
-    """
+    """A body as its mesh is; ``held`` are nodes."""
     skin = skin_of_mesh(mesh)
     is_held = np.zeros(mesh.node_count, dtype=bool)
     is_held[held] = True
@@ -167,7 +153,7 @@ def _mesh_words(mesh: Mesh) -> str:
 def _contact(
     name: str, upper: TouchingSide, lower: TouchingSide, names: tuple[str, str], gap: float | None
 ) -> ContactView:
-    """Where two bodies touch first when they are centred; ``gap`` is that of the case, or None."""
+    """Where two centred bodies touch first; ``gap`` is that of the case, or None."""
     ring, clearance = touch_ring(upper, lower)
     return ContactView(
         name=name,
@@ -182,7 +168,7 @@ def _contact(
 Floats = NDArray[np.float64]
 
 _BYTES = 3_600_000
-"""Of all mode shapes of a page; base64 makes a third more of them."""
+"""For all mode shapes of a page; base64 makes a third more of them."""
 
 _COLUMNS = 400  # of a history
 
@@ -195,18 +181,8 @@ def view_of_result(
 ) -> View:
     """What a page shows of a result of ``klack impact`` or ``klack stroke``.
 
-    Parameters
-    ----------
-    study : ImpactStudy or StrokeStudy
-    folder
-        Of the result; files that its case names are looked for beside it.
-    components : iterable of type
-        Component classes of the user.
-
-    Raises
-    ------
-    InputError
-        For other results, which have no bodies.
+    Files that the case names are looked for beside ``folder``, that of the result.  InputError for
+    other results, which have no bodies.
     """
     if isinstance(study, ImpactStudy):
         return _impact_view(study, folder, progress)
@@ -404,7 +380,7 @@ def _stroke_view(
 
 
 def _without_case(study: StrokeStudy, folder: Path, variant: StrokeVariant, error: str) -> View:
-    """What the result itself holds, where a file that its case names does not lie beside it."""
+    """What the result itself holds, where a file that its case names is missing."""
     view = View(
         name="",
         title="",

@@ -36,9 +36,9 @@ def view_of_source(
     ----------
     source
         Case file or name of a shipped case, mesh or STEP file, folder of a result.
-    components : iterable of type
+    components
         Component classes of the user that a case may name.
-    unit_length : float [m] or None
+    unit_length [m]
         Of a mesh file that does not name it.
 
     Raises
@@ -69,7 +69,7 @@ def view_of_source(
 
 
 def named_case(source: Path, components: Iterable[type[Component]] = ()) -> ValveCase | None:
-    """The case of a whole valve, if that is what the source names; None for all others."""
+    """The case of a whole valve, if that is what the source names."""
     if is_result(source) or source.suffix.lower() in (*STEP_ENDINGS, *MESH_FORMATS):
         return None
     case = load_any_case(find_case(source), components)

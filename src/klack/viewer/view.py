@@ -38,7 +38,7 @@ class ContactView:
     closed
         The points are a ring; others are drawn one by one.
     gap [m]
-        Between both as shown; nan where it is not known.
+        As shown; nan where it is not known.
     """
 
     name: str
@@ -84,8 +84,8 @@ class BodyView:
 
     Parameters
     ----------
-    name, about
-        ``about`` in words: where it comes from, its mesh.
+    about
+        Where it comes from, its mesh.
     held (v,)
         Vertices of the skin that are held.
     section (s, 2, 3) [m]
@@ -131,12 +131,14 @@ class View:
 
     Parameters
     ----------
-    name, title, source, description
-        ``name`` is a short one, for a file; ``source`` says which case, mesh or result this is.
+    name
+        Short, for a file.
+    source
+        Which case, mesh or result this is.
     version
         Of klack.
     time (frames,) [s]
-        Instants of the motion; empty without one.
+        Of the motion; empty without one.
     schematic
         SVG of the network; empty without one.
     notes
@@ -256,8 +258,8 @@ _IMPORT = "import * as THREE from './three.min.js';\n"
 def page_of(view: View) -> str:
     """HTML of a view: no server, no request, nothing but the file.
 
-    The component and three.js are modules for other programs; a page that is opened from a file may
-    load none, so both become one classic script here.
+    A page that is opened from a file may load no modules, so the component and three.js become one
+    classic script here.
     """
     environment = Environment(
         loader=PackageLoader("klack.viewer", ""),

@@ -1,6 +1,6 @@
 """``python -m klack.warming GROUP...``: compile groups of functions for another process.
 
-Ends when the process that started it has gone, which closes the standard input.
+Ends with that process, which closes the standard input.
 """
 
 import os

@@ -18,7 +18,7 @@ class Group:
     Parameters
     ----------
     words
-        What they do, for the table of ``klack warm``.
+        For the table of ``klack warm``.
     compute
         Small calculation that calls each of them with the types of a real one.
     """
@@ -59,7 +59,7 @@ def _derivatives() -> None:
 
 
 def all_steps() -> set[Any]:
-    """Step functions of all files of the rooms in which components are."""
+    """Step functions of the components in all rooms."""
     from klack.network.catalogue import component_classes
     from klack.network.step_function import is_step_function
 

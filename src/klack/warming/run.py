@@ -19,12 +19,7 @@ __all__ = ["Compiled", "Warmed", "warm"]
 
 @dataclass
 class Compiled:
-    """Functions of klack that were compiled, and how long that took.
-
-    Parameters
-    ----------
-    seconds [s]
-    """
+    """Functions of klack that were compiled, and how long [s] that took."""
 
     functions: int = 0
     seconds: float = 0.0
@@ -65,7 +60,7 @@ class Warmed:
     Parameters
     ----------
     functions
-        Functions of klack that had to be compiled for it; 0 if all were there.
+        Compiled for it; 0 if all were there.
     seconds [s]
         Spent on compiling, waiting for other processes included.
     """
@@ -78,8 +73,7 @@ class Warmed:
 def warm(groups: Sequence[str]) -> Iterator[Warmed]:
     """Compile groups of functions; yield each when it is done.
 
-    In one process: groups share most of their functions, and what two processes compile at the
-    same time costs more than it saves unless two cores are free.
+    In one process, since groups share most of their functions.
     """
     for name in groups:
         with _computed_anew(), counted() as count:

@@ -1,7 +1,7 @@
 """A key for content: equal keys mean equal numbers, whatever their name or date.
 
-Every value is written with its kind and length in front, so that no two different contents have the
-same bytes.  Names of files are refused: what counts is what is in them.
+Every value is written with its kind and length in front, so that different contents never have
+the same bytes.  Names of files are refused: what counts is what is in them.
 """
 
 import hashlib
@@ -22,12 +22,7 @@ def content_key(*parts: object) -> str:
     ----------
     parts
         None, bool, int, float, str, bytes, arrays, sparse rows, tuples, lists, mappings (their
-        order counts, it numbers solids) and dataclasses (name of the class and fields) of these.
-
-    Raises
-    ------
-    TypeError
-        For anything else, paths among them.
+        order counts, it numbers solids) and dataclasses of these; TypeError for anything else.
 
     Examples
     --------

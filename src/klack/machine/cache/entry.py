@@ -53,13 +53,7 @@ class DamagedEntry(Exception):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Entry:
-    """Arrays by name, and a text.
-
-    Parameters
-    ----------
-    arrays
-        Each comes back with the same type, shape, order of storage and bits.
-    """
+    """Arrays by name, which come back with type, shape, order of storage and bits; and a text."""
 
     arrays: Mapping[str, NDArray[Any]]
     text: str = ""
@@ -102,10 +96,8 @@ def read_entry(path: Path, key: str) -> Entry:
     Raises
     ------
     DamagedEntry
-        If the file is cut off, changed, of another program or of another key, a link or a pipe, or
-        if another user has written it or may do so: its numbers would count as klack's own.
-    OSError
-        If it cannot be read.
+        If the file is cut off, changed, of another program or of another key, a link or a pipe,
+        or if another user has written it or may do so.
     """
     with os.fdopen(_open_trusted(path), "rb") as file:
         size = os.fstat(file.fileno()).st_size
@@ -138,7 +130,7 @@ def _open_trusted(path: Path) -> int:
 
 
 def _fill(file: BufferedReader, header: Any, key: str, left: int, digest: Any) -> Entry:
-    """Read the arrays that the header announces; they must fill the file exactly."""
+    """The arrays that the header announces must fill the file exactly."""
     if header["key"] != key:
         raise DamagedEntry("of another key")
     table = [(str(name), _known(kind), tuple(shape), order == "F") for name, kind, shape, order
@@ -158,7 +150,6 @@ def _fill(file: BufferedReader, header: Any, key: str, left: int, digest: Any) -
 
 
 def _raw_bytes(array: NDArray[Any]) -> memoryview:
-    """Memory of an array that is stored row by row without gaps."""
     return memoryview(array.reshape(-1).view(np.uint8).data)
 
 

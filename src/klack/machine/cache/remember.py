@@ -37,8 +37,8 @@ _THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_C
 def origin() -> str:
     """Key of klack's own sources, the versions of its libraries, processor and threads.
 
-    The sources count as they are, not by their version: who edits klack is never given a result of
-    the code before.  Processor and number of threads decide the order of sums in the libraries.
+    Sources count by content, not by version.  Processor and number of threads decide the order
+    of sums in the libraries.
     """
     return content_key(
         FORMAT,
@@ -76,7 +76,6 @@ def _version(distribution: str) -> str:
 
 
 def _instructions() -> tuple[str, ...]:
-    """Instruction sets of the processor, as numpy has found them."""
     module = import_module("numpy._core._multiarray_umath")
     found = getattr(module, "__cpu_features__", {})
     return tuple(sorted(name for name, there in found.items() if there))
@@ -102,10 +101,11 @@ def remembered(
         None computes.
     kind
         What it is, e.g. ``"modes"``.
-    parts : tuple
-        Everything that the result depends on; see :func:`klack.machine.cache.content.content_key`.
+    parts
+        Everything that the result depends on; see
+        :func:`klack.machine.cache.content.content_key`.
     compute
-        Must depend on nothing else and warn of nothing: a warning would come only once.
+        Must not warn: a warning would come only once.
     pack, unpack
         To arrays and back, bit by bit.
     """

@@ -30,7 +30,7 @@ _TAG = "Signature: 8a477f597d28d172789f06886806bc55\n# Results of klack; safe to
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CacheContent:
-    """Content of a folder: number of entries, and their size [byte], unfinished files included."""
+    """Number of entries and their size [byte], unfinished files included."""
 
     count: int
     size: int
@@ -39,10 +39,9 @@ class CacheContent:
 class ResultCache:
     """Results in a folder; several processes may use it at once.
 
-    An entry is written beside its place and renamed, so that a reader finds all of it or nothing;
-    of two processes that store the same result the last one wins, with the same content.  What is
-    damaged counts as absent and is written anew.  A folder that cannot be written to costs one
-    note and is then only read.
+    An entry is written beside its place and renamed, so that a reader finds all of it or
+    nothing. What is damaged counts as absent and is written anew.  A folder that cannot be
+    written to costs one note and is then only read.
 
     Parameters
     ----------
@@ -55,7 +54,7 @@ class ResultCache:
     def __init__(self, folder: Path, limit: int) -> None:
         self.folder, self.limit = folder, limit
         self.served: Counter[str] = Counter()
-        """Results of earlier processes that this one was given, by kind."""
+        """Results of earlier processes, by kind."""
         self.missed: Counter[str] = Counter()
         """Results that it did not have."""
         self._lock = Lock()
@@ -104,13 +103,7 @@ class ResultCache:
         return CacheContent(count=count, size=sum(size for _, size, _ in files))
 
     def clear(self) -> CacheContent:
-        """Delete all entries, and return what was deleted.
-
-        Raises
-        ------
-        OSError
-            If one cannot be deleted.
-        """
+        """Delete all entries, and return what was deleted."""
         count = size = 0
         for path, length, _ in list(self._files()):
             path.unlink(missing_ok=True)
@@ -148,7 +141,7 @@ class ResultCache:
                 file.write(_TAG)
 
     def _files(self) -> Iterator[tuple[Path, int, float]]:
-        """Files of ours, with size [byte] and time of the last use [s]."""
+        """Entries, with size [byte] and time of the last use [s]."""
         try:
             places = list(os.scandir(self.folder))
         except OSError:
@@ -162,7 +155,7 @@ class ResultCache:
                     yield Path(place.path), state.st_size, state.st_mtime
 
     def _keep_within_limit(self) -> None:
-        """Look at all files, which takes 10 us each, and delete what was not used for longest."""
+        """Delete what was not used for longest; looking at a file takes 10 us."""
         files = sorted(self._files(), key=lambda file: file[2])
         old = time.time() - _FORGOTTEN
         total = sum(size for _, size, _ in files)
@@ -194,13 +187,7 @@ _UNITS = {"": 1, "B": 1, "KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
 
 
 def result_cache() -> ResultCache | None:
-    """Cache that the environment names; that of the user without; None where it is off.
-
-    Raises
-    ------
-    InputError
-        For a size that is none.
-    """
+    """Cache that the environment names; that of the user without; None where it is off."""
     text = os.environ.get(FOLDER_VARIABLE, "").strip()
     if text.lower() in _OFF:
         return None
@@ -215,7 +202,7 @@ def _at(folder: Path, limit: int) -> ResultCache:
 
 
 def _folder(text: str) -> Path | None:
-    """Folder of the cache; None for a user without a home."""
+    """None for a user without a home."""
     if text:
         return Path(os.path.expanduser(text)).absolute()
     from platformdirs import user_cache_path

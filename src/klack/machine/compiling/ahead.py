@@ -1,7 +1,6 @@
-"""Let a second process compile while this one does: each half of what a first run needs.
+"""Let a second process compile half of what a first run needs, while this one compiles the rest.
 
-Both fill the same store; who needs what the other one compiles at this moment waits for it
-(:mod:`klack.machine.compiling.turn`).
+Each waits for a function that the other one is compiling (:mod:`klack.machine.compiling.turn`).
 """
 
 import subprocess
@@ -32,8 +31,6 @@ def compiling_ahead(groups: Sequence[str], threads: int | None = None) -> Iterat
     ----------
     groups
         Of :data:`klack.warming.groups.GROUPS`, those first that this process needs last.
-    threads
-        Cores that may be used.
     """
     starting = _Starting(groups)
     if min(threads or available_cores(), available_cores()) < 2:
@@ -74,7 +71,6 @@ class _Starting(event.Listener):
         pass
 
     def end(self) -> None:
-        """End the process; what it has compiled stays."""
         if self._process is not None:
             self._process.kill()
             self._process.communicate()

@@ -28,7 +28,7 @@ _NAME, _BYTECODE = "klack-compiled", "bytecode"
 
 
 def compiled_folder() -> Path | None:
-    """Folder of the compiled functions; None for a user without a home."""
+    """None for a user without a home."""
     given = os.environ.get(FOLDER_VARIABLE, "").strip()
     if given:
         return Path(os.path.expanduser(given)).absolute() / _NAME
@@ -42,10 +42,7 @@ def compiled_folder() -> Path | None:
 
 
 def is_trusted(state: os.stat_result) -> bool:
-    """Whether only the caller or the administrator can have written a file or folder.
-
-    Machine code is run, so only that of these two is.
-    """
+    """Whether only the caller or the administrator can have written a file or folder."""
     if caller() is None:
         return True
     return state.st_uid in (0, caller()) and not state.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
@@ -54,7 +51,7 @@ def is_trusted(state: os.stat_result) -> bool:
 def bytecode_folder() -> Path | None:
     """Folder for what Python compiles, made if absent; None where another user could write to it.
 
-    Python runs what it finds there and looks at no owner.  So no other user may enter the folder,
+    Python does not look at the owner of what it runs.  So no other user may enter the folder,
     nor put another one in its place.
     """
     folder = compiled_folder()
@@ -100,13 +97,7 @@ def stored(folder: Path) -> tuple[int, int]:
 
 
 def clear_folder(folder: Path) -> None:
-    """Delete what is kept, bytecode too, except what another process writes at this moment.
-
-    Raises
-    ------
-    OSError
-        If a file cannot be deleted.
-    """
+    """Delete what is kept, bytecode too, except what another process writes at this moment."""
     with suppress(FileNotFoundError):
         for entry in os.scandir(folder):
             if entry.name.endswith((".code", ".part")):

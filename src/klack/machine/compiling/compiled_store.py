@@ -1,10 +1,10 @@
 """The store of machine code: one file for each function, signature and kind of processor.
 
-numba's own store looks only at the file that a function is written in; code that was compiled into
-it from other files would stay when these change, for instance with a new release.  Here the key
-holds the code, the constants and the options of all functions that a function reaches, wherever
-they are written; a file that only differs in its texts keeps the key.  A file is written under
-another name and renamed, and begins with a checksum: it is whole, or it counts as absent.
+numba's own store looks only at the file that a function is written in; code that was compiled
+in from other files would stay when these change.  Here the key holds the code, the constants
+and the options of all functions that a function reaches; a file that only differs in its texts
+keeps the key.  A file is written under another name and renamed, and begins with a checksum: it
+is whole, or it counts as absent.
 """
 
 import hashlib
@@ -50,19 +50,9 @@ _PLAIN = (bool, int, float, complex, str, bytes, type(None), np.generic)
 
 
 def code_key(dispatcher: Any, signature: Any, target: tuple[Any, ...]) -> str:
-    """Key of a function for one signature on one kind of processor.
+    """Key, 64 hexadecimal digits, of a function for one signature on one kind of processor.
 
-    Parameters
-    ----------
-    dispatcher : numba.core.dispatcher.Dispatcher
-    signature : tuple of numba types, or a numba signature
-    target : tuple
-        Operating system, processor and instruction sets, as numba names them.
-
-    Returns
-    -------
-    str
-        64 hexadecimal digits.
+    ``target``: operating system, processor and instruction sets, as numba names them.
     """
     arguments = getattr(signature, "args", signature)
     returns = getattr(signature, "return_type", None)
@@ -218,12 +208,7 @@ _UNREADABLE = (
 
 
 class CompiledStore(_Cache):
-    """Machine code of one function; what numba asks before and after it compiles.
-
-    Parameters
-    ----------
-    dispatcher : numba.core.dispatcher.Dispatcher
-    """
+    """Machine code of one function; what numba asks before and after it compiles."""
 
     def __init__(self, dispatcher: Any) -> None:
         self._dispatcher = dispatcher
@@ -247,10 +232,7 @@ class CompiledStore(_Cache):
         """Nothing is dropped: another key is another file."""
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Compiled function for a signature; None if this process has to compile it.
-
-        Waits while another process compiles it.
-        """
+        """Compiled function for a signature, also from a process that compiles it now, or None."""
         folder = compiled_folder()
         if not self._is_on or folder is None:
             return None
@@ -274,7 +256,7 @@ class CompiledStore(_Cache):
         return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep what was compiled for a signature; without effect where that is not possible."""
+        """Keep what was compiled for a signature, where that is possible."""
         folder = compiled_folder()
         if not self._is_on or folder is None:
             return
@@ -309,7 +291,7 @@ class CompiledStore(_Cache):
 
 
 def _prepared(folder: Path) -> bool:
-    """Make the folder; whether code may be kept in it."""
+    """Make the folder; return whether code may be kept in it."""
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         state = folder.stat()
@@ -326,7 +308,7 @@ def _prepared(folder: Path) -> bool:
 
 
 def _read_whole(path: Path) -> bytes | None:
-    """Content of a file that is whole and that only the caller can have written; None without."""
+    """None for a file that is damaged, or that another user can have written."""
     try:
         with path.open("rb") as file:
             if not (is_trusted(os.fstat(file.fileno())) and is_trusted(path.parent.stat())):

@@ -1,16 +1,11 @@
 """How numba compiles klack's functions: its own steps, with three of their costs left out.
 
-- numba compares the options of the function that it compiles with those of every function that it
-  has compiled before, one option after another: a tenth of all compiling.
-- The garbage collector searches the many objects of a compiler, which live until its end, again and
-  again: another tenth.
-- Inner functions are optimised and turned into machine code on their own, and then once more in
-  each function that calls them (:mod:`klack.machine.compiling.compilers`).
-
-Functions that only compiled ones call: without machine code of their own.
-
-What a compiled function calls is linked into it, and turned into machine code there.  An inner
-function is never entered in another way, so this is left out for itself.
+- numba compares the options of the function that it compiles with those of every function that
+  it has compiled before, one option after another: a tenth of all compiling.
+- The garbage collector searches the many objects of a compiler, which live until its end, again
+  and again: another tenth.
+- Inner functions, which only compiled ones call, are optimised and turned into machine code on
+  their own, and again in each function that they are linked into.
 """
 
 import gc
@@ -31,7 +26,7 @@ _KIND = "klack inner"
 class InnerCode(CPUCodeLibrary):
     """A function and all that it calls, for linking into other functions.
 
-    numba takes it for a library of machine code; what it asks only machine code has no effect.
+    numba takes it for a library of machine code; what it asks only of those has no effect.
     """
 
     def serialize_using_object_code(self) -> tuple[str, str, bytes]:
@@ -89,9 +84,9 @@ class InnerCode(CPUCodeLibrary):
     def _optimize_final_module(self) -> None:
         """Optimise once.
 
-        numba's first round, for counted references, is left out here: it comes in the callers.
-        Without vectorising here the time loop is a third slower: loops that are put into a large
-        function first are not vectorised there.
+        numba's first round, for counted references, comes in the callers.  Without vectorising
+        here the time loop is a third slower: loops that are put into a large function first are
+        not vectorised there.
         """
         match self._codegen._module_pass_manager():
             case (passes, builder):
@@ -138,7 +133,7 @@ class EntryCompiler(Compiler):
 
 
 class InnerCompiler(EntryCompiler):
-    """Compile a function that only compiled ones call."""
+    """Compiler of functions that only compiled ones call."""
 
     def compile_extra(self, func: Callable[..., Any]) -> Any:
         """Compile a plain function as far as its callers need it."""

@@ -1,4 +1,4 @@
-"""The two places at which a derivative is not that of the operations on a number."""
+"""Two places at which a derivative is not that of the operations on a number."""
 
 from typing import Any
 
@@ -9,10 +9,9 @@ __all__ = ["constant", "with_slope_of"]
 
 @intrinsic
 def constant(typingctx: Any, number: Any) -> Any:
-    """The same number, taken as chosen: a first guess, the length of a piece; in compiled code.
+    """The same number without its derivatives; in compiled code.
 
-    A plain number is left as it is.  Of one with derivatives
-    (:mod:`klack.machine.compiling.tangent_number`) these are dropped.  A solution has the same ones
+    For what is chosen: a first guess, the length of a piece.  A solution has the same derivatives
     from any guess, and so has a sum over pieces of any length but for the error of the method;
     where a guess or a length follows from that of the step before, what is left of their own
     derivatives would grow from step to step without bound.

@@ -1,4 +1,4 @@
-"""Mark functions that are compiled when they are first called, and kept for later processes."""
+"""Marks of functions that are compiled at their first call, and kept for later processes."""
 
 from collections.abc import Callable
 from functools import partial
@@ -12,15 +12,13 @@ __all__ = ["inner", "intrinsic", "njit"]
 def njit(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     """Compile a function to machine code at its first call, or load that of an earlier process.
 
-    What is not given is fixed here: numba would take the error model, fast mathematics, inlining
-    and the runtime over from whichever compiled function calls it first, so that the code would
-    depend on the order in which functions are compiled.
+    numba would take options that are not given here (error model, fast mathematics, inlining,
+    runtime) from whichever compiled function calls it first.
 
     Parameters
     ----------
     options
-        Those of :func:`numba.njit`; ``cache=True`` has no meaning of its own: all are kept, in the
-        store of :mod:`klack.machine.compiling.compiled_store`.
+        Those of :func:`numba.njit`; ``cache`` has no effect, since all are kept.
     """
     return _marked(function, _entry, options)
 
@@ -28,8 +26,8 @@ def njit(function: Callable[..., Any] | None = None, **options: Any) -> Any:
 def inner(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     """Compile a function that only compiled ones call.
 
-    Without an entry from Python and machine code of its own it compiles in a quarter of the time,
-    in less where it is given a bundle of arrays.
+    Without an entry from Python and machine code of its own it compiles in a quarter of the
+    time, in less where it is given a bundle of arrays.
     """
     return _marked(function, _inner, options)
 
@@ -42,7 +40,6 @@ def intrinsic(function: Callable[..., Any] | None = None, **options: Any) -> Any
 def _marked(
     function: Callable[..., Any] | None, make: Callable[..., Any], options: dict[str, Any]
 ) -> Any:
-    """The function marked, or what marks one with these options."""
     options.pop("cache", None)
     making = partial(make, **options)
     return partial(Marked, make=making) if function is None else Marked(function, making)

@@ -1,8 +1,4 @@
-"""A function that is marked to be compiled, before the library that compiles is loaded.
-
-Loading numba takes longer than reading a case.  So a marked function stands in for what numba makes
-of it, also where other compiled functions name it.
-"""
+"""A stand-in for a function that numba compiles, until numba, slow to load, is needed."""
 
 from collections.abc import Callable
 from functools import cached_property, update_wrapper
@@ -12,13 +8,7 @@ __all__ = ["Marked"]
 
 
 class Marked:
-    """A function, and what numba makes of it once it is called, or a call of it compiled.
-
-    Parameters
-    ----------
-    make
-        Makes of the function what numba knows.
-    """
+    """A function; ``make`` makes of it what numba calls, or compiles calls of."""
 
     def __init__(self, function: Callable[..., Any], make: Callable[..., Any]) -> None:
         update_wrapper(self, function)
@@ -43,7 +33,7 @@ class Marked:
 
     @cached_property
     def _numba_type_(self) -> Any:
-        """Type of what it stands for; numba asks for it where a compiled function names this."""
+        """Type of what it stands for, where a compiled function names it."""
         from numba.core.registry import cpu_target
 
         cpu_target.typing_context.refresh()  # an intrinsic is registered as it is made

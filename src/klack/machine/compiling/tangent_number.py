@@ -1,8 +1,8 @@
 """A number with its derivatives in some directions, as a type of compiled code.
 
-Compiled for such numbers in place of plain ones, a function carries exact tangents: every
-operation follows the rules of calculus beside the value (forward mode), and every decision is that
-of the value alone.  The same source serves both, so that no derivative is written by hand.
+Compiled for such numbers in place of plain ones, a function carries exact tangents (forward
+mode): every operation follows the rules of calculus beside the value, and every decision is
+that of the value alone.  No derivative is written by hand.
 
 Value and derivatives are the lanes of one vector register, the value first.
 """
@@ -26,17 +26,11 @@ from numba.extending import intrinsic, models, register_model
 __all__ = ["TangentNumber", "tangent_number", "with_tangents"]
 
 _RULES = sha256(Path(__file__).read_bytes()).hexdigest()[:12]
-"""In the name of the type, and so in the key of all machine code that is made with it."""
+"""In the name of the type, and so in the key of all machine code made with it."""
 
 
 class TangentNumber(types.Type):  # as a number, numba would ask NumPy for its kind
-    """Numba type of a number with derivatives.
-
-    Parameters
-    ----------
-    lanes
-        One more than there are directions.
-    """
+    """Numba type of a number with derivatives; ``lanes`` is one more than there are directions."""
 
     def __init__(self, lanes: int) -> None:
         self.lanes = lanes
@@ -73,13 +67,7 @@ _REAL = ir.DoubleType()
 
 
 class _Lanes:
-    """Writes the rules of calculus for vectors of one length.
-
-    Parameters
-    ----------
-    context, builder
-        Of numba and of LLVM.
-    """
+    """Rules of calculus for vectors of one length; ``context`` of numba, ``builder`` of LLVM."""
 
     def __init__(self, context: Any, builder: Any, kind: TangentNumber) -> None:
         self.context, self.builder, self.count = context, builder, kind.lanes
@@ -154,7 +142,6 @@ def _real(value: float) -> Any:
 
 
 def _lifted(args: Any) -> TangentNumber | None:
-    """The type of an operation between such numbers and plain ones."""
     found = [kind for kind in args if isinstance(kind, TangentNumber)]
     others = [kind for kind in args if not isinstance(kind, TangentNumber)]
     if not found or not all(isinstance(k, types.Integer | types.Float) for k in others):
@@ -418,9 +405,10 @@ def _with(kind: Any, number: TangentNumber) -> Any:
 def with_tangents(typingctx: Any, lanes: Any, given: Any) -> Any:
     """Take arrays of floats as arrays of numbers with derivatives, in compiled code.
 
-    ``lanes`` (a literal) is the length of the last axis of each; the memory stays the same.  It has
-    to begin at a multiple of the size of a vector.  An array with this axis alone is one number.
-    ``given`` is an array or a named tuple of arrays and of such bundles; what is whole stays.
+    ``lanes`` (a literal) is the length of the last axis of each; the memory stays the same, and
+    must begin at a multiple of the size of a vector.  An array with this axis alone is one
+    number. ``given`` is an array or a named tuple of arrays and of such bundles; what is whole
+    stays.
     """
     if not isinstance(lanes, types.IntegerLiteral):
         return None

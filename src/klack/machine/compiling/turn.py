@@ -1,8 +1,8 @@
 """One process compiles a function, others that need it wait for it.
 
-A file beside the code is locked while its function is compiled.  The system gives the lock back
-however a process ends, so none is left behind by one that was killed.  Functions are compiled with
-all that they call; as none calls itself, two processes never wait for each other.
+A file beside the code is locked while its function is compiled; the system releases it however
+a process ends.  Functions are compiled with all that they call; as none calls itself, two
+processes never wait for each other.
 """
 
 import os
@@ -25,8 +25,8 @@ _PAUSE = 0.02  # [s]
 _PATIENCE = 60.0
 """Age of a lock [s] from which a process compiles itself: twice what the longest function takes.
 
-The other one may have been stopped (Ctrl-Z), or has hardly any time of the processor.  What it has
-compiled until then is in the store."""
+The other one may be stopped (Ctrl-Z) or starved; what it has compiled is in the store.
+"""
 
 
 class Turn:
@@ -50,12 +50,12 @@ def take_turn(path: Path, done: Path, patience: float = _PATIENCE) -> Turn | Non
     Parameters
     ----------
     path
-        File to lock; made, and removed at the end.
+        Made, and removed at the end.
     done
-        What the process that has the lock will have written.
+        What the process that has the lock writes.
     patience [s]
-        From when on the other process has the lock: those of functions within functions run out at
-        the same time.
+        Counts from when the other process took the lock, so that the waits of functions within
+        functions run out together.
     """
     turn = _try(path)
     end = time.monotonic() + patience - _age(path)
@@ -81,7 +81,6 @@ def _age(path: Path) -> float:
 
 
 def _try(path: Path) -> Turn | None:
-    """Make and lock the file; None while another process has it."""
     try:
         handle = open_own_file(path, os.O_RDWR | os.O_CREAT)
     except (OSError, InputError):  # a folder that may only be read
