@@ -34,13 +34,13 @@ class Analysis(Generic[Kept]):
 
     Parameters
     ----------
-    json : type
+    json
         Of what ``to_json`` returns: a typed dictionary whose ``schema`` names it.
     to_json
         Its numbers, SI, the unit in the key.
     told
-        What a terminal shows of it: tables, lines and notes, in their order.
-    measures : mapping of str to tuple of Measure
+        What a terminal shows of it, in this order.
+    measures
         Its catalogue, by what they are of.
     measured
         What its measures are of: levels, variants, impacts, shots, by name.
@@ -59,8 +59,6 @@ class StoredAnalysis(Analysis[Kept]):
 
     Parameters
     ----------
-    form
-        How the record is stored.
     page
         Function that makes the report of a record, ``"noise.content:noise_content"``; loaded with
         all its figures when a report is asked for.
@@ -75,36 +73,22 @@ class StoredAnalysis(Analysis[Kept]):
     def content(self, record: Kept, *, result: str = "", case: str = "") -> Content:
         """Report of a record, in words, tables and figures.
 
-        Parameters
-        ----------
-        result, case
-            Folder of the result, and what it was computed from, as typed at a terminal: for the
-            commands that the report names.
+        ``result`` and ``case``, the folder of the result and what it was computed from, are named
+        in its commands as typed at a terminal.
         """
         content: Content = named(self.page)(record)
         return content.placed(result=result, case=case)
 
     def save(self, record: Kept, folder: Path) -> Path:
-        """Write ``folder/result.zarr``; an earlier result stays whole until this one is complete.
+        """Write ``folder/result.zarr`` and return it.
 
-        Returns
-        -------
-        Path
-            Of the store.
+        An earlier result stays whole until this one is complete.
         """
         return save_record(record, folder, self.form)
 
     def load(self, folder: Path) -> Kept:
-        """Read what :meth:`save` wrote.
+        """Read what :meth:`save` wrote, from its folder or the store itself.
 
-        Parameters
-        ----------
-        folder
-            The folder given to :meth:`save`, or the store itself.
-
-        Raises
-        ------
-        InputError
-            If there is no result, it comes from something else, or a part of it is missing.
+        InputError if there is no result, it is another kind, or a part of it is missing.
         """
         return self.renewed(load_record(folder, self.form))

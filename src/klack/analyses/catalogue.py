@@ -1,4 +1,4 @@
-"""All analyses; what a user can ask of klack is named here, and loaded when it is asked for."""
+"""All analyses, each loaded when it is asked for."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -103,13 +103,7 @@ def commands() -> dict[Callable[..., int], str]:
 
 
 def analysis_in(folder: Path) -> "StoredAnalysis[Any]":
-    """Which analysis a stored result is of.
-
-    Raises
-    ------
-    InputError
-        If there is no result, or it is of another kind.
-    """
+    """Analysis of a stored result; InputError if there is none, or of another kind."""
     from klack.analyses.store import stored_format
 
     name = stored_format(folder)
@@ -127,11 +121,5 @@ def analysis_in(folder: Path) -> "StoredAnalysis[Any]":
 
 
 def load_result(folder: Path) -> Any:
-    """Read a stored result of whichever kind.
-
-    Raises
-    ------
-    InputError
-        If there is no result, or a part of it is missing.
-    """
+    """Read a stored result of any kind."""
     return analysis_in(folder).load(folder)

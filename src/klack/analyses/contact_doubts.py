@@ -68,7 +68,7 @@ CONTACT = JsonForm(
 
 
 def contact_doubt(contact: MeshedContact) -> str:
-    """Sentence on why the numbers of a contact are doubtful; empty if they are not."""
+    """Why the numbers of a contact are doubtful; empty if they are not."""
     doubts = " and ".join(contact.doubts)
     return f"The contact {contact.surfaces} cannot be relied on: {doubts}." if doubts else ""
 

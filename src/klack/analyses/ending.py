@@ -1,4 +1,4 @@
-"""How every command ends that asks for an analysis: result, report, tables, JSON, exit."""
+"""How every command of an analysis ends: result, report, tables, JSON, exit."""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -55,8 +55,6 @@ def write_result(
 
     Parameters
     ----------
-    save
-        Writes the result into a folder.
     unfinished
         Finished parts that are not needed any more once the result stands.
 
@@ -77,16 +75,9 @@ def write_result(
 
 
 def add_report(page: "Callable[[], Content]", folder: Path, mark: Mark | None) -> Exception | None:
-    """Write the report of a result, if the folder still has this one at the end.
+    """Write the report of a result, if the folder still has this one (``mark``) at the end.
 
-    Whatever happens to the report costs no calculation: an internal error in a picture is returned.
-
-    Parameters
-    ----------
-    page
-        Makes the report.
-    mark : mark
-        Of the result, from :func:`write_result`.
+    An internal error in a picture is returned, so that it costs no calculation.
     """
     try:
         with staged_folder(folder, {} if mark is None else {_RESULT: mark}) as stage:
@@ -121,12 +112,8 @@ Stored = TypeVar("Stored", bound="Record")
 class Ending(Shown):
     """What the user wants of a record that is stored.
 
-    Parameters
-    ----------
-    report
-        Whether pages are written.
-    case
-        What the result is computed from, as typed at a terminal; empty if not from one case.
+    ``case`` is what the result is computed from, as typed at a terminal; empty if not from one
+    case.
     """
 
     folder: Path
@@ -151,7 +138,7 @@ class Ending(Shown):
 
     @contextmanager
     def resumable(self, log: "LogForm[Any, Any]") -> Iterator[Progress]:
-        """Show progress; who stops it hears what is kept."""
+        """Show progress; after a stop, say what is kept."""
         with show_progress(self.quiet) as progress:
             try:
                 yield progress
@@ -176,7 +163,7 @@ class Ending(Shown):
         beside
             Writes further files into a folder, and returns their names.
         unfinished
-            Finished parts that are not needed any more once the result stands.
+            As for :func:`write_result`.
         incomplete
             Raised at the end: why the record is not all that was asked for.
         """

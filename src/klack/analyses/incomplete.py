@@ -15,10 +15,7 @@ __all__ = ["Attempts", "IncompleteImpactError", "failure_notes", "missing_in"]
 class IncompleteImpactError(ConvergenceError):
     """A level of an impact failed; ``study`` holds those that did not.
 
-    Parameters
-    ----------
-    study
-        Says in its ``failures`` and its warnings what is missing.
+    Its ``failures`` and warnings say what is missing.
     """
 
     def __init__(self, study: ImpactStudy) -> None:
@@ -55,7 +52,7 @@ class Attempts:
 
 
 def failure_notes(failures: Mapping[str, str]) -> tuple[str, ...]:
-    """Notes on missing levels of an impact, with reasons; empty if none is missing."""
+    """Notes on missing levels of an impact, with reasons."""
     return tuple(
         f"level '{name}' failed and has no results: {' '.join(text.split())}"
         for name, text in failures.items()
@@ -63,7 +60,7 @@ def failure_notes(failures: Mapping[str, str]) -> tuple[str, ...]:
 
 
 def missing_in(study: object) -> tuple[str, ...]:
-    """Report what is missing in a stored result, for commands that use it."""
+    """What is missing in a stored result, for commands that use it."""
     if isinstance(study, ImpactStudy):
         return failure_notes(study.failures)
     if isinstance(study, StrokeStudy):

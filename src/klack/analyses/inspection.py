@@ -40,7 +40,7 @@ Row = tuple[str, str, str]
 def expanded_rows(case: CaseFile) -> Iterator[tuple[str, tuple[Row, ...]]]:
     """Parameters of a case, values that follow from expressions, components with included parts.
 
-    Yields a title and its rows; nothing for a case without any of them.
+    Yields a title and its rows.
     """
     found = case.expanded
     if found is None:
@@ -68,7 +68,6 @@ def _parameters(parameters: object) -> Iterator[Row]:
 
 
 def _source(item: ParameterValue) -> str:
-    """Expression that a value comes from; empty for a quantity."""
     try:
         parse_quantity(item.text, item.kind)
     except InputError:
@@ -109,15 +108,10 @@ def inspect_file(
     ----------
     path
         With one of the endings of :data:`INSPECTED`.
-    unit_length : float [m] or None
+    unit_length [m]
         Of a mesh whose file does not name it.
     matrix
         Name of one matrix in a file of several; all of them without.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or is of another kind.
     """
     ending = path.suffix.lower()
     if not path.is_file():
@@ -143,14 +137,8 @@ def inspect_file(
 def inspect_case(case: CaseFile) -> Iterator[tuple[str, tuple[Row, ...]]]:
     """Parameters, parts and bodies of a case, their files checked as in a run.
 
-    Yields the rows of :func:`klack.analyses.inspection.expanded_rows`, then the name of each
-    body and its rows.
-
-    Raises
-    ------
-    InputError
-        For files that cannot be read, for matrices and models that no body has, and, after the
-        rows of all bodies, for a surface that the case names and its file does not have.
+    Yields the rows of :func:`expanded_rows`, then the name of each body and its rows; after those
+    of all bodies it refuses a surface that the case names and its file does not have.
     """
     yield from expanded_rows(case)
     known: dict[str, tuple[str, ...]] = {}
@@ -191,7 +179,6 @@ def _drawn_rows(case: CaseFile, name: str, drawn: ProfileGeometry) -> Iterator[R
 
 
 def _mass(case: CaseFile, name: str, volumes: Mapping[str, float]) -> Row:
-    """Mass of a body from the volume [m^3] of each solid and the materials of the case."""
     try:
         materials = case.materials_of(name, volumes)
     except InputError as error:  # what there is shall be shown all the same
@@ -292,7 +279,6 @@ def _mesh_rows(path: Path, model: MeshModel) -> Iterator[Row]:
 
 
 def _rows_of_matrices(path: Path, name: str | None) -> Iterator[Row]:
-    """One matrix, or all of a file of several."""
     try:
         yield from _matrix_rows(read_matrix(path, name=name))
         return
@@ -339,7 +325,7 @@ def _fmu_rows(fmu: FmuDescription) -> Iterator[Row]:
 
 
 def _around(mesh: Mesh, nodes: np.ndarray) -> str:
-    """Where some nodes lie: their height and their distance from the axis."""
+    """Height and distance from the axis of some nodes."""
     points = mesh.points[nodes]
     radius = points[:, 0] if mesh.dimension == 2 else np.hypot(points[:, 0], points[:, 1])
     return f"z {_range(points[:, -1])}, r {_range(radius)}"

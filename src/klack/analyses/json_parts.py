@@ -1,7 +1,4 @@
-"""Objects of JSON, each described once: its keys with their types and meanings, and its values.
-
-Numbers are SI, the unit in the key; what does not exist (nan, infinite) is null.
-"""
+"""Objects of JSON, each described once: its keys with their types and meanings, and its values."""
 
 from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
@@ -46,12 +43,12 @@ class Key(NamedTuple):
 
     Parameters
     ----------
-    type : type, or the shape of the entry
+    type
         A :class:`JsonForm` stands for an object, ``[FORM]`` for a list of such objects,
         ``{str: FORM}`` for objects by name, ``(FORM, None)`` for one that may be null.
     words
         What the name does not say.
-    of : str or callable
+    of
         What it is read from, what the record calls so by default.
     depth
         From how far above it is inherited.
@@ -78,8 +75,6 @@ class JsonForm:
     ----------
     name
         Of its type in the schema.
-    words
-        What it is.
     keys
         In their order; in the schema inherited ones come first.
     module
@@ -139,7 +134,7 @@ def measured_keys(
 
 
 def schema_key(name: str) -> Key:
-    """The key that tells which of all results an object is."""
+    """Key that tells which of all results an object is."""
     return Key("schema", Literal[name], of=lambda _: name)
 
 
@@ -187,7 +182,6 @@ def _type(shape: Any) -> Any:
 
 OWN_COMPONENTS = Key("own_components", OwnComponents)
 CASE = (Key("case", str), Key("klack", Version, of="version"))
-"""Of which case a record is, and by which version."""
 
 REJECTED = JsonForm(
     "RejectedJson", "A recording that was left out.", Key("name", str), Key("reason", str)

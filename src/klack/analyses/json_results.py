@@ -1,11 +1,11 @@
 """Output of ``--json`` of each command: one type for the code, the schema and the docs.
 
 Every analysis has a type of its own (:attr:`Analysis.json`); those of the other commands stand
-here.  The functions that make the JSON are annotated with these types, so that the type checker
+here.  Functions that make the JSON are annotated with these types, so that the type checker
 compares their keys; the schema that ``klack schema --kind result`` prints and the page of the
 reference are generated from them.  Numbers are SI, the unit in the key; what does not exist (nan,
 infinite) is null.  The number behind the slash of ``schema`` goes up when a key goes or changes its
-meaning; new keys leave it as it is.
+meaning.
 """
 
 from typing import Annotated, Any, Literal
@@ -196,7 +196,7 @@ _OTHERS = (
 
 
 def measures_catalogue() -> dict[str, Any]:
-    """Description of every measure: key, name, symbol, unit, definition and source, versioned."""
+    """Key, name, symbol, unit, definition and source of every measure, versioned."""
     catalogue: dict[str, Any] = {"schema": "klack-measures/1"}
     for analysis in analyses():
         catalogue |= {of: described(measures) for of, measures in analysis.measures.items()}
@@ -206,8 +206,8 @@ def measures_catalogue() -> dict[str, Any]:
 def result_schema() -> dict[str, Any]:
     """JSON schema (draft 2020-12) of what every command writes with ``--json``.
 
-    The key ``schema`` of a result tells which of the choices it is.  ``x-measures`` is the
-    catalogue of measures.
+    The key ``schema`` of a result tells which of the choices it is; ``x-measures`` is the catalogue
+    of measures.
     """
     kinds = (*(analysis.json for analysis in analyses()), *_OTHERS)
     references, definitions = TypeAdapter.json_schemas(

@@ -1,7 +1,7 @@
 """Measures: the numbers that people name, each described once.
 
-From the description of a measure come its key in JSON, its column in tables, its row in a report,
-its entry in the glossary, its attributes in exported files and its line in the reference.
+The description gives a measure its key in JSON, its column in tables, its row in a report, its
+entry in the glossary, its attributes in exported files and its line in the reference.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -120,8 +120,6 @@ class Measure(Generic[Of]):
     read
         Its value [unit], nan or None where it does not exist; what stands under its key by
         default.
-    kind
-        A ``"number"``, a ``"whole"`` number or a ``"truth"`` value.
     form
         How a report prints it: a ``"quantity"`` with ``digits`` significant digits and a prefix,
         ``"fixed"`` decimals, a ``"share"`` in per cent, a ``"power"`` of ten, a ``"count"``, which
@@ -290,13 +288,13 @@ def cells(measures: Iterable[Measure[Of]], of: Of) -> tuple[str, ...]:
 def text_table(
     title: str, first: str, measures: Sequence[Measure[Of]], named: Iterable[tuple[str, Of]]
 ) -> TextTable:
-    """A table for a terminal: things down, below their names, and their measures across."""
+    """Table for a terminal: things down, below their names, and their measures across."""
     rows = tuple((name, *cells(measures, of)) for name, of in named)
     return TextTable(title=title, columns=(first, *heads(measures)), rows=rows)
 
 
 def page_heads(measures: Iterable[Measure[Of]]) -> tuple[str, ...]:
-    """What a report calls its key numbers, those with ``page``."""
+    """Names of the key numbers of a report, those with ``page``."""
     return tuple(measure.title or measure.name for measure in measures if measure.page)
 
 
@@ -311,7 +309,7 @@ def json_of(measures: Iterable[Measure[Of]], of: Of) -> dict[str, Value]:
 
 
 def number_or_none(value: float) -> float | None:
-    """Number for JSON, which has no nan and no infinity."""
+    """None for nan and infinity, which JSON does not have."""
     return float(value) if isfinite(value) else None
 
 

@@ -1,4 +1,4 @@
-"""Page of a record: the common parts of every report, and of tables beside it."""
+"""Common parts of the report of every record, and of tables beside it."""
 
 import csv
 from collections.abc import Iterable, Mapping, Sequence
@@ -37,9 +37,8 @@ def page_of(
         What else stands before date and version.
     answer
         In one paragraph.
-    numbers
-        The key numbers.
-    definitions, limits : tuple of (term, text)
+    definitions, limits
+        Terms and their texts.
     """
     made = f"klack {record.version}"
     heading = (kind, f"case {record.case}", *subtitle, _date_text(record.created), made)

@@ -1,4 +1,4 @@
-"""Points of a parameter space and the measures that were computed there."""
+"""Points of a parameter space and their measures."""
 
 import csv
 from dataclasses import dataclass
@@ -34,8 +34,6 @@ class PointColumn:
         SI; ``"1"`` for pure numbers, empty for texts.
     values (points,)
         Numbers, nan where there is none; of a key without unit what is written there.
-    measure
-        With its definition.
     """
 
     name: str
@@ -55,17 +53,13 @@ class PointTable:
 
     Parameters
     ----------
-    case
-        Name of the case.
-    variant
-        That was computed.
     points
         Keys that points exchange, in SI; nan or None where a point leaves the case as it is.
     measures
         In the order in which they were asked for; nan where a run does not have the number.
     failures
         Why a point has no measures: the error of its run; empty where it was computed.
-    warnings : tuple of tuple of str
+    warnings
         Doubts about the numbers of each point.
     steps
         Of strokes: how often their steps were halved, and the largest change over what the accuracy
@@ -89,13 +83,7 @@ class PointTable:
         return (*self.points, *self.measures, *self.steps)
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        """Values of a key or a measure, shape (points,).
-
-        Raises
-        ------
-        InputError
-            If there is none of this name.
-        """
+        """Values of a key or a measure, shape (points,)."""
         for column in self.columns:
             if column.name == name:
                 return column.values
@@ -123,13 +111,7 @@ class PointTable:
         return (("failure", self.failures), ("doubts", tuple(map("\n".join, self.warnings))))
 
     def to_pandas(self) -> Any:
-        """Return a ``pandas.DataFrame``; units are in its ``attrs["units"]``.
-
-        Raises
-        ------
-        MissingExtraError
-            Without the package pandas.
-        """
+        """Return a ``pandas.DataFrame``; units are in its ``attrs["units"]``."""
         try:
             from pandas import DataFrame  # type: ignore[import-untyped]
         except ImportError:
@@ -155,13 +137,7 @@ class PointTable:
         return path
 
     def to_parquet(self, file: str | Path) -> Path:
-        """Write a Parquet file: columns by name, the unit of each in the metadata of its field.
-
-        Raises
-        ------
-        MissingExtraError
-            Without the package pyarrow.
-        """
+        """Write a Parquet file: columns by name, the unit of each in the metadata of its field."""
         try:
             import pyarrow
             from pyarrow import parquet
@@ -221,10 +197,7 @@ class PointTable:
 class RunsInterrupted(KeyboardInterrupt):
     """Ctrl-C during the runs of many points.
 
-    Parameters
-    ----------
-    table
-        What was computed until then; the other points say that they were not computed.
+    ``table`` is what was computed until then; the other points say that they were not computed.
     """
 
     def __init__(self, table: PointTable) -> None:
@@ -235,7 +208,7 @@ class RunsInterrupted(KeyboardInterrupt):
 def column_of(
     name: str, unit: str, values: list[Any], measure: Measure[Any] | None = None
 ) -> PointColumn:
-    """Return a column: an array of floats if it has a unit, nan for None; else of objects."""
+    """A column: floats if it has a unit, nan for None; else objects."""
     if not unit:
         kept = np.empty(len(values), dtype=object)
         kept[:] = values
@@ -245,7 +218,6 @@ def column_of(
 
 
 def _plain(values: NDArray[Any]) -> list[Any]:
-    """Numbers, or texts: what stands in the case where a key has no unit."""
     found = values.tolist()
     if values.dtype == object and not all(x is None or isinstance(x, str) for x in found):
         return [None if x is None else str(x) for x in found]

@@ -1,7 +1,7 @@
-"""Head of every record: what was computed, by which version, when, and how long it took.
+"""Head of every record, what an analysis leaves behind.
 
-A record is what an analysis leaves behind.  Its fields are stored under their own names
-(:mod:`klack.analyses.store`).
+Its fields are stored under their own names (:mod:`klack.analyses.store`).  They are plain arrays
+and small frozen records, so that a stored one can be reported again without the solver.
 """
 
 from collections.abc import Mapping
@@ -78,7 +78,7 @@ class CaseRecord(Record):
     own_components
         Components that are not part of klack: first digits of the SHA-256 of their code, by name.
     case_notes
-        What the case by itself gives reason to say; added to the warnings.
+        Added to the warnings, each once.
     """
 
     case: str
@@ -87,17 +87,17 @@ class CaseRecord(Record):
     case_notes: InitVar[tuple[str, ...]] = ()
 
     def __post_init__(self, case_notes: tuple[str, ...]) -> None:
-        """Add the notes of the case to the warnings, each once."""
+        """Add the notes of the case to the warnings."""
         new = tuple(note for note in case_notes if note not in self.warnings)
         object.__setattr__(self, "warnings", (*self.warnings, *new))
 
 
 _version = cache(version)
-"""Installed version of a library; reading its description takes milliseconds."""
+"""Version of an installed library; reading its description takes milliseconds."""
 
 
 def run_fields(begin: float, clock: StageClock, *libraries: str) -> dict[str, Any]:
-    """Fields of a record that its run gives, which began at ``begin`` of ``perf_counter`` [s]."""
+    """Fields that a run gives, which began at ``begin`` of ``perf_counter`` [s]."""
     return {
         "version": __version__,
         "versions": {name: _version(name) for name in (*_LIBRARIES, *libraries)},

@@ -17,7 +17,7 @@ Kind = TypeVar("Kind", bound="type[Columns]")
 
 
 class Columns:
-    """Runs in rows; what a run does not reach is nan.  See :func:`with_columns`."""
+    """Runs in rows, a column for each measure; what a run does not reach is nan."""
 
     filled: ClassVar[float]
 
@@ -49,7 +49,7 @@ class Columns:
         return len(getattr(self, self.keys()[0]))
 
     def row(self, index: int) -> dict[str, float]:
-        """Return all numbers of one run by the name of their column."""
+        """All numbers of one run by the name of their column."""
         return {name: float(getattr(self, name)[index]) for name in self.keys()}
 
 
@@ -58,16 +58,14 @@ def with_columns(
     later: Collection[str] = (),
     filled: float = float("nan"),
 ) -> Callable[[Kind], Kind]:
-    """Give a class a column, an array of shape (runs,), for each measure, in its unit.
+    """Give a class a column (runs,) for each measure, in its unit.
 
     Parameters
     ----------
     measures
         In the order in which the columns are stored.
     later
-        Columns that earlier versions have not stored.
-    filled
-        What stands in such a column instead.
+        Columns that earlier versions have not stored; ``filled`` stands there instead.
     """
     members = [
         (item.key, Column, field(default_factory=lambda: np.zeros(0)))
@@ -87,7 +85,7 @@ def with_columns(
 
 
 def told_value(value: float, unit: str, digits: int = 4) -> str:
-    """A value in a sentence or a table of a terminal; a dash where there is none."""
+    """A value for a terminal; a dash where there is none."""
     if not np.isfinite(value):
         return "–"
     return format_si(value, unit, digits) if unit != "1" else f"{value:.4f}"

@@ -26,7 +26,7 @@ class Statistic:
     definition
         Of the values of the sample.
     of
-        Of values, shape (n,), n > 0; not a number where one of them is none.
+        Of values (n,), n > 0; nan where one of them is.
     fewest
         Values that it takes to tell more than their ends.
     """
@@ -42,8 +42,7 @@ class Statistic:
 def quantile(share: float, key: str = "", name: str = "") -> Statistic:
     """Value that a share of the sample stays below, linear between its values in rising order.
 
-    With fewer than 1/share values, or 1/(1 - share), it lies between the last two at that end:
-    what it should tell lies beyond all of them.
+    With fewer than 1/share values, or 1/(1 - share), what it should tell lies beyond all of them.
     """
     short = min(share, 1.0 - share)
     return Statistic(
@@ -98,13 +97,7 @@ STATISTICS = (
 def moments(
     values: NDArray[np.float64], statistics: Iterable[Statistic] = STATISTICS
 ) -> dict[str, float | None]:
-    """Statistics of the values that are known, as JSON has them; None where there is none.
-
-    Parameters
-    ----------
-    values (n,)
-        Nan where there is none.
-    """
+    """Statistics of the values (n,) that are known, as JSON has them; None where there is none."""
     known = values[np.isfinite(values)]
     found = {item.json_key: item.of(known) if known.size else np.nan for item in statistics}
     return {key: value if np.isfinite(value) else None for key, value in found.items()}
@@ -113,7 +106,7 @@ def moments(
 def rank_correlation(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
     """Spearman's coefficient over the values present in both samples.
 
-    Nan where nothing can be said: of fewer than five of them, and where one sample is constant.
+    Nan for fewer than five of them, and where one sample is constant.
     """
     known = np.isfinite(one) & np.isfinite(other)
     first, second = scipy.stats.rankdata(one[known]), scipy.stats.rankdata(other[known])

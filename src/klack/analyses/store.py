@@ -42,7 +42,7 @@ class RecordFormat:
     ----------
     name
         Written into the store.
-    kind : type
+    kind
         Frozen dataclass of numbers, words, arrays and further such records.
     command
         That makes it, for messages.
@@ -61,12 +61,9 @@ class RecordFormat:
 
 
 def save_record(record: Any, folder: Path, form: RecordFormat) -> Path:
-    """Write ``folder/result.zarr``; an earlier result stays whole until the new one is complete.
+    """Write ``folder/result.zarr`` and return it.
 
-    Returns
-    -------
-    Path
-        Of the store.
+    An earlier result stays whole until the new one is complete.
     """
     with whole_file(folder / RESULT_NAME) as new:
         _describe(new, "group", {"format": form.name, "format_version": form.version})
@@ -75,23 +72,10 @@ def save_record(record: Any, folder: Path, form: RecordFormat) -> Path:
 
 
 def load_record(folder: Path, form: RecordFormat, *, largest: int = _LARGEST) -> Any:
-    """Read what :func:`save_record` wrote.
+    """Read what :func:`save_record` wrote, from its folder or the store itself.
 
-    Parameters
-    ----------
-    folder
-        The folder given to :func:`save_record`, or the store itself.
-    largest [byte]
-        Of all arrays together; more is refused before it is read.
-
-    Raises
-    ------
-    InputError
-        If there is no result, it comes from something else, or a part of it is missing.
-
-    Notes
-    -----
-    A result that another process replaces meanwhile is read again: no numbers of two results mix.
+    Arrays that together exceed ``largest`` [byte] are refused before they are read.  A result that
+    another process replaces meanwhile is read again: no numbers of two results mix.
     """
     return _steadily(folder, lambda path: _load(path, form, largest))
 
@@ -216,8 +200,7 @@ def _describe(place: Path, kind: str, attributes: Mapping[str, Any], **more: Any
 def _write_array(place: Path, value: np.ndarray, attributes: Mapping[str, Any]) -> None:
     """Store numbers, some rows of the first axis in each file; the last one is filled up.
 
-    Written by hand: zarr hands each file to a thread, and a stroke to the disk in three times as
-    long.
+    zarr hands each file to a thread, and takes three times as long for a stroke.
     """
     from numcodecs.zstd import Zstd
 
@@ -255,7 +238,6 @@ def _write_array(place: Path, value: np.ndarray, attributes: Mapping[str, Any]) 
 
 
 def _write(place: Path, name: str, value: Any, form: RecordFormat) -> None:
-    """Store a value that is or holds arrays or records as a node of this name."""
     if isinstance(value, np.ndarray):
         _write_array(place, value, {"unit": form.units[name]} if name in form.units else {})
         return
@@ -359,7 +341,7 @@ def _dtype(about: Mapping[str, Any]) -> np.dtype[Any]:
 def _read_array(place: Path, about: Mapping[str, Any]) -> np.ndarray:
     """Numbers of an array of a regular grid of packed files; one that is not there has zeros.
 
-    Read by hand: zarr takes 0.3 s to load, and each file through a thread.
+    zarr takes 0.3 s to load, and reads each file through a thread.
     """
     from numcodecs.zstd import Zstd
 

@@ -132,10 +132,7 @@ class UnfinishedLog(Closing, Generic[Key, Part]):
     def add(self, key: Key, part: Part) -> None:
         """Keep a finished part.
 
-        Raises
-        ------
-        InputError
-            If it cannot be written; what was written before is kept.
+        InputError if it cannot be written; what was written before is kept.
         """
         self.done[key] = part
         if self.path is None or self._file is None:
@@ -230,7 +227,7 @@ def fingerprint(case: "AnyCase", parts: Iterable[bytes], source: str | None = No
 
     Parameters
     ----------
-    case : Case or ValveCase
+    case
         Meshes and drawings of its bodies are read.
     parts
         Seeds, measured values, ...

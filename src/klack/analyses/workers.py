@@ -57,8 +57,6 @@ class WorkerDied(Exception):
 
 @dataclass(eq=False)
 class _Task(Generic[Item]):
-    """An item, and how many processes ended over it."""
-
     item: Item
     deaths: int = 0
 
@@ -106,17 +104,7 @@ class WorkerPool(Closing):
     ) -> Iterator[tuple[Item, Result]]:
         """Compute something for each item; yield item and result, in the order of their end.
 
-        Parameters
-        ----------
-        compute
-            Of a module, with one argument.
-
-        Raises
-        ------
-        WorkerDied
-            When a process ends without an answer.
-        Exception
-            Of ``compute``.
+        ``compute`` is a function of a module.  WorkerDied when a process ends without an answer.
         """
         left = deque(items)
         if not left:
@@ -152,8 +140,6 @@ class WorkerPool(Closing):
         WorkerDied
             If ten processes one after another ended before they could begin, and nothing was
             answered meanwhile; the first one, where an item has a single attempt.
-        Exception
-            Of ``compute``.
         """
         if self._is_busy:  # with what was asked for before, and given up
             self.close()
@@ -305,7 +291,7 @@ def unwrapped(name: str, found: Result | Failure) -> Result:
 
 @contextmanager
 def deaf_to_interrupts() -> Iterator[None]:
-    """Start processes that do not hear Ctrl-C, from their first moment on: they inherit it.
+    """Start processes that never hear Ctrl-C: they inherit it.
 
     One that comes meanwhile is heard at the end.
     """
@@ -320,7 +306,6 @@ def deaf_to_interrupts() -> Iterator[None]:
 
 
 def _work(connection: Connection, start: Callable[[object], None]) -> None:
-    """Loop of a worker until it is stopped."""
     with suppress(EOFError, OSError):  # the process that asked has closed its end
         connection.send(_attempt(start, connection.recv()))  # that it is ready
         while True:
@@ -337,7 +322,6 @@ def _attempt(compute: Callable[[Item], Result], item: Item) -> tuple[Result | No
 
 
 def _end_with_parent() -> None:
-    """End this worker when its parent process is gone."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()
@@ -395,10 +379,7 @@ class LoggedWork(Closing, Generic[Key, Part]):
     def completed(self, items: Mapping[Key, Any]) -> Iterator[Key]:
         """Compute items by their key, those that are not there yet; yield each key when it is.
 
-        Raises
-        ------
-        InputError, ConvergenceError
-            Of a part that cannot be computed; it is named.
+        An error names the part.
         """
         left = {key: item for key, item in items.items() if key not in self.log.done}
         if self._pool.workers < 2 or len(left) < self._fewest:
@@ -434,12 +415,7 @@ _NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 def grouped_doubts(doubts: Iterable[tuple[int, Iterable[str]]], shots: str) -> list[str]:
     """How many shots have each doubt, and the first of them.
 
-    Parameters
-    ----------
-    doubts : iterable of (int, iterable of str)
-        Number of each shot, and its doubts.
-    shots
-        What they are called, ``"shots"``.
+    ``doubts`` are the number of each shot and its doubts; ``shots`` is what they are called.
 
     Examples
     --------

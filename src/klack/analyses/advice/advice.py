@@ -22,7 +22,8 @@ _COARSER = {"mesh": 2.0, "layers": 1.5, "modes": 1.0, "step": 4.0}
 """How much coarser than the coarsest run an advised setting may be; finer is
 :data:`klack.analyses.advice.ladder.REACH`.
 
-Modes that are left out change more than a power law knows: no fewer than were run."""
+Modes that are left out change more than a power law knows: no fewer than were run.
+"""
 
 _LEAST_BUDGET = 0.25  # for the settings, where errors that no setting changes take the target
 
@@ -36,7 +37,7 @@ class Measured:
     runs
         For the table: level, bodies, what was run.
     at_least
-        Coarsest factor that the target band allows, whatever the errors; inf without such a limit.
+        Coarsest factor that the target band allows; inf without such a limit.
     """
 
     setting: Setting
@@ -56,14 +57,7 @@ class Measured:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Fixed:
-    """An error that no setting of the case changes.
-
-    Parameters
-    ----------
-    errors (m,)
-    remedy
-        What to do instead.
-    """
+    """An error that no setting of the case changes; ``remedy`` is what to do instead."""
 
     name: str
     errors: NDArray[np.float64]
@@ -76,7 +70,7 @@ class Counsel:
 
     Parameters
     ----------
-    values : mapping of key to float
+    values
         Advised [SI].
     factor
         At which they stand; 1 keeps the case.
@@ -91,7 +85,7 @@ class Counsel:
 
     @property
     def now(self) -> NDArray[np.float64]:
-        """Expected error of the case as it is, shape (m,)."""
+        """Expected error (m,) of the case as it is."""
         return self.measured.ladder.error(1.0)
 
     @property
@@ -129,12 +123,12 @@ class Advice:
         Whether the target band was taken from the force of the case.
     unmeshed
         Bodies whose meshes were given: their errors are in no sum.
-    dofs : pair of int or None
+    dofs
         Of all bodies now, and with the advice.
-    times : pair of float [s]
+    times [s]
         Of one run with everything before it: measured, and estimated for the advice.
-    checked : pair of array or None
-        Deviations of the case as it is and of the advised one from the finest run, shape (m,) each.
+    checked (m,) each
+        Deviations of the case as it is and of the advised one from the finest run.
     check_words
         What that was, or why there is none.
     wall_time [s]
@@ -162,13 +156,13 @@ class Advice:
 
     @property
     def now(self) -> NDArray[np.float64]:
-        """Sum of the expected errors of the case as it is, shape (m,)."""
+        """Sum of the expected errors (m,) of the case as it is."""
         parts = [item.now for item in self.counsels] + [item.errors for item in self.fixed]
         return np.sum(parts, axis=0) if parts else np.zeros(len(self.measures))
 
     @property
     def then(self) -> NDArray[np.float64]:
-        """Sum of the expected errors with the advice, shape (m,)."""
+        """Sum of the expected errors (m,) with the advice."""
         parts = [item.then for item in self.counsels] + [item.errors for item in self.fixed]
         return np.sum(parts, axis=0) if parts else np.zeros(len(self.measures))
 
@@ -204,9 +198,8 @@ def settle(
 ) -> tuple[Counsel, ...]:
     """Share the target out over the settings and find the coarsest of each.
 
-    Every setting gets the same share of the target; what it cannot use goes to the others (see
-    :func:`klack.analyses.advice.ladder.allotment`).  The scores are added although the worst
-    measures of two settings may differ: the sum of every single measure is then within its limit.
+    Scores are added although the worst measures of two settings may differ: the sum of every
+    single measure is then within its limit.
     """
     spent = sum(score(item.errors, measures) for item in fixed)
     budget = max(1.0 - spent, _LEAST_BUDGET)
@@ -216,12 +209,7 @@ def settle(
 
 
 def counsel(item: Measured, share: float, measures: Sequence[Measure]) -> Counsel:
-    """Advise one setting for a share of the target.
-
-    Parameters
-    ----------
-    share [-]
-    """
+    """Advise one setting for a share [-] of the target."""
     factor = coarsest_within(item.ladder, share, measures, coarsest=item.coarsest)
     values = item.setting.advised(factor)
     actual = item.setting.factor_of(values)

@@ -36,8 +36,8 @@ def advise_case(
 ) -> Advice:
     """Advise an impact of two bodies, or the stroke of a whole valve.
 
-    Parameters are those of :func:`klack.analyses.advice.impact.advise_impact`; a stroke is judged
-    by its first impacts, without a band and without levels.
+    Parameters are those of :func:`klack.analyses.advice.impact.advise_impact`; a stroke has neither
+    band nor levels.
     """
     if isinstance(case, Case):
         advice = advise_impact(
@@ -59,7 +59,6 @@ def advise_case(
 
 
 def _refuse_options(*given: tuple[str, object]) -> None:
-    """Refuse options that a stroke does not have."""
     for option, value in given:
         if value is not None:
             raise InputError(
@@ -97,7 +96,7 @@ def _written(now: object, value: float, unit: str) -> str:
 def advice_yaml(tree: CaseTree, advice: Advice) -> str:
     """Sections of the case with the advice in them: whole meshes and modes, single other keys.
 
-    Merged into the case, key by key, they give the advised case.  Empty if nothing changes.
+    Merged into the case, they give the advised case.  Empty if nothing changes.
     """
     safe = YAML(typ="safe")
     data: Any = {}
@@ -119,10 +118,7 @@ def advice_yaml(tree: CaseTree, advice: Advice) -> str:
 def advised_text(tree: CaseTree, advice: Advice, path: Path, version: str) -> str:
     """Text of the case with the advice, for a file at ``path``; comments and order stay.
 
-    Raises
-    ------
-    InputError
-        If the new text is no case, or a value cannot be exchanged alone.
+    InputError if the new text is no case, or a value cannot be exchanged alone.
     """
     values = changed_values(tree, advice)
     header = (

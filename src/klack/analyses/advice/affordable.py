@@ -1,8 +1,6 @@
 """Advice whose meshes a machine can hold, for a looser target if need be.
 
-What a refined run would need: degrees of freedom, memory, time, by powers of the size.
-
-Rough, and meant to be: they decide whether a finer mesh is tried, and what a user may expect.
+Degrees of freedom, memory and time of a refined run are rough estimates, by powers of the size.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -31,7 +29,7 @@ def larger(dofs: int, factor: float, dimension: int) -> int:
 
 
 def added(present: int, run: tuple[float, int], factor: float, dimension: int) -> float:
-    r"""Degrees of freedom that one region adds at a factor, from one run with that region changed.
+    """Degrees of freedom that one region adds at a factor, from one run with that region changed.
 
     A region of fixed extent holds :math:`b f^{-d}` of them: :math:`b` from the run.
 
@@ -39,8 +37,8 @@ def added(present: int, run: tuple[float, int], factor: float, dimension: int) -
     ----------
     present
         Of the case.
-    run : pair of float and int
-        Factor of the run, and its degrees of freedom.
+    run
+        Its factor and degrees of freedom.
 
     Examples
     --------
@@ -66,10 +64,7 @@ def time_of(dofs: int, dimension: int) -> float:
 
 
 def fits(dofs: int, dimension: int) -> bool:
-    """Whether a run of this size is expected to use no more than half of the free memory.
-
-    Free is what is left to this process, inside a container or a batch job too.
-    """
+    """Whether a run of this size needs no more than half of the memory left to this process."""
     return memory_of(dofs, dimension) <= _SHARE * available_memory().size
 
 
@@ -88,17 +83,13 @@ def affordable(
 ) -> tuple[tuple[Counsel, ...], int, str]:
     """Settle a target, or the tightest multiple of it whose meshes are affordable.
 
-    Affordable is what needs no more than half of the free memory, and no more than twenty times
-    the degrees of freedom of the case.  For a multiple no setting becomes coarser than the case.
+    Affordable is what :func:`fits`, with no more than twenty times the degrees of freedom of the
+    case.  For a multiple no setting becomes coarser than the case.
 
     Parameters
     ----------
-    measured, fixed, measures
-        As for :func:`klack.analyses.advice.advice.settle`.
     size_with
-        Degrees of freedom of all bodies with these values.
-    present
-        Those of the case.
+        Degrees of freedom of all bodies with these values; ``present`` of the case.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""An advice in words and numbers: rows of the table, lines below it, plain JSON."""
+"""An advice in words and numbers."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -39,7 +39,7 @@ class AdvisedCase:
     yaml
         Sections of the case with the advice in them; empty if nothing changes.
     written
-        Where the whole case with the advice stands.
+        File of the whole case with the advice.
     """
 
     advice: Advice
@@ -49,7 +49,6 @@ class AdvisedCase:
 
 
 def _told(advised: AdvisedCase) -> Iterator[TextTable | str]:
-    """What a terminal shows: the settings, the verdict, and what to write into the case."""
     advice = advised.advice
     title = f"{advice.title}: advice for the {advice.level} level"
     yield TextTable(title=title, columns=_COLUMNS, rows=_rows(advice))
@@ -62,7 +61,7 @@ def _told(advised: AdvisedCase) -> Iterator[TextTable | str]:
 
 
 def _rows(advice: Advice) -> tuple[tuple[str, ...], ...]:
-    """Rows of the table: settings, what no setting changes, sums, target, check."""
+    """Rows: settings, what no setting changes, sums, target, check."""
     measures = advice.measures
     rows = [_row(item, measures) for item in advice.counsels]
     for fixed in advice.fixed:
@@ -131,7 +130,6 @@ def _number(value: float, unit: str) -> str:
 
 
 def _lines(advice: Advice) -> tuple[str, ...]:
-    """Sentences below the table: verdict, band, cost, what is missing."""
     return tuple(
         line
         for line in (

@@ -99,7 +99,6 @@ class _Base:
         return self.history(1.0)
 
     def history(self, factor: float) -> ImpactHistory:
-        """Impact at the level of the advice with another step."""
         step = factor * self.step
         if self.level == "reduced":
             return _reduced(self.case, self.pair, step)
@@ -149,8 +148,7 @@ def advise_impact(
     Raises
     ------
     InputError
-        For bodies without surfaces, a level that cannot be run, an impact that does not end or
-        that rings on its modes.
+        Also for an impact that does not end or that rings on its modes.
     """
     begin = perf_counter()
     case = explicit_modes(case)
@@ -386,7 +384,7 @@ class _Family:
 
     @property
     def fine(self) -> bool:
-        """Whether anything was made finer than the case."""
+        """Whether anything is finer than the case."""
         return min(self.rest) < 1.0
 
     @cached_property
@@ -569,7 +567,7 @@ def _confirmed(
     progress: Progress,
     threads: int | None,
 ) -> Advice:
-    """Lay the case and the advised one over a run at least as fine as all others and as both."""
+    """Compare the case and the advised one with one at least as fine as all runs and as both."""
     case = family.case
     finest = {k: v for k, v in advice.finest.items() if k[0] == "bodies" and k[-1] != "layers"}
     if meshes and not family.fine:

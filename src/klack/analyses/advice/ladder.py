@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 __all__ = ["REACH", "Ladder", "Measure", "allotment", "coarsest_within", "score"]
 
 REACH = 4.0
-"""Finer settings are extrapolated by this factor beyond the finest measured one, no further."""
+"""Factor beyond the finest measured setting up to which finer ones are extrapolated."""
 
 _ORDERS = (0.5, 4.0)  # an order outside of these is scatter, not convergence
 _SMALLEST = 1e-12
@@ -32,7 +32,7 @@ class Measure:
     Parameters
     ----------
     limit
-        Greatest error that the user accepts; inf for a number that is only reported.
+        Greatest accepted error; inf for a number that is only reported.
     decibel
         Errors are in dB, otherwise relative (-).
     """
@@ -43,12 +43,7 @@ class Measure:
 
 
 def score(errors: NDArray[np.float64], measures: Sequence[Measure]) -> float:
-    """Largest error over its limit [-]: 1 uses the whole target.
-
-    Parameters
-    ----------
-    errors (m,)
-    """
+    """Largest of the errors (m,) over their limits [-]: 1 uses the whole target."""
     limits = np.array([measure.limit for measure in measures])
     return float(np.max(np.abs(errors) / limits))
 
@@ -66,7 +61,7 @@ class Ladder:
     steps (k - 1,)
         Norm of the difference between neighbours: what the order is measured on.
     assumed_order
-        Taken where two runs tell no order.
+        For two runs, which tell no order.
     """
 
     factors: tuple[float, ...]
@@ -81,7 +76,7 @@ class Ladder:
 
     @property
     def raw_order(self) -> float:
-        """Order as the three finest runs give it; nan with two runs."""
+        """Order by the three finest runs; nan with two runs."""
         if len(self.steps) < 2:
             return float("nan")
         first, second = np.maximum(self.steps[-2:], _SMALLEST)
@@ -100,15 +95,15 @@ class Ladder:
 
     @property
     def finest(self) -> float:
-        """Finest factor that these runs may advise: :data:`REACH` beyond them, or the case itself.
+        """Finest factor that these runs may advise: :data:`REACH` beyond them.
 
-        Where runs scatter, finer is not better, and nothing finer than the case is advised.
+        Where runs scatter, finer is not better, and the limit is the case itself.
         """
         return 1.0 if self.scattered else min(self.factors) / REACH
 
     @property
     def _points(self) -> NDArray[np.float64]:
-        """Errors at the factors, shape (k, m), never smaller where it is coarser."""
+        """Errors (k, m) at the factors, never smaller where it is coarser."""
         if self.scattered:  # nothing to extrapolate: all runs differ by the same scatter
             every = np.vstack([self.differences, self.differences[-1]])
         else:
@@ -118,7 +113,7 @@ class Ladder:
         return np.maximum(upwards, _SMALLEST)
 
     def error(self, factor: float) -> NDArray[np.float64]:
-        """Expected error, shape (m,): a power law between the runs, and beyond them."""
+        """Expected error (m,): a power law between the runs, and beyond them."""
         known, points = np.array(self.factors), self._points
         if factor >= known[0]:
             return np.asarray(points[0] * (factor / known[0]) ** self.order)
@@ -134,14 +129,9 @@ class Ladder:
 def coarsest_within(
     ladder: Ladder, allowed: float, measures: Sequence[Measure], *, coarsest: float
 ) -> float:
-    """Largest factor whose expected score stays within what is allowed.
+    """Largest factor whose expected score stays within ``allowed``, a share [-] of the target.
 
     Never above ``coarsest``, and never below :attr:`Ladder.finest`.
-
-    Parameters
-    ----------
-    allowed [-]
-        Share of the target.
     """
     finest = min(ladder.finest, coarsest)
     if score(ladder.error(coarsest), measures) <= allowed:
@@ -163,11 +153,7 @@ def allotment(caps: Sequence[float], budget: float) -> float:
 
     What a setting cannot use, because even its coarsest is better than that, goes to the others.
     A tighter target raises every cap and never raises the share, so no setting becomes coarser.
-
-    Parameters
-    ----------
-    caps
-        Score of each setting at its coarsest.
+    ``caps`` are the scores of the settings at their coarsest.
     """
     left = sorted(caps)
     while left:

@@ -45,7 +45,7 @@ __all__ = [
 
 
 HISTORY = 2
-"""Place of the force history among the measures: the norm that orders are measured on."""
+"""Place of the force history, the norm that orders are measured on, among the measures."""
 
 _RANGE = 40.0  # [dB] below the highest band
 
@@ -79,10 +79,7 @@ def highest_band(history: ImpactHistory) -> float:
 def judged_up_to(history: ImpactHistory, up_to: float) -> float:
     """Middle frequency [Hz] of the highest band that is judged in a target band.
 
-    Raises
-    ------
-    InputError
-        For a target band below the first third octave of the force.
+    InputError for a target band below the first third octave of the force.
     """
     bands = impact_third_octaves(history)
     judged = bands.middle[_judged(bands) & (bands.low < up_to)]
@@ -105,11 +102,8 @@ def impact_errors(
 ) -> NDArray[np.float64]:
     """Absolute deviations in the order of :func:`impact_measures`, shape (6,).
 
-    Parameters
-    ----------
-    up_to [Hz]
-        Third octaves that begin below it are compared, as far as those of the reference lie
-        within 40 dB of its strongest.
+    Third octaves are compared that begin below ``up_to`` [Hz], as far as those of the reference
+    lie within 40 dB of its strongest.
     """
     whole = compare_histories(reference, candidate)
     high = 0.1 / max(reference.step, candidate.step)
@@ -135,7 +129,7 @@ _FEWEST = 2
 
 
 def explicit_modes(case: AnyCase) -> AnyCase:
-    """Return the case with the choice of modes written out for every body."""
+    """The case with the choice of modes written out for every body."""
     choices = {name: case.reduction.choice(name) for name in case.bodies}
     return _with_choices(case, choices)
 
@@ -247,8 +241,6 @@ def mode_ladder(
         Kept.
     reference
         With twice the modes of every body.
-    step [s]
-    up_to [Hz]
     """
     most = {name: 2 * count for name, count in counts.items()}
     if len(pools[body].omega) < most[body]:

@@ -24,13 +24,8 @@ def mesh_settings(
 ) -> tuple[Setting, ...]:
     """Contact region of all bodies together, the growth away from it, then the rest of each body.
 
-    The contact region holds ``mesh.contact`` and the sizes of the touching surfaces; the growth is
-    the grading of all bodies; the rest of a body is its size and those of its other surfaces.
-
-    Parameters
-    ----------
-    surfaces
-        That touch.
+    The contact region holds ``mesh.contact`` and the sizes of the touching ``surfaces``; the growth
+    is the grading of all bodies; the rest of a body is its size and those of its other surfaces.
     """
     contact: list[SettingValue] = []
     names: list[str] = []
@@ -64,7 +59,7 @@ def mesh_settings(
 
 
 def layer_setting(bodies: Mapping[str, CaseBody]) -> Setting | None:
-    """Layers round the circle of all swept bodies together; None without any."""
+    """Layers round the circle of all swept bodies together."""
     values = tuple(
         SettingValue(
             key=("bodies", name, "geometry", "layers"),
@@ -85,14 +80,9 @@ def layer_setting(bodies: Mapping[str, CaseBody]) -> Setting | None:
 def axisymmetric_twin(case: Case, highest: Mapping[str, float]) -> Case | None:
     """The same half sections as axisymmetric bodies; None where a body has no swept profile.
 
-    Their meshes are those that are swept, so what refining them changes is measured at a hundredth
-    of the cost.  Supports in sectors become supports all round, the impact is centred, and the
-    modes go as high up as those of the case.
-
-    Parameters
-    ----------
-    highest [Hz]
-        Highest kept mode of each body.
+    Refining them changes the same at a hundredth of the cost.  Supports in sectors become supports
+    all round, the impact is centred, and the modes go as high up as those of the case, ``highest``
+    [Hz] by body.
     """
     names = (case.contact.moving.body, case.contact.stop.body)
     bodies = {}
@@ -125,10 +115,7 @@ def unmeshed(bodies: Mapping[str, CaseBody]) -> tuple[str, ...]:
 def unmeshed_notes(bodies: Mapping[str, CaseBody], size_ratio: float = nan) -> list[str]:
     """Why the meshes of some bodies have no advice, and what to do instead.
 
-    Parameters
-    ----------
-    size_ratio [-]
-        Element size across the contact over its half width; nan if unknown.
+    ``size_ratio`` [-] is the element size across the contact over its half width; nan if unknown.
     """
     names = unmeshed(bodies)
     reduced = [name for name in names if bodies[name].reduced is not None]
@@ -166,10 +153,7 @@ def unmeshed_notes(bodies: Mapping[str, CaseBody], size_ratio: float = nan) -> l
 def coarse_contact_notes(size_ratio: float) -> list[str]:
     """What to make of the warning of a run where finer elements were measured to change little.
 
-    Parameters
-    ----------
-    size_ratio [-]
-        Element size across the contact over its half width.
+    ``size_ratio`` as in :func:`unmeshed_notes`.
     """
     if not size_ratio > COARSE:
         return []

@@ -20,8 +20,6 @@ class SettingValue:
 
     Parameters
     ----------
-    key
-        Its place in the case.
     value
         In SI, as the case has it.
     unit
@@ -90,15 +88,7 @@ class SettingValue:
 
 @dataclass(frozen=True, kw_only=True)
 class Setting:
-    """Numbers of a case that change together.
-
-    Parameters
-    ----------
-    name
-        For example ``"needle, away from the contact"``.
-    group
-        ``mesh``, ``layers``, ``modes`` or ``step``.
-    """
+    """Numbers of a case that change together; ``name`` as ``"needle, away from the contact"``."""
 
     name: str
     group: Literal["mesh", "layers", "modes", "step"]
@@ -125,8 +115,6 @@ class Setting:
 def rounded_down(value: float) -> float:
     """Next number of the series 1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8 that is not above.
 
-    Examples
-    --------
     >>> rounded_down(0.00379), rounded_down(2.5e-8)
     (0.003, 2.5e-08)
     """
@@ -138,8 +126,6 @@ def rounded_down(value: float) -> float:
 def rounded_up(count: float) -> int:
     """Next number of modes or layers: every one to 20, fives to 100, tens above.
 
-    Examples
-    --------
     >>> rounded_up(12.2), rounded_up(41), rounded_up(113)
     (13, 45, 120)
     """
@@ -148,13 +134,7 @@ def rounded_up(count: float) -> int:
 
 
 def applied(node: Any, values: Mapping[Key, float]) -> Any:
-    """Copy of a case with other numbers at some keys that it has.
-
-    Parameters
-    ----------
-    values : mapping of key to float
-        Whole numbers where the case has some.
-    """
+    """Copy of a case with other numbers, whole ones where it has some, at keys that it has."""
     for key, value in values.items():
         node = _with(node, key, value)
     return node

@@ -42,11 +42,8 @@ _MODE_ORDER, _MESH_ORDER, _STEP_ORDER = 1.0, 1.0, 2.0
 def stroke_measures(error: float) -> tuple[Measure, ...]:
     """Measures of a stroke, each the worst of the first impacts on its stops.
 
-    Parameters
-    ----------
-    error [-]
-        Accepted for the time of the impact (of its time since the start), peak force, and
-        absolutely for the restitution.  The contact time comes in whole steps and is only reported.
+    ``error`` [-] is accepted for the time of the impact (of its time since the start), peak force,
+    and absolutely for the restitution.  The contact time comes in whole steps and is only reported.
     """
     names = ("impact time", "peak force", "restitution")
     judged = [Measure(name=name, limit=error) for name in names]
@@ -56,10 +53,7 @@ def stroke_measures(error: float) -> tuple[Measure, ...]:
 def first_impacts(valve: Valve, *, step: float | None = None) -> dict[str, NDArray[np.float64]]:
     """Time, peak force, restitution, contact time of the first impact on every stop, shape (4,).
 
-    Parameters
-    ----------
-    step [s]
-        Of the network; that of the case without.  Macro steps change in proportion.
+    ``step`` [s] is that of the network; macro steps change in proportion.
     """
     case = valve.case
     rows, run = variant_network(valve, _variant(case)).rows(), case.run
@@ -106,14 +100,7 @@ def advise_stroke(
 
     Contact regions and step are doubled and halved; growth, bodies away from their contacts and
     modes are refined twice.  Nothing is simulated beyond the first impacts, and no sound is
-    prepared.
-
-    Parameters
-    ----------
-    error [-]
-        Accepted for time and peak force of first impacts, and for their restitution.
-    confirm
-        Run the advised valve and lay it over the one with everything finest.
+    prepared.  Parameters as for :func:`klack.analyses.advice.impact.advise_impact`.
 
     Raises
     ------
@@ -234,11 +221,6 @@ def step_ladder(
 
     Where a wave in a line would cross a cell within the doubled macro step, which the network
     refuses: once, half and a quarter of it, and no longer step is advised.
-
-    Parameters
-    ----------
-    now
-        First impacts with the step of the case.
     """
     step, doubles = valve.case.run.fine_step, _may_double(valve)
     factors = _NEAR if doubles else _REST
@@ -302,7 +284,7 @@ def _confirmed(
     now: Mapping[str, NDArray[np.float64]],
     threads: int | None,
 ) -> Advice:
-    """Lay the valve and the advised one over one at least as fine as all runs and as both."""
+    """Compare the valve and the advised one with one at least as fine as all runs and as both."""
     reference = _impacts(applied(case, advice.finest), threads)
     advised = _impacts(applied(case, advice.changes), threads)
     return replace(

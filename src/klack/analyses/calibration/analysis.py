@@ -116,7 +116,7 @@ def calibration_measured(study: CalibrationStudy) -> Iterator[Measured]:
 
 
 def calibration_told(study: CalibrationStudy) -> Iterator[TextTable | str]:
-    """What a terminal shows: the parameters, and how far the mean stroke is off."""
+    """The parameters, and how far the mean stroke is off."""
     title = f"{study.title}: {len(study.strokes)} strokes, {study.variant}"
     yield TextTable(title=title, columns=PARAMETER_COLUMNS, rows=parameter_rows(study))
     yield (

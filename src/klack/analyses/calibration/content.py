@@ -1,4 +1,4 @@
-"""What a calibration report says and shows before its layout: the same for screen and paper."""
+"""Content of the report of a calibration."""
 
 from collections.abc import Iterable, Sequence
 from math import isfinite
@@ -44,14 +44,7 @@ def correlation_figure(
     matrices: Sequence[tuple[str, NDArray[np.float64]]],
     note: str,
 ) -> Picture:
-    """Draw correlation matrices side by side; every field carries its number.
-
-    Parameters
-    ----------
-    names
-        Of the parameters.
-    matrices : sequence of (title, array of shape (p, p))
-    """
+    """Draw correlation matrices (p, p) side by side; every field carries its number."""
     count = len(names)
     height = 0.9 + min(0.42 * count, 2.8)
     with rc_context(STYLE | {"axes.grid": False}):
@@ -93,11 +86,11 @@ Floats = NDArray[np.float64]
 
 _MARGIN = 0.05
 _HEADROOM = 1.25
-"""Range of the residual over its largest value, for the legend of nothing but the curve."""
+"""Range of the residual over its largest value, so that the legend covers no curve."""
 
 
 def stroke_chart(study: CalibrationStudy, channel: FittedChannel) -> Chart:
-    """The whole stroke of one channel, measured and computed, and what is left."""
+    """The whole stroke of one channel, measured and computed, and their difference."""
     return _overlay(
         study,
         channel,
@@ -112,7 +105,7 @@ def stroke_chart(study: CalibrationStudy, channel: FittedChannel) -> Chart:
 
 
 def window_chart(study: CalibrationStudy, channel: FittedChannel, window: FitWindow) -> Chart:
-    """One fitted window from near, from where the channel begins to move."""
+    """One fitted window, from where the channel begins to move."""
     inside = (study.time >= window.first) & (study.time <= window.last)
     moved = np.abs(channel.mean - channel.mean[inside][0]) > 0.04 * np.ptp(channel.mean[inside])
     times = study.time[inside & moved]

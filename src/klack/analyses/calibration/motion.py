@@ -1,8 +1,8 @@
 """One stroke with other values of its parameters: what a calibration computes many times.
 
 Meshes, modes and contact laws do not depend on what can be calibrated; they are made once.  A trial
-checks the changed case as a whole, joins its network anew and runs it.  Trials that were computed
-are kept on disk: the same command asks for the same ones, and comes to where it was.
+checks the changed case as a whole, joins its network anew and runs it.  Trials are kept on disk:
+the same command finds those of an interrupted run.
 """
 
 from base64 import b64decode, b64encode
@@ -57,9 +57,10 @@ class Motion:
     ----------
     step [s]
         Of the channels, which begin at time zero.
-    channels : mapping of str to float32 array, shape (n,)
+    channels (n,) each
         By role, SI.
-    impacts : mapping of "opening" and "seat" to times [s]
+    impacts [s]
+        Times by "opening" and "seat".
     """
 
     step: float
@@ -81,7 +82,8 @@ class MotionModel:
     ----------
     parameters
         Those that the motion depends on.
-    variant : "wet" or "dry"
+    variant
+        "wet" or "dry".
     channels
         Recorded channel of each role.
     record [s]
@@ -108,12 +110,7 @@ class MotionModel:
     def run(self, values: Sequence[float], duration: float) -> Motion:
         """Compute one stroke with these values [SI] of the parameters.
 
-        Raises
-        ------
-        InputError
-            For values that the case refuses.
-        ConvergenceError
-            When a step of the solver fails.
+        InputError for values that the case refuses.
         """
         case = self.tree.case(self.changes(values))
         damped = {  # with the damping of the case; everything else of bodies is as it was
@@ -153,10 +150,7 @@ def channel_names(
 ) -> dict[str, str]:
     """Recorded channel of each role that a calibration needs.
 
-    Raises
-    ------
-    InputError
-        For a role that the computed stroke does not have, or several times.
+    InputError for a role that the computed stroke does not have, or several times.
     """
     point = f"{roles.needle}.{roles.point}"
     coils = network.coil_labels()
@@ -185,10 +179,7 @@ TrialLog = UnfinishedLog[TrialKey, Motion]
 
 
 def calibration_mark(case: ValveCase, strokes: StrokeSet) -> str:
-    """Digest of all that decides a trial: the case and the measured strokes.
-
-    The same command asks for the same trials again, finds them here and comes to where it was.
-    """
+    """Digest of all that decides a trial: the case and the measured strokes."""
     return fingerprint(case, _deciding(case, strokes))
 
 
@@ -248,10 +239,7 @@ class TrialPool(LoggedWork[TrialKey, Motion]):
     def motions(self, values: Sequence[Sequence[float]], duration: float) -> list[Motion]:
         """Motions for several parameter vectors [SI], in their order.
 
-        Raises
-        ------
-        InputError, ConvergenceError
-            Of a trial that cannot be computed; its parameters are named.
+        Errors of a trial name its parameters.
         """
         keys: list[TrialKey] = [(duration, *map(float, item)) for item in values]
         self.used.update(keys)
@@ -287,7 +275,7 @@ class StrokeModel:
     sensor
         Of the case.
     zeroed
-        True if the lift before the trigger is set to zero.
+        Whether the lift before the trigger is set to zero.
     time (k,) [s]
         Of the measured strokes.
     channels

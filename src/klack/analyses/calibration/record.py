@@ -1,8 +1,4 @@
-"""What ``klack calibrate`` leaves behind: parameters with their uncertainty, and what shows it.
-
-The numbers are plain arrays and small frozen records, so that a stored study can be reported again
-without the solver.
-"""
+"""Record of ``klack calibrate``: parameters with their uncertainty, and what shows it."""
 
 from dataclasses import dataclass
 from operator import attrgetter
@@ -46,8 +42,8 @@ class CalibratedParameter:
         Paths in the case.
     unit
         Empty for a plain number.
-    value, standard_error
-        The error is infinite if the data do not see the parameter.
+    standard_error
+        Infinite if the data do not see the parameter.
     lower_95, upper_95
         Ends of the 95 % interval, by Student's t.
     start, lower, upper
@@ -84,15 +80,15 @@ class CalibratedParameter:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FittedChannel:
-    """Measured and computed strokes of one channel, on the time axis of the study [SI].
+    """Measured and computed strokes (k,) of one channel, on the time axis of the study [SI].
 
     Parameters
     ----------
-    mean, low, high (k,)
-        Mean of the measured strokes, and the band of 90 % of them.
-    before, after (k,)
+    low, high
+        Band of 90 % of the measured strokes.
+    before, after
         Computed with the values of the case, and with the calibrated ones.
-    weight (k,)
+    weight
         Of each sample in the fit, inverse variance; 0 outside the windows.
     """
 
@@ -110,12 +106,8 @@ class FittedChannel:
 class FittedImpact:
     """Time of the first impact on a stop, from the trigger [s]; nan where there is none.
 
-    Parameters
-    ----------
-    measured, scatter
-        Median and standard deviation of the strokes.
-    before, after
-        Computed, with the values of the case and with the calibrated ones.
+    ``measured`` and ``scatter`` are median and standard deviation of the strokes; the computed ones
+    are with the values of the case and with the calibrated ones.
     """
 
     stop: str
@@ -158,10 +150,8 @@ class CalibrationStudy(CaseRecord):
         Wall time of the profiles alone.
     source
         Measured files, in words.
-    strokes
-        Names of the strokes that were fitted.
-    rejected
-        Strokes that were discarded, with the reason.
+    strokes, rejected
+        Names of the fitted strokes, and discarded ones with the reason.
     correlation, design_correlation (p, p)
         Of the estimates, from the scatter of the strokes; and from the sensitivities alone.
     singular_values (p,)
@@ -175,8 +165,8 @@ class CalibrationStudy(CaseRecord):
         1 or less if nothing but scatter is left.
     degrees
         Degrees of freedom of Student's t.
-    iterations, evaluations, resumed, workers
-        Evaluations are computed strokes; those resumed come from an earlier, interrupted run.
+    evaluations, resumed
+        Computed strokes, and those from an earlier, interrupted run.
     """
 
     profile_time: float

@@ -118,18 +118,14 @@ def run_calibration(
         Keeps computed trials there until it is finished; the same call resumes from them.
     workers
         Processes; all cores by default.
-    progress
-        Called with stage and fraction.
     threads
         Of the factorisations.
 
     Raises
     ------
     InputError
-        For a case without what is needed, a motion in three dimensions, strokes without the
-        fitted channels, or a lift that goes down where the computed one goes up.
-    ConvergenceError
-        A trial that cannot be computed.
+        Also for a motion in three dimensions, strokes without the fitted channels, or a lift that
+        goes down where the computed one goes up.
     """
     begin = perf_counter()
     case = tree.case()
@@ -247,7 +243,7 @@ def _calibrate(
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
     """Fit, judge and follow the parameters; ``whole`` computes all samples of a stroke.
 
-    Fields of the record, and doubts.
+    Returns fields of the record, and doubts.
     """
     parameters = whole.parameters
     start = np.array([p.start for p in parameters])
@@ -327,8 +323,7 @@ def _repeatable(
 ) -> tuple[tuple[FitWindow, ...], tuple[str, ...]]:
     """Leave the closing out if the needle still bounces on the opening stop when it begins.
 
-    The last bounces, too low to be measured, then decide when it closes; the sum of squares gets
-    many minima, and a search ends in any of them.
+    Bounces too low to be measured then decide when it closes; the sum of squares gets many minima.
     """
     if len(windows) < 2:
         return windows, ()
@@ -560,12 +555,8 @@ CALIBRATED_NAME = "case_calibrated.yaml"
 def calibrated_text(tree: CaseTree, study: CalibrationStudy, folder: Path) -> str:
     """Text of the case with the values found, for a file in ``folder``.
 
-    Comments and order are those of the author; files are named from the new place.
-
-    Raises
-    ------
-    InputError
-        If the new text is no case, or a value cannot be exchanged alone.
+    Comments and order are those of the author; files are named from the new place.  Errors as of
+    :func:`klack.analyses.advice.advised_case.advised_text`.
     """
     found = {item.name: item for item in study.parameters}
     values = moved_files(tree, folder)

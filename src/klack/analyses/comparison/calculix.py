@@ -1,4 +1,4 @@
-"""A stored impact beside that of another program: the numbers of both, and how far apart."""
+"""A stored impact beside that of another program."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -42,13 +42,10 @@ class OtherRun:
 
     Parameters
     ----------
-    program
-        Its name, as a table says it.
     energy_swing [-]
         Largest distance of the total energy from that at the start, over that at the start.
     iterations
         Of all steps together.
-    wall_time [s]
     """
 
     program: str
@@ -61,14 +58,9 @@ class OtherRun:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Comparison:
-    """A level of klack beside another program.
+    """A level of klack beside another program; ``measures`` are those of the other one.
 
-    Parameters
-    ----------
-    measures
-        Of the other program.
-    deviation
-        Of klack from the other program.
+    ``deviation`` is that of klack from the other program.
     """
 
     case: str
@@ -177,12 +169,9 @@ def level_of(study: ImpactStudy, name: str) -> LevelResult:
 
 
 def compare_with(study: ImpactStudy, level: str, other: OtherRun) -> Comparison:
-    """Lay one level of a study over the impact of another program, which is the reference.
+    """Compare one level of a study with the impact of another program, which is the reference.
 
-    Raises
-    ------
-    InputError
-        If the study has no such level, or the other run no contact.
+    InputError if the other run has no contact.
     """
     chosen = level_of(study, level)
     return Comparison(
@@ -225,7 +214,7 @@ def comparison_rows(comparison: Comparison) -> tuple[tuple[str, ...], ...]:
 
 
 def _told(comparison: Comparison) -> Iterator[TextTable | str]:
-    """What a terminal shows: both programs, and how far their histories are apart."""
+    """Both programs, and how far their histories are apart."""
     yield TextTable(
         title=comparison.title, columns=COMPARISON_COLUMNS, rows=comparison_rows(comparison)
     )

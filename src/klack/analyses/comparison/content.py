@@ -1,4 +1,4 @@
-"""What a report beside a measurement says, before it is laid out."""
+"""Content of a report beside a measurement."""
 
 import numpy as np
 

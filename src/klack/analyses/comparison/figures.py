@@ -1,4 +1,4 @@
-"""The figures of a report beside a measurement: computed black, measured blue, in all of them."""
+"""Figures of a report beside a measurement: computed black, measured blue, in all of them."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -38,7 +38,7 @@ _COLUMNS = 350
 
 
 def lift_chart(variant: ComparedVariant) -> Chart:
-    """Lift and velocity of a whole stroke, computed and measured, and what is left."""
+    """Lift and velocity of a whole stroke, computed and measured, and their difference."""
     left = 1e6 * (variant.computed_lift - variant.lift_median)
     low, high = (1e6 * (x - variant.lift_median) for x in (variant.lift_low, variant.lift_high))
     window = _moving(variant)
@@ -71,7 +71,7 @@ def lift_chart(variant: ComparedVariant) -> Chart:
 
 
 def first_touch_chart(variant: ComparedVariant, stop: str) -> Chart | None:
-    """Lift and velocity about the first impact on a stop; None if there is none to compare."""
+    """Lift and velocity about the first impact on a stop, if there is one to compare."""
     impact = variant.first(stop)
     if impact is None or not isfinite(impact.time.measured):
         return None
@@ -94,7 +94,7 @@ def first_touch_chart(variant: ComparedVariant, stop: str) -> Chart | None:
 
 
 def _with_room(panel: Panel) -> tuple[float, float]:
-    """Range of y with room above the curves for the words of the marks."""
+    """Range of y with room above the curves for the labels of the marks."""
     low = min(float(curve.y.min()) for curve in panel.curves)
     high = max(float(curve.y.max()) for curve in panel.curves)
     return low - 0.05 * (high - low), high + 0.45 * (high - low)

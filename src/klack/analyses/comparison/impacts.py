@@ -62,16 +62,14 @@ def compare_impact(
     known_speed: bool = False,
     progress: Progress = silent,
 ) -> MeasuredImpactStudy:
-    """Lay an output of an impact over measured pulses.
+    """Compare an output of an impact with measured pulses.
 
     Parameters
     ----------
     paths
         Recordings of repeated shots.
-    output
-        Name of the output; needed where the case has several.
-    channel
-        Name in the recordings; needed where they have several.
+    output, channel
+        Needed where the case, or a recording, has several.
     low_pass
         Instead of that of the output.
     known_speed
@@ -80,8 +78,7 @@ def compare_impact(
     Raises
     ------
     InputError
-        For a level, an output or a channel that is not there, and for a record without a pulse
-        that has a front, a plateau and an end.
+        Also for a record without a pulse that has a front, a plateau and an end.
     """
     begin = perf_counter()
     clock = StageClock(progress)
@@ -120,13 +117,7 @@ def compare_impact(
 
 
 def gauge_of(study: ImpactStudy, level: str, output: str | None) -> GaugeRecord:
-    """Output of a level by name; the only one by default.
-
-    Raises
-    ------
-    InputError
-        If there is none of that name, or several and no name.
-    """
+    """Output of a level by name; the only one by default."""
     gauges = {record.name: record for record in level_of(study, level).gauges}
     if not gauges:
         raise InputError(

@@ -1,4 +1,4 @@
-"""What ``klack compare`` leaves behind of an impact and measured pulses, side by side."""
+"""Record of ``klack compare`` for an impact and measured pulses."""
 
 from dataclasses import dataclass
 
@@ -62,17 +62,13 @@ class MeasuredImpactStudy(CaseRecord):
 
     Parameters
     ----------
-    level
-        Of the impact.
     output, label, unit
         Name of the channel, what it is, and its unit.
     speed [m/s]
         That was computed.
-    pulses
-        One for each recording.
     time (n,) [s]
         From half of the plateau in the front of the computed pulse.
-    measured : float32 array, shape (recordings, n)
+    measured (recordings, n)
         Over the factor of each, so that all belong to the computed speed, upwards.
     middle, low, high (n,)
         Median, 5 % and 95 % of the recordings.

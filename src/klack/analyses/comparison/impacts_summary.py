@@ -1,4 +1,4 @@
-"""The few numbers of an impact beside measured pulses that a script or a terminal wants."""
+"""Measures and summary of an impact beside measured pulses."""
 
 from collections.abc import Iterator
 
@@ -45,7 +45,7 @@ _STUDY = JsonForm(
 
 
 def _told(study: MeasuredImpactStudy) -> Iterator[TextTable | Notes | str]:
-    """What a terminal shows: a line for each recording, and what follows from them."""
+    """A line for each recording, and what follows from them."""
     title = f"{study.title}, level '{study.level}': {study.label}"
     yield text_table(
         title, "recording", PULSE_MEASURES, ((pulse.name, pulse) for pulse in study.pulses)
@@ -75,7 +75,7 @@ def pulse_verdict(study: MeasuredImpactStudy) -> str:
 
 
 _LIKELY = 10.0
-"""Factor of a speed beside the computed one above which a recording is taken for scaled."""
+"""Speed over the computed one above which a recording is taken for scaled."""
 
 
 def _side(difference: float) -> str:
@@ -83,7 +83,7 @@ def _side(difference: float) -> str:
 
 
 def factor_sentence(study: MeasuredImpactStudy) -> str:
-    """Say what the factor was, and what it takes away."""
+    """What the factor was, and what it takes away."""
     pulses = study.pulses
     if not pulses[0].fitted:
         return "No factor was fitted: the speed is taken as known and the recordings as absolute."

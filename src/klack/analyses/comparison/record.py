@@ -1,8 +1,4 @@
-"""What ``klack compare`` leaves behind of strokes and shots and their measurements.
-
-The numbers are plain arrays and small frozen records, so that a stored comparison can be reported
-again without the recordings.
-"""
+"""Record of ``klack compare`` for strokes and shots beside their measurements."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -41,7 +37,7 @@ class Compared:
     measured
         Median of the strokes; nan if they have none.
     scatter
-        Standard deviation from stroke to stroke; nan for a single stroke, which has none.
+        Standard deviation from stroke to stroke; nan for a single stroke.
     error
         Standard error of reading it off one stroke, median of the strokes.
     count
@@ -113,7 +109,6 @@ class HighestShot:
     rebound_height, rebound_height_error [m]
         With standard error.
     restitution, restitution_error [-]
-        Of the same stroke.
     by_reading [m]
         How much too high the highest of so many readings is by their errors alone.
     above_median [m]
@@ -140,8 +135,6 @@ class ComparedVariant:
 
     Parameters
     ----------
-    variant, label
-        Of the model, as in the stroke study.
     source
         Files of the measurement.
     count
@@ -150,7 +143,7 @@ class ComparedVariant:
         Of the reader.
     time (n,) [s]
         From the trigger, that of the model too.
-    lift, velocity : float32 array, shape (strokes, n) [m], [m/s]
+    lift, velocity (strokes, n) [m], [m/s]
         Measured.
     lift_median, lift_low, lift_high (n,) [m]
         Median, 5 % and 95 % of the strokes.
@@ -161,10 +154,9 @@ class ComparedVariant:
         From it, by the same differentiator as the measured one.
     velocity_bandwidth [Hz]
         3 dB of that differentiator; ``velocity_noise`` [m/s] is what it leaves of the noise.
-    velocity_noise [m/s]
-    lift_rms, velocity_rms : float [m], [m/s]
+    lift_rms, velocity_rms [m], [m/s]
         Root mean square of computed minus median, over the whole record.
-    lift_scatter, velocity_scatter : float [m], [m/s]
+    lift_scatter, velocity_scatter [m], [m/s]
         Root mean square of the single strokes about the median, noise included; nan for one stroke.
     way [m]
         Lift between both stops.
@@ -232,8 +224,6 @@ class MeasuredStrokeStudy(CaseRecord):
 
     Parameters
     ----------
-    case_text : str
-        With the section ``measurement`` that was used.
     trigger, sensor, zero
         In words.
     point
@@ -261,7 +251,7 @@ class MeasuredDistribution:
         In words.
     unit
         SI; ``""`` for a plain number.
-    computed, measured : array, shape (n,), (m,)
+    computed (n,), measured (m,)
         One value per shot; nan for a shot without.
     error
         Standard error of reading it off one drop, median of the drops.
@@ -270,7 +260,7 @@ class MeasuredDistribution:
     centred
         Of the computed shot that is centred.
     expected_highest
-        Mean over the highest of any m computed shots, m as many as were measured.
+        Mean over the highest of any m computed shots.
     statistic, significance [-]
         Largest distance of the two cumulative distributions (Kolmogorov and Smirnov), and the
         probability of a larger one if both were the same.
@@ -312,13 +302,13 @@ class MeasuredShotsStudy(CaseRecord):
         Restitution, rebound height.
     time (k,) [s]
         From the first touch.
-    lift : float32 array, shape (drops, k) [m]
+    lift (drops, k) [m]
         Measured, above the seat.
     computed_time (j,) [s]
-    computed_height : float32 array, shape (shots, j) [m]
+    computed_height (shots, j) [m]
         Of the centre of mass.
     likely [-]
-        Limit of the verdict: significance from which two distributions are called alike.
+        Significance from which two distributions are called alike.
     """
 
     source: str

@@ -1,8 +1,8 @@
-r"""Computed shots beside measured drops: two distributions, and the highest rebound of each.
+"""Computed shots beside measured drops: two distributions, and the highest rebound of each.
 
-Both are read off the height over time in the same way, from smooth flights before and after the
-first impact.  The restitution of ``klack shots`` is another number: it holds at the end of the
-impact, before friction in the guide takes its share of the rebound.
+Both are read off the height over time, from smooth flights before and after the first impact. The
+restitution of ``klack shots`` is another number: it holds at the end of the impact, before friction
+in the guide takes its share of the rebound.
 
 The highest of m shots is a random number with a bias of its own.  Drawn from n computed shots in
 rising order of their rebound, the i-th is the highest of m with the probability
@@ -53,7 +53,7 @@ def compare_shots(
     case_text: str | None = None,
     progress: Progress = silent,
 ) -> MeasuredShotsStudy:
-    """Lay the shots of a study beside measured drops of the same valve.
+    """Compare the shots of a study with measured drops of the same valve.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def compare_shots(
     Raises
     ------
     InputError
-        For recordings that cannot be used, or with fewer than three drops that can be read.
+        Also for recordings with fewer than three drops that can be read.
     """
     begin = perf_counter()
     used = CaseMeasurement() if section is None else section
@@ -109,13 +109,8 @@ def compare_shots(
 def mean_of_highest(values: Floats, heights: Floats, count: int) -> float:
     """Mean value of the shot with the highest rebound, among any ``count`` of the given ones.
 
-    Parameters
-    ----------
-    values, heights (n,)
-        Shots without a value or a height are left out.
+    Shots without a value or a height are left out.
 
-    Examples
-    --------
     >>> x = np.array([1.0, 2.0])
     >>> mean_of_highest(x, x, 2)  # 11, 12, 21, 22
     1.75
@@ -232,5 +227,4 @@ def _distribution(
 
 
 def _numbers(impacts: Sequence[MeasuredImpact | None], field: str) -> Floats:
-    """One number of each impact; nan where there is none."""
     return np.array([float("nan") if hit is None else getattr(hit, field) for hit in impacts])

@@ -1,4 +1,4 @@
-"""The few numbers of shots beside measured drops that a script or a terminal wants."""
+"""Measures and summary of shots beside measured drops."""
 
 from collections.abc import Iterator
 from math import isfinite
@@ -74,7 +74,7 @@ _STUDY = JsonForm(
 
 
 def _told(study: MeasuredShotsStudy) -> Iterator[TextTable | Notes | str]:
-    """What a terminal shows: both distributions, and what follows from them."""
+    """Both distributions, and what follows from them."""
     title = f"{study.title}: beside {len(study.names)} measured drops"
     yield TextTable(title=title, columns=DROP_COLUMNS, rows=drop_rows(study), left=2)
     for item in study.rejected:
@@ -105,7 +105,7 @@ def drop_rule(study: MeasuredShotsStudy) -> str:
 
 
 def bias_sentence(study: MeasuredShotsStudy) -> str:
-    """Say what taking the highest rebound for the centred impact gets wrong."""
+    """What taking the highest rebound for the centred impact gets wrong."""
     count = len(study.names)
     found = []
     for d in study.distributions:

@@ -1,8 +1,8 @@
-r"""Computed strokes beside measured ones: the same trigger, the same sensor, the same readings.
+"""Computed strokes beside measured ones: the same trigger, the same sensor, the same readings.
 
 The computed lift is shown as the sensor would show it, counted from the same crossing of the same
-channel as the measured strokes, and put on their grid.  Velocity and impacts are read off both in
-the same way, so that what a differentiator or a fit takes away is taken from both.
+channel as the measured strokes, and put on their grid.  Velocity and impacts are read off both
+alike, so that what a differentiator or a fit takes away is taken from both.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -66,22 +66,17 @@ def compare_strokes(
     case_text: str | None = None,
     progress: Progress = silent,
 ) -> MeasuredStrokeStudy:
-    """Lay the variants of a stroke study beside their measured sets.
+    """Compare the variants of a stroke study with their measured sets.
 
     Parameters
     ----------
-    measurements : mapping of variant to files
-        Of one set each.
+    measurements
+        Files of one set for each variant.
     section
         Channels, trigger and sensor; with None, channels are found by their names, each recording
         is one stroke, and the sensor is perfect.
     case_text
         The case that ``section`` stands in, if it is not that of the study.
-
-    Raises
-    ------
-    InputError
-        For a variant that the study does not hold, and for recordings that cannot be used.
     """
     begin = perf_counter()
     used = CaseMeasurement() if section is None else section
@@ -178,13 +173,7 @@ def _compare(
 
 
 def require_same_way(source: str, computed: Floats, measured: Floats) -> None:
-    """Refuse a lift that goes down where the computed one goes up.
-
-    Raises
-    ------
-    InputError
-        If they are correlated by less than -0.5 over the record.
-    """
+    """Refuse a lift that goes down where the computed one goes up: correlated by less than -0.5."""
     if float(np.ptp(computed)) == 0.0 or float(np.ptp(measured)) == 0.0:
         return
     together = float(np.corrcoef(computed, measured)[0, 1])
@@ -231,8 +220,8 @@ def _read(time: Floats, lift: Floats, sensor: LiftSensor, way: float | None) -> 
 def _as_noisy(lift: Floats, noise: float, count: int) -> Floats:
     """Computed lift with the noise of the measured one, several times.
 
-    A reading adapts to noise: longer stretches are fitted where there is more of it, and what
-    these bend changes the result.  Both sides must have the same.
+    A reading fits longer stretches where there is more noise, and what these bend changes the
+    result: both sides must have the same.
     """
     random = np.random.default_rng(_SEED)
     return lift + noise * random.standard_normal((count, lift.size))
@@ -266,7 +255,6 @@ def _computed_lift(
 
 
 def _of_role(study: StrokeStudy, variant: StrokeVariant, role: str) -> Floats:
-    """Computed channel that a measured one stands for, SI."""
     names = {
         "lift": (study.channels.lift,),
         "velocity": (study.channels.lift_velocity,),
@@ -307,7 +295,6 @@ def _scatter(records: Floats, median: Floats) -> float:
 def _impacts(
     model: Sequence[_Reading], readings: Sequence[_Reading], step: float
 ) -> tuple[ComparedImpact, ...]:
-    """Impacts of the model beside those of the same number on the same stop."""
     found = []
     for stop in _STOPS:
         computed, measured = ([item.on(stop) for item in side] for side in (model, readings))

@@ -1,4 +1,4 @@
-"""The few numbers of a comparison with a measurement that a script or a terminal wants."""
+"""Measures and summary of a comparison with a measurement."""
 
 from collections.abc import Iterator
 from math import isfinite
@@ -111,7 +111,7 @@ _STUDY = JsonForm(
 
 
 def _told(study: MeasuredStrokeStudy) -> Iterator[TextTable | Notes | str]:
-    """What a terminal shows: curves and impacts of each variant, and the verdicts."""
+    """Curves and impacts of each variant, and the verdicts."""
     for variant in study.variants.values():
         aside = f", {len(variant.rejected)} discarded" if variant.rejected else ""
         title = f"{study.title}, {variant.variant}: {variant.count} strokes{aside}"
@@ -140,7 +140,7 @@ def agreement(study: MeasuredStrokeStudy, variant: ComparedVariant) -> str:
 
 
 def verdict(study: MeasuredStrokeStudy, variant: ComparedVariant) -> str:
-    """Say in one sentence whether a variant agrees with its measurement, and what is worst."""
+    """In one sentence, whether a variant agrees with its measurement, and what is worst."""
     words, worst = variant.worst()
     found = agreement(study, variant)
     strokes = f"{variant.count} measured stroke{'s' if variant.count != 1 else ''}"

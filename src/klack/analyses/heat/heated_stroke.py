@@ -1,4 +1,4 @@
-"""One stroke at given temperatures: its losses, and the numbers that a warm-up follows."""
+"""One stroke at given temperatures."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -58,13 +58,7 @@ _ZERO_CELSIUS = 273.15
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class WarmValve:
-    """A valve at temperatures.
-
-    Parameters
-    ----------
-    values : mapping of str to (float, str)
-        Resistances and gaps that follow from them, with their SI units, by what they are of.
-    """
+    """A valve at temperatures; ``values`` are the resistances and gaps, with their SI units."""
 
     valve: Valve
     values: Mapping[str, tuple[float, str]]
@@ -91,7 +85,7 @@ def warm_valve(valve: Valve, at: Mapping[Aspect, Temperatures]) -> WarmValve:
     ----------
     valve
         Built once; bodies and laws stay.
-    at : mapping of Aspect to mapping of str to float [K]
+    at [K]
         Temperature of every thermal node, for each aspect.
 
     Raises
@@ -147,7 +141,7 @@ def warm_valve(valve: Valve, at: Mapping[Aspect, Temperatures]) -> WarmValve:
 
 
 def winding_of(parts: Mapping[str, Component], coil: str) -> Section:
-    """Return what holds resistance and temperature of a coil, ``magnet`` or ``magnet.circuit``."""
+    """Section that holds resistance and temperature of a coil, ``magnet`` or ``magnet.circuit``."""
     name, _, circuit = coil.partition(".")
     part = parts[name]
     return getattr(part, "circuits", {})[circuit] if circuit else part
@@ -219,7 +213,7 @@ def _within_range(case: ValveCase, temperature: float) -> tuple[float, tuple[str
 
 
 def _with_viscosity(fluid: Fluid, warm: Fluid) -> Fluid:
-    """Fluid with the viscosity of another temperature, and nothing else of it."""
+    """Fluid with only the viscosity of another temperature."""
     return replace(
         fluid,
         base_viscosity=warm.base_viscosity,
@@ -251,7 +245,7 @@ class HeatedStroke:
         As the energy balance calls them.
     numbers
         By the names of :data:`NUMBERS`; nan where the stroke does not have it.
-    values : mapping of str to (float, str)
+    values
         Resistances and gaps at its temperatures, with their units.
     """
 
@@ -267,12 +261,9 @@ def heated_stroke(
     variant: Variant,
     at: Mapping[Aspect, Mapping[str, float]],
 ) -> HeatedStroke:
-    """Compute a stroke, from rest, at temperatures [K] that stand still in it.
+    """Compute a stroke, from rest, at temperatures [K] that stay constant in it.
 
-    Raises
-    ------
-    ConvergenceError
-        For a stroke that does not reach its end.
+    ConvergenceError for a stroke that does not reach its end.
     """
     warm = warm_valve(valve, at)
     with trial():  # its warnings are those of the same stroke of klack stroke
@@ -341,7 +332,6 @@ def _rebound(result: NetworkResult, roles: ValveRoles, touch: float | None) -> f
 
 
 def _still_driven(result: NetworkResult) -> tuple[str, ...]:
-    """Coils whose current has not ended with the stroke."""
     found = []
     for name, channel in result.channels.items():
         if name.endswith(" current") and channel.unit == "A":
@@ -365,13 +355,7 @@ def _gas(result: NetworkResult) -> tuple[str, ...]:
 
 
 def sent_heat(thermal: CaseThermal, losses: Mapping[str, float]) -> dict[str, float]:
-    """Heat of a stroke into each named node [J].
-
-    Raises
-    ------
-    InputError
-        For a loss that the stroke does not have.
-    """
+    """Heat of a stroke into each named node [J]."""
     found: dict[str, float] = {}
     for i, sent in enumerate(thermal.heat):
         whole = " " not in sent.loss

@@ -34,12 +34,7 @@ class WarmColumn:
 class CauseRow:
     """A stroke with one cause, or all of them, at other temperatures than the base.
 
-    Parameters
-    ----------
-    state
-        At which temperatures, in words.
-    cause
-        ``"base"``, an aspect, or ``"all"``.
+    ``state`` says at which temperatures; ``cause`` is ``"base"``, an aspect, or ``"all"``.
     """
 
     state: str
@@ -75,7 +70,7 @@ class HeatStudy(CaseRecord):
     strokes, repeats
         Strokes computed, and steps that were done again.
     cpu_time [s]
-        Processor time of the strokes.
+        Of the strokes.
     """
 
     variant: str

@@ -137,8 +137,6 @@ def run_heat(
 
     Parameters
     ----------
-    case
-        With a section ``thermal``.
     variant
         The first one of the case by default.
     soak [K]
@@ -150,7 +148,6 @@ def run_heat(
     ------
     InputError
         Without a section ``thermal``, and for heat that has no way out.
-    ConvergenceError
     """
     begin = perf_counter()
     name = case.one_variant(variant)
@@ -230,7 +227,6 @@ class _Found:
 
 
 def _soaked(strokes: _Strokes, network: HeatNetwork, soak: Sequence[float]) -> _Found:
-    """Strokes of a valve that is at one temperature throughout."""
     names = (*network.node_of, *network.fixed_names)
     base = dict.fromkeys(names, REFERENCE)
     states = {_celsius(T): dict.fromkeys(names, T) for T in soak}

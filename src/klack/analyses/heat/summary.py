@@ -1,4 +1,4 @@
-"""Warm-ups for scripts and terminals, and on disk; see :mod:`klack.analyses.store`.
+"""Warm-ups in words and numbers, and on disk.
 
 ``result.zarr/study/temperature/0/values`` is the temperature of the first node at every point.
 """
@@ -85,7 +85,7 @@ HEAT_FORM = JsonForm(
 
 
 def heat_told(record: HeatStudy) -> Iterator[TextTable | str]:
-    """What a terminal shows: points, causes, and the energy balance."""
+    """Points, causes, and the energy balance."""
     shown = main_columns(record)
     yield TextTable(
         title=f"Strokes, {record.variant}"
@@ -125,7 +125,7 @@ def main_columns(record: HeatStudy) -> tuple[WarmColumn, ...]:
 
 
 def cell(value: float, unit: str, *, page: bool = False) -> str:
-    """A number for people, on a terminal or on a page; temperatures in degrees Celsius."""
+    """A number for a terminal or a page; temperatures in degrees Celsius."""
     if not isfinite(value):
         return "–"
     if unit == "K":

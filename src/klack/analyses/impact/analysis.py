@@ -1,4 +1,4 @@
-"""An impact study in words and numbers, and on disk; see :mod:`klack.analyses.store`.
+"""An impact study in words and numbers, and on disk.
 
 ``result.zarr/study/levels/full/history/force`` is the force of the full-order run in newtons.
 """
@@ -135,7 +135,7 @@ STUDY = JsonForm(
 
 
 def study_told(study: ImpactStudy) -> Iterator[TextTable | str]:
-    """Terminal output: the levels side by side, the answer, the error of the others."""
+    """The levels side by side, the answer, the error of the others."""
     yield text_table(study.title, "level", LEVEL_MEASURES, study.levels.items())
     yield answer_line(study)
     if doubt := contact_doubt(study.contact):

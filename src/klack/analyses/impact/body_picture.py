@@ -1,4 +1,4 @@
-r"""Both bodies of an impact as a picture that moves: surfaces, mode shapes, and what they do.
+r"""Both bodies of an impact as a picture that moves: surfaces and mode shapes.
 
 .. math:: u(t) = \Phi q(t) + F(t) \left( K^+ p - \Phi_e \Omega_e^{-2} \Phi_e^T p \right)
 
@@ -53,7 +53,7 @@ def body_pictures(
     pair
         As the case asks.
     ran
-        The level reduced; without it the modes are there, but no motion and no stress.
+        The level reduced; without it there is no motion and no stress.
     """
     bodies = (problem.pair.upper, problem.pair.lower)
     faces = (problem.pair.upper_surface.name, problem.pair.lower_surface.name)
@@ -99,12 +99,7 @@ def body_pictures(
 def with_peak_stress(
     picture: BodyPicture, case: Case, body: ElasticBody, displacement: Floats
 ) -> BodyPicture:
-    """The picture with the stress of a displacement field; as it is for a body of matrices.
-
-    Parameters
-    ----------
-    displacement (n_dof,) [m]
-    """
+    """The picture with the stress of a displacement field [m]; as it is for a body of matrices."""
     if case.bodies[body.name].material is None:
         return picture
     field = StressField(body.mesh, case.materials_of(body.name, body.mesh.solids))

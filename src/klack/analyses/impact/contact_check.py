@@ -1,11 +1,9 @@
-"""Check that meshes and named surfaces resolve the contact, and advice where they do not.
+"""Check that meshes and named surfaces resolve the contact, and whether the bodies yield there.
 
 The numbers of one mesh cannot tell: a contact on one row of elements is as wide as that row, all
 levels agree on it, and the energy is kept.  So the shape of the two surfaces is asked: how wide
 the contact should be (:mod:`klack.contact.hertz`), whether it lies on a sharp corner, and whether
 it reaches the edge of a named surface (:mod:`klack.contact.surface_edges`).
-
-Whether the bodies of a contact yield where they touch, from the pressure of elastic bodies.
 
 A ring on a cone is a line contact and yields below its surface at a pressure of 1.79 Y, a contact
 around one point at 1.295 exp(0.736 nu) Y (von Mises; Johnson, Contact Mechanics, 1985, section 6.2;
@@ -95,15 +93,15 @@ def check_yield(
     force [N]
         Peak force of the impact.
     surfaces
-        The two surfaces, for the message.
+        For the message.
     computed
         Whether the law of the contact has the yield.
 
     Warns
     -----
     AccuracyWarning
-        Where a body with a yield stress yields, though levels compute it as elastic, and where
-        that yield stress is an estimate that decides whether it does.
+        Where a body yields, though levels compute it as elastic, and where that yield stress is an
+        estimate that decides whether it does.
     """
     if not 0.0 < force <= static.max_force:
         return YieldCheck()
@@ -186,7 +184,7 @@ A mesh that is far too coarse is too stiff, and so overrates the force by up to 
 up to 1.4."""
 
 _EXTENT = 3.0
-"""Half widths around the first touch that are worth small elements."""
+"""Half widths around the first touch that deserve small elements."""
 
 _MARGIN = 0.3
 """Distance from an edge, over the element size, within which a contact point lies at it."""
@@ -241,7 +239,7 @@ def check_contact(
     has_yield: bool = False,
     worn_by: float = 0.0,
 ) -> ContactCheck:
-    """Judge a static contact at an axial force, and warn of what makes it doubtful.
+    """Judge a static contact at a force, and warn of what makes it doubtful.
 
     Parameters
     ----------
@@ -250,17 +248,13 @@ def check_contact(
     pair
         Placed as they touch.
     force [N]
-        Peak force of the impact.
+        Peak of the impact.
     surfaces
-        The two surfaces, for the messages.
+        For the messages.
     has_yield
         Whether the law of the contact has the yield of its faces.
-
-    Warns
-    -----
-    AccuracyWarning
-        About an edge, elements too coarse for the contact, a contact at the end of a named
-        surface, and a body that yields.
+    worn_by [N]
+        Highest force of the impacts that have worn the faces, 0 for faces as made.
     """
     space, lam = static.space, static.pattern_at(force)
     ratio = size_over_half_width(static, force)
@@ -309,24 +303,9 @@ def ends_reached(
     levels: Mapping[str, LevelResult],
     surfaces: str,
 ) -> ContactCheck:
-    """Look at the contact points of levels that have them, too: one may lean or hit harder.
+    """Add a doubt and warn where contact points of levels ran over the end of a named surface.
 
-    Parameters
-    ----------
-    check
-        Of the static contact.
-    worn_by : float [N]
-        Highest force of the impacts that have worn the faces, 0 for faces as made.
-
-    Returns
-    -------
-    ContactCheck
-        With one doubt more where a contact ran over the end of a named surface.
-
-    Warns
-    -----
-    AccuracyWarning
-        Where that is so.
+    One body may lean or hit harder than in the static contact, which ``check`` is of.
     """
     if _OVER_THE_END in check.doubts:
         return check
@@ -378,10 +357,6 @@ def expected_half_width(
 
     A ring is a line contact under its highest load per length, anything else a point contact; of an
     ellipse the short half axis counts.
-
-    Parameters
-    ----------
-    force [N]
     """
     space, lam = static.space, static.pattern_at(force) * force
     modulus = _modulus(case, pair)
@@ -406,7 +381,7 @@ def expected_half_width(
 
 
 def _within(pair: BodyPair, width: float) -> float:
-    """Nothing that is as wide as the surfaces themselves: they fit each other closely."""
+    """Not a number for a width as large as the surfaces themselves: they fit each other closely."""
     room = min(
         float(np.max(np.ptp(mesh.points[surface.nodes], axis=0)))
         for mesh, surface in (
@@ -552,7 +527,7 @@ def _coarse(
 
 
 def _extent(case: CaseFile, pair: BodyPair, expected: float) -> str:
-    """Words for how far small elements should go, where that is set and too little."""
+    """How far small elements should go, where that is set and too little."""
     extents = [
         mesh.contact.extent
         for name in (pair.upper.name, pair.lower.name)

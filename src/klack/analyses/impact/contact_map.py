@@ -1,8 +1,8 @@
 r"""Contact points laid out in a plane, so that their forces can be drawn as a picture.
 
 A ring is unrolled: angle round its axis, and distance across it along the surface.  A spot is seen
-along the axis of motion.  An axisymmetric contact keeps its distance across alone.  Which of them a
-contact is, its points and forces tell, not the name of the case.
+along the axis of motion.  An axisymmetric contact keeps its distance across alone.  Points and
+forces tell which of them a contact is.
 
 Nothing is interpolated: every point of the picture belongs to the nearest contact point, and a
 contact point spreads its force evenly over its cell.  With :math:`w_k` the share of cell *k* that a
@@ -52,8 +52,7 @@ class ContactMap:
     Parameters
     ----------
     shape
-        ``ring``, ``spot``; of axisymmetric bodies ``meridian`` (a ring) or ``disc`` (around the
-        axis).
+        Of axisymmetric bodies ``meridian`` (a ring) or ``disc`` (around the axis).
     along (nc,)
         Ring: angle round its axis from +x towards +y, 0 to 360 [deg]; spot: x [m]; else 0.
     across (nc,) [m]
@@ -75,7 +74,7 @@ class Cells:
 
     Parameters
     ----------
-    along, across : array, shape (nx + 1,), (ny + 1,)
+    along (nx + 1,), across (ny + 1,)
         Edges of the rectangles, in the units of the map.
     owner (ny, nx)
         Contact point of each rectangle; -1 beyond the surface.
@@ -161,16 +160,7 @@ def map_cells(
     across: tuple[float, float],
     shape: tuple[int, int],
 ) -> Cells:
-    """Cut a window of a ring or a spot into ``shape`` = (nx, ny) equal rectangles.
-
-    Parameters
-    ----------
-    found
-        Of shape ``ring`` or ``spot``.
-    along, across : pair of float
-        Window, in the units of the map; a ring is closed.
-    shape : pair of int
-    """
+    """Cut a window of a ring or a spot, in units of the map, into (nx, ny) equal rectangles."""
     x = np.linspace(*along, shape[0] + 1)
     y = np.linspace(*across, shape[1] + 1)
     points = np.column_stack([found.along, found.across])
@@ -238,7 +228,7 @@ def averaged(values: Floats, cells: Cells) -> Floats:
 
 
 def closed(carries: NDArray[np.bool_], cells: Cells) -> NDArray[np.bool_]:
-    """Loaded cells, with holes and notches of single cells filled, shape (ny, nx)."""
+    """Loaded cells (ny, nx), with holes and notches of single cells filled."""
     rows, columns = (2 * (width // 2) + 3 for width in _cell_size(cells))  # a little more than one
     # beyond the ends of a ring is its other end, beyond all others nothing
     wide = np.pad(carries, [(rows, rows), (0, 0)])
@@ -257,6 +247,5 @@ def _cell_size(cells: Cells) -> tuple[int, int]:
 
 
 def _usual_run(owner: NDArray[np.int64], line: NDArray[np.int64]) -> int:
-    """Median number of rectangles that one cell has in one line of the picture."""
     number = np.bincount(owner * (int(line.max(initial=0)) + 1) + line)
     return max(round(float(np.median(number[number > 0]))), 1)

@@ -1,8 +1,6 @@
-"""Content of an impact report before its layout: the same texts for screen and paper.
+"""Content of an impact report.
 
-Everything here is plain text; each renderer escapes it in its own way, because titles, names and
-the text of the case come from the user.  Pictures are imported where there are any: matplotlib
-takes half a second.
+Pictures are imported where there are any: matplotlib takes half a second.
 """
 
 from collections.abc import Callable, Sequence
@@ -193,7 +191,6 @@ def _standing(study: ImpactStudy, name: str) -> str:
 
 
 def _number(study: ImpactStudy, measure: Measure[LevelResult], result: LevelResult) -> str:
-    """Value of a level, with its deviation from the reference below."""
     cell = measure.on_page(result)
     found = study.deviations.get(result.level)
     apart = next((item for item in DEVIATION_MEASURES if item.key == measure.key), None)

@@ -1,7 +1,4 @@
-"""The figures of an impact report, each built from a study by one function.
-
-Units on the axes are those of the workshop: us, N, um, kHz.
-"""
+"""Figures of an impact report, with the units of the workshop: us, N, um, kHz."""
 
 from dataclasses import replace
 from math import ceil, floor
@@ -200,7 +197,7 @@ def _way(history: ImpactHistory, time: Floats) -> Floats:
 
 
 def output_charts(study: ImpactStudy) -> tuple[Chart, ...]:
-    """One chart for each output of the case: what its sensor shows at every level."""
+    """What the sensor of each output of the case shows at every level."""
     names = dict.fromkeys(record.name for level in study.ordered for record in level.gauges)
     found = []
     for name in names:
@@ -299,7 +296,6 @@ def _level_panel(label: str, unit: str, curves: list[Curve], depth: float) -> Pa
 
 
 def _steps(octaves: ThirdOctaves, values: Floats, result: LevelResult) -> Curve:
-    """Levels as steps from band edge to band edge."""
     seen = octaves.low >= 0.99 * _LOW_FREQUENCY / 10**0.05
     edges = np.append(octaves.low[seen], octaves.high[-1])
     heights = np.append(values[seen], values[-1])

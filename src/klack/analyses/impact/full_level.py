@@ -44,14 +44,13 @@ def simulate_in_full(
 
     Parameters
     ----------
-    kept : mapping of body name to Modes
+    kept
         Elastic modes that the reduced levels keep: a damping ratio acts on these, as it does
         there, and they tell when the bodies have parted for good.
     space
         Other contact points of the same surfaces than those of the static contact.
-    longest_period [s]
-    snapshots
-        Both as in :func:`klack.transient.full_order.simulate_full_order`.
+    longest_period, snapshots
+        As in :func:`klack.transient.full_order.simulate_full_order`.
 
     Raises
     ------

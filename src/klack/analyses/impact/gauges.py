@@ -87,7 +87,7 @@ class FullGauges:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ModalMotion:
-    """Modes over time, displacement and velocity, each of shape (n + 1, m)."""
+    """Modes over time, displacement and velocity, (n + 1, m) each."""
 
     q: Floats
     v: Floats
@@ -172,12 +172,7 @@ def with_reduced_gauges(
 ) -> LevelResult:
     """A reduced level with what its gauges read.
 
-    Parameters
-    ----------
-    problem
-        With its static solutions still there.
-    pair
-        Of that level.
+    The static solutions of ``problem`` still exist.
     """
     history, found = result.history, []
     sides = (

@@ -1,7 +1,7 @@
 """One dry impact of bodies that have no common surfaces: each meets the other at a port.
 
-There is no static contact problem to solve, hence no consistent law and no error estimate:
-the law is the one of the case, and what the modes miss of both bodies lies in series with it.
+Without a static contact problem there is no consistent law and no error estimate: the law is the
+one of the case, and what the modes miss of both bodies lies in series with it.
 """
 
 from collections.abc import Sequence
@@ -44,17 +44,7 @@ def run_given_impact(
 ) -> ImpactStudy:
     """Compute one impact at the levels ``reduced`` and ``lumped``.
 
-    Parameters
-    ----------
-    case
-        With at least one body without surfaces.
-    threads
-        Of the factorisation of a body that klack reduces.
-
-    Raises
-    ------
-    InputError
-        For other levels, and for models that cannot be used.
+    At least one body has no surfaces.
     """
     begin = perf_counter()
     wanted = require_given_levels(case, levels)
@@ -101,12 +91,7 @@ def run_given_impact(
 
 
 def require_given_levels(case: Case, levels: Sequence[str]) -> tuple[str, ...]:
-    """Check that bodies without surfaces can run the levels; return them without repetition.
-
-    Raises
-    ------
-    InputError
-    """
+    """Check that bodies without surfaces can run the levels; return them without repetition."""
     wanted = case.require_levels(levels)
     for level in wanted:
         if level not in GIVEN_LEVELS:

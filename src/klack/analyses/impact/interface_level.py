@@ -75,7 +75,7 @@ _SAME_PEAK, _SAME_RESTITUTION = 0.005, 0.002  # differences that are no doubt
 
 
 def certificate_modes(case: Case) -> int:
-    """Modes of each body that the error estimate takes: twice those kept, or their pool.
+    """Modes of each body for the error estimate: twice those kept, or their pool.
 
     Thirty at least.
     """
@@ -105,8 +105,8 @@ def build_interface(
     ----------
     problem
         With its factorisations still there.
-    ports : pair of Port, optional
-        Contact ports of both bodies: needed when modes are chosen by participation.
+    ports
+        Of both bodies: needed when modes are chosen by participation.
     count
         Take so many modes of each body, as far as the pool goes, instead of those of the case.
     space
@@ -184,14 +184,8 @@ def within_reach(
     """Run an interface-level model on as many contact points as the motion reaches.
 
     The static contact bounds the approach of one quasi-static impact; waves, or a body that comes
-    back while its stop still swings, may go further.
-
-    Parameters
-    ----------
-    problem, pools, ports, count, limit
-        As given to :func:`build_interface`.
-    run
-        Given the model; called again, with twice the reach, after a :class:`ReachError`.
+    back while its stop still swings, may go further.  Then ``run`` is called again, with twice the
+    reach.
 
     Raises
     ------
@@ -227,19 +221,9 @@ def off_axis_within_reach(
     ports: tuple[Port, Port] | None = None,
     limit: PressureLimit | None = None,
 ) -> _Result:
-    """Run axisymmetric bodies off-axis on as many contact points as the motion reaches.
+    """Run centred axisymmetric bodies off-axis on as many contact points as the motion reaches.
 
-    Parameters
-    ----------
-    problem, pools, ports, limit
-        As given to :func:`build_interface`; the bodies are centred.
-    run
-        Given the model; called again, with twice the reach, after a :class:`ReachError`.
-
-    Raises
-    ------
-    ReachError
-        Where the case gives the reach.
+    As :func:`within_reach`, with or without an upper stop.
     """
     case, reach = problem.case, problem.space.reach
     count = ANGLES if case.contact.angles is None else case.contact.angles
@@ -272,10 +256,7 @@ def _sides(problem: ContactProblem) -> list[tuple[ElasticBody, Flexibility]]:
 def exact_gaps(problem: ContactProblem) -> PlacedGaps:
     """Gaps of all contact points on the curved faces, at any rigid placement of the moving body.
 
-    Raises
-    ------
-    InputError
-        For axisymmetric bodies.
+    InputError for axisymmetric bodies.
     """
     pair, above = problem.pair, problem.opposite
     centre = pair.upper.centre_of_mass
@@ -350,19 +331,9 @@ def build_guide(
     ports: tuple[Port, Port] | None = None,
     count: int | None = None,
 ) -> Guide | None:
-    """Guide of a case for its interface model, None without one.
+    """Guide of a case for its interface model, if it has one.
 
-    Parameters
-    ----------
-    problem, pools, ports, count
-        As given to :func:`build_interface`.
-    model
-        What that returned.
-
-    Raises
-    ------
-    InputError
-        For a body that is placed inside the wall of its bore, which would throw it out.
+    InputError for a body that is placed inside the wall of its bore, which would throw it out.
     """
     asked: CaseGuide | None = problem.case.guide
     if asked is None:

@@ -181,7 +181,7 @@ def pressure_record(
     area: NDArray[np.float64],
     friction: FrictionRecord | None = None,
 ) -> PressureRecord | None:
-    """Contact forces of all points over the first impact, thinned to a hundred instants or so.
+    """Contact forces of all points over the first impact, thinned to about a hundred instants.
 
     ``friction`` is that of every step of the history, as ``point_force`` is.
     """

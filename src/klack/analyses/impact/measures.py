@@ -22,7 +22,6 @@ def _cut(level: LevelResult) -> str:
 
 
 def _contact(level: LevelResult, number: int) -> str:
-    """Which contact of several a number belongs to."""
     several = level.measures.sub_contacts
     return f" (contact {number} of {several})" if several > 1 else ""
 

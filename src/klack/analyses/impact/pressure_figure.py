@@ -1,16 +1,14 @@
-"""Where the bodies carry while they touch: the forces of all contact points as pictures over time.
+"""Where the bodies carry, stick and slip while they touch: pictures over time.
 
 Of bodies in three dimensions the upper row shows the line load, that is the force per length of the
 ring (or along x of a spot), over time, and the lower row the pressure at the peak force.
 Axisymmetric bodies have one row: the pressure across the contact over time.  White is no contact.
 Several runs stand side by side at one scale.
 
-Where faces stick and slip while they touch, and which way: a picture over time.
-
-Friction over the most that the points can hold, +1 where all slips with friction pushing the moving
-body outwards, -1 inwards, between them where they stick.  Axisymmetric bodies have one row, across
-the contact; bodies in three dimensions two, round the ring: friction along the face away from the
-axis, and round the axis.
+Friction is shown over the most that the points can hold: +1 where all slips with friction pushing
+the moving body outwards, -1 inwards, between them where they stick.  Axisymmetric bodies have one
+row, across the contact; bodies in three dimensions two, round the ring: friction along the face
+away from the axis, and round the axis.
 """
 
 from collections.abc import Sequence
@@ -83,7 +81,6 @@ def draw_pressure(views: Sequence[PressureView]) -> bytes:
 
 
 def _draw_profiles(figure: Figure, row: Any, views: Sequence[PressureView]) -> None:
-    """Pressure over the distance across an axisymmetric contact and time."""
     pressures = [1e-6 * view.force / view.area for view in views]
     norm = _common_scale(pressures)
     low, high = across_window(views)
@@ -186,7 +183,6 @@ def friction_figure(views: Sequence[FrictionView]) -> Picture:
 
 
 def _across(axes: Any, view: FrictionView, window: tuple[float, float]) -> Any:
-    """Friction over the distance across an axisymmetric contact and time."""
     order, edges = cell_edges(view.pressure.places)
     share = _share(view, 0, np.eye(len(view.pressure.area)))[:, order]
     mesh = _paint_shares(axes, 1e6 * edges, 1e6 * record_edges(view.pressure), share)

@@ -37,7 +37,7 @@ __all__ = [
 Floats = NDArray[np.float64]
 
 _COLUMNS, _ROWS = 1080, 180
-"""Rectangles of the picture: so narrow that a cell of a spot is 30 or so wide."""
+"""Rectangles of the picture: so narrow that a cell of a spot is about 30 wide."""
 _MARGIN = 0.18
 """Of the carrying zone, added to the picture on either side."""
 
@@ -144,12 +144,12 @@ def _columns(places: ContactMap) -> int:
 
 
 def line_load(view: PressureView, cells: Cells) -> Floats:
-    """Force per length in every column of the picture over time, shape (n, nx) [N/m]."""
+    """Force per length (n, nx) [N/m] in every column of the picture over time."""
     return view.force @ line_load_weights(view.places, cells)
 
 
 def peak_pressure(view: PressureView, cells: Cells) -> Floats:
-    """Pressure at the peak force, averaged over an element, shape (ny, nx) [Pa].
+    """Pressure (ny, nx) [Pa] at the peak force, averaged over an element.
 
     Points at the corners of quadratic elements and points in the middle of their sides may
     alternate; the mean over both does not.  Zero where neighbouring points carry nothing.
@@ -263,7 +263,6 @@ def _first(view: PressureView, load: Floats, angle: Floats) -> str:
 
 
 def _closed(view: PressureView, load: Floats) -> str:
-    """From when to when every part of the ring carries."""
     whole = np.flatnonzero((load > 0).all(axis=1))
     if not len(whole):
         return f"never\nat most {100 * float((load > 0).mean(axis=1).max()):.0f} % of it"

@@ -1,8 +1,4 @@
-"""Record of an impact study: everything that a report or a comparison needs.
-
-The numbers are plain arrays and small frozen records, so that a stored study can be reported again
-without the solver.
-"""
+"""Record of an impact study: everything that a report or a comparison needs, without the solver."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -50,7 +46,7 @@ class ContactSummary:
     points
         Number of contact points (mortar multipliers).
     half_width [m]
-        Half width of the contact at the highest force of the impact.
+        At the highest force of the impact.
     size_ratio [-]
         Element size across the contact over the half width; good up to 1, doubtful above 1.5.
     points_across
@@ -61,7 +57,7 @@ class ContactSummary:
         Yield stress from which on both bodies stay elastic; nan where it is not known.
     layer
         Asperities of rough faces in words; empty for smooth ones.
-    approach, force, area : array, shape (n,) [m], [N], [m^2]
+    approach, force, area (n,) [m], [N], [m^2]
         Ladder from first touch.
     """
 
@@ -86,12 +82,11 @@ class LawSummary:
     ----------
     kind
         ``"consistent"``, ``"linear"``, ``"hertz"``.
-    indentation, force : array [m], [N]
+    indentation, force [m], [N]
     share [-]
-        Share of the static compliance that the law carries, at each ``force``.
+        Of the static compliance that the law carries, at each ``force``.
     linear_stiffness [N/m]
-        Straight line through the law over ``fit_range``.
-    fit_range [N]
+        Straight line through the law over ``fit_range`` [N].
     classical_stiffness [N/m]
         Linear fit of a static submodel of the contact region alone.
     classical_size [m]
@@ -123,10 +118,10 @@ class FrictionRecord:
 
     Parameters
     ----------
-    force : float32 array, shape (n, ways, nc) [N]
+    force (n, ways, nc) [N]
         On the moving body: outwards from the axis along the face; in three dimensions round the
         axis too.
-    doing : int8 array, shape (n, nc)
+    doing (n, nc)
         0 open, 1 sticking, 2 slipping (:mod:`klack.transient.rubbing`).
     coefficient [-]
         While a point slips.
@@ -146,10 +141,9 @@ class PressureRecord:
     time (n,) [s]
         Middle of each recorded step.
     points (nc, dimension) [m]
-        Where the contact points are.
     area (nc,) [m^2]
         The pressure of a point is its force over its area.
-    point_force : float32 array, shape (n, nc) [N]
+    point_force (n, nc) [N]
     friction
         Where the faces rub.
     """
@@ -171,7 +165,7 @@ class LevelResult:
         ``lumped``, ``reduced``, ``reduced-attachment``, ``reduced-none``,
         ``reduced-participation``, ``interface`` or ``full``.
     label
-        What a legend says, for example ``"reduced, 20 + 40 modes, consistent law"``.
+        For a legend, for example ``"reduced, 20 + 40 modes, consistent law"``.
     step [s]
     wall_time [s]
         Of the time integration alone.
@@ -181,11 +175,11 @@ class LevelResult:
         After separation, e.g. ``"needle kinetic (rigid)"``, ``"needle vibration"``, ...; the first
         entry is ``"initial kinetic"``.
     energy_residual [-]
-        Residual of the energy balance over the initial kinetic energy.
+        Over the initial kinetic energy.
     pressure
         Of levels that resolve the contact point by point.
     frictionless
-        What the level computes without the friction of the faces, where they rub.
+        Without the friction of the faces, where they rub.
     doubts
         Why this level can be no reference for others (:mod:`klack.analyses.impact.trust`).
     gauges
@@ -221,9 +215,9 @@ class SectionPicture:
     Parameters
     ----------
     points (n, 2) [m]
-        Undeformed coordinates, distance from the axis and height.
+        Undeformed: distance from the axis and height.
     displacement (n, 2) [m]
-        In the same two directions, elastic and rigid.
+        In these directions, elastic and rigid.
     magnitude (n,) [m]
         Length of the displacement vector (three components) that colours the picture.
     triangles (t, 3)
@@ -260,7 +254,7 @@ class BodyPicture:
         Shortest side of an element.
     node (n,)
         Nodes of the mesh on the skin, rising.
-    shapes : int16 array, shape (m, n, dimension)
+    shapes (m, n, dimension)
         Displacements of these nodes, each in 32767ths of the largest component of its shape: rigid
         modes, elastic modes, and last the static rest of the contact force if there is one.
     scale (m,)
@@ -269,9 +263,9 @@ class BodyPicture:
         0 of rigid modes; nan of attachment modes and of the static rest.
     instants (frames,) [s]
         Of the reduced level; empty where it was not computed.
-    amplitude : float32 array, shape (frames, m)
+    amplitude (frames, m)
         Of the modes in sqrt(kg) m, of the static rest in N.
-    stress : float32 array, shape (n,) [Pa]
+    stress (n,) [Pa]
         Von Mises at the highest force, of the full level if it was computed; empty without.
     touch (k, 3) [m]
         Points of first touch of both bodies when centred, in their order round the axis: of the
@@ -342,19 +336,19 @@ class ImpactStudy(CaseRecord):
 
     Parameters
     ----------
-    speed, gap : float [m/s], [m]
+    speed, gap [m/s], [m]
     reference
         Level whose numbers are the answer: the finest one that nothing speaks against.
-    deviations : mapping of level to Deviation
+    deviations
         From the reference; none where that has doubts itself.
-    estimates : mapping of level to Deviation
+    estimates
         Estimated error of reduced levels: their deviation from one interface-level run.  With the
         full order also that of its steps: of the same run with its periods and steps.
     estimate_basis
         What that run was, in words; empty without one.
-    estimate_margins : mapping of level to Deviation
-        So far may each estimate be off, no signs: what half the modes in longer steps do to
-        that run, and what its steps leave open.  None in results of earlier versions.
+    estimate_margins
+        How far each estimate may be off, no signs: what half the modes in longer steps do to that
+        run, and what its steps leave open.  None in results of earlier versions.
     estimate_spread [-]
         That of the force history.  Above :data:`SETTLED` the run is no reference, and the
         estimates say little.
@@ -403,6 +397,6 @@ class ImpactStudy(CaseRecord):
         return tuple(self.levels[name] for name in first | dict.fromkeys(self.levels))
 
     def why_missing(self, name: str) -> str:
-        """Reason for "no result of this name": why it failed; empty if it was not requested."""
+        """Why a level failed; empty if it was not requested."""
         text = self.failures.get(name, "")
         return f": it failed ({' '.join(text.split())})" if text else ""

@@ -46,7 +46,7 @@ class Recovered:
     missing: NDArray[np.float64] | None
 
     def rest(self, load: NDArray[np.float64]) -> NDArray[np.float64] | None:
-        """Static displacement per force that the modes lack [m/N], shape (n_dof,)."""
+        """Static displacement (n_dof,) per force that the modes lack [m/N]."""
         if self.missing is None:
             return None
         return np.asarray(self.flexibility.deflections(load[:, None])[:, 0] + self.missing)
@@ -58,7 +58,7 @@ class Recovered:
         force: float,
         load: NDArray[np.float64],
     ) -> MotionOfBody:
-        """Fields under a contact force [N] with its load pattern, shape (n_dof,)."""
+        """Fields (n_dof,) under a contact force [N] with its load pattern."""
         u = self.shapes @ q
         rest = self.rest(load) if force > 0.0 else None
         if rest is not None:
@@ -97,7 +97,7 @@ def _recovered(
 def recovered_bodies(
     problem: ContactProblem, pools: Mapping[str, Modes], pair: ReducedPair
 ) -> tuple[Recovered, Recovered]:
-    """Recovery of all nodes of both bodies, the upper one first; see :func:`recovered_motion`."""
+    """Recovery of all nodes of both bodies, the upper one first."""
     upper, lower = problem.pair.upper, problem.pair.lower
     # the force pushes the upper body up and the lower one down
     return (
@@ -111,17 +111,14 @@ def recovered_motion(
 ) -> Iterator[tuple[float, tuple[MotionOfBody, ...]]]:
     """Compute the motion of the reduced level of a case, instant by instant.
 
+    Yields the time [s] and the motion of the upper and the lower body.
+
     Parameters
     ----------
     problem
-        With its factorisations; they are needed until the last instant.
+        Its factorisations are needed until the last instant.
     instants
         In steps of ``run.reduced_step``, rising; 0 is the start.
-
-    Yields
-    ------
-    tuple of float [s] and tuple of MotionOfBody
-        The upper body first.
     """
     case = problem.case
     tell_elastic(case, "the recovered motion is that of")

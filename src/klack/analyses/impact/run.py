@@ -1,4 +1,4 @@
-"""``klack impact``: one dry impact at the requested levels, overlaid."""
+"""``klack impact``: one dry impact at the requested levels."""
 
 import warnings
 from collections.abc import Mapping, Sequence
@@ -147,14 +147,8 @@ def run_impact(
     certify
         Estimate the error of reduced levels, and of the steps of the full order, by one
         interface-level run with twice as many modes; bodies without surfaces have no such level.
-    progress
-        Called with stage and fraction.
     threads
         Of the factorisations; the full order moves two bodies side by side on two cores.
-
-    Returns
-    -------
-    ImpactStudy
 
     Raises
     ------
@@ -176,14 +170,9 @@ def run_impact(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ImpactBodies(Closing):
-    """Bodies of an impact with their modes: the same for every speed, force, step and law.
+    """Bodies of an impact, the same for every speed, force, step and law.
 
-    Parameters
-    ----------
-    pools : mapping of body name to Modes
-        As many as the levels of the impact need.
-    notes
-        Doubts about them.
+    With as many modes as the levels of the impact need; notes are doubts about them.
     """
 
     placed: PlacedBodies
@@ -250,7 +239,7 @@ def impact_of_bodies(
         Made for the same levels; they stay open.
     levels
         Without ``full``, which frees the factorisations first.
-    near : mapping of body name to NearLoads, optional
+    near
         Of earlier impacts: the structures then depend on these to about 1e-6, the impact does not.
     """
     begin = perf_counter()
@@ -327,7 +316,6 @@ class _Work:
         self.sections: tuple[SectionPicture, ...] = ()
 
     def reduce(self, wanted: Sequence[Level], certify: bool, clock: StageClock) -> None:
-        """Bodies with the modes and the law of the case, elastic or with faces that yield."""
         problem, pools = self.problem, self.pools
         clock("reduced", 0.0)
         with warnings_of("modes of the case"):
@@ -412,7 +400,6 @@ class _Work:
         self.certificate = found or self.certificate
 
     def check_contact(self) -> None:
-        """Mesh and law of the contact under the highest load."""
         worn = self.case.contact.worn
         static, loaded = _as_loaded(self.problem, self.results, self.peak)
         self.check = check_contact(
@@ -463,7 +450,6 @@ class _Work:
             self.pictures = _with_full_stress(problem, run, self.pictures)
 
     def check_ends(self) -> None:
-        """Whether a level has run over the end of a surface."""
         problem = self.problem
         self.check = ends_reached(
             self.check, problem.pair, problem.space, self.results, _surfaces(self.case)
@@ -738,7 +724,6 @@ def _pictures(
     own: ReducedPair,
     ran: LevelResult | None,
 ) -> tuple[BodyPicture, ...]:
-    """Pictures of both bodies; what is doubtful about their modes, the level has said already."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AccuracyWarning)
         return body_pictures(problem, pools, own, ran)

@@ -1,9 +1,9 @@
 r"""Impacts one after another on the same faces, until they do not yield any more.
 
 Every impact starts like the first; the law remembers how far the faces were pressed, or every
-contact point its set.  For a rigid
-body of energy E the limit is the force :math:`P_\infty` whose elastic opening gives back all of it,
-:math:`W_e(P_\infty) = E` (shakedown), and what is missing falls geometrically.
+contact point its set.  For a rigid body of energy E the limit is the force :math:`P_\infty` whose
+elastic opening gives back all of it, :math:`W_e(P_\infty) = E` (shakedown), and what is missing
+falls geometrically.
 """
 
 import warnings
@@ -53,19 +53,8 @@ _MOST = 1000
 def running_in(case: Case, pair: ReducedPair, loops: YieldingLoops) -> RunningIn | None:
     """Impacts on the same faces, as many as the case asks for; None where it asks for one.
 
-    Parameters
-    ----------
-    case
-        ``run.impacts``, and with ``run.run_in`` as many more as it takes.
-    pair
-        With a law of faces that yield.
-    loops
-        Behind that law.
-
-    Warns
-    -----
-    AccuracyWarning
-        Where the faces are pressed further than the loops go.
+    ``loops`` are behind the law of faces that yield of ``pair``; a warning tells where the faces
+    are pressed further than they go.
     """
     law = pair.law
     if not isinstance(law, YieldingLaw) or not asks_for_more(case):
@@ -119,12 +108,7 @@ def running_in(case: Case, pair: ReducedPair, loops: YieldingLoops) -> RunningIn
 def points_running_in(case: Case, model: InterfaceModel, guide: Guide | None) -> RunningIn | None:
     """Impacts at the interface level on the same faces; None where the case asks for one.
 
-    Every point keeps its own set, wherever the body lands.
-
-    Parameters
-    ----------
-    model
-        With a pressure limit.
+    Every point keeps its own set, wherever the body lands; the model has a pressure limit.
     """
     if model.limit is None or not asks_for_more(case):
         return None
@@ -168,7 +152,7 @@ def asks_for_more(case: Case) -> bool:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Impact:
-    """One of them: loss to yield [J], set [m] and width of the land [m] after it."""
+    """Loss to yield [J], set [m] and width of the land [m] after it."""
 
     history: ImpactHistory
     lost: float
@@ -177,7 +161,7 @@ class _Impact:
 
 
 def _repeated(case: Case, hit: Callable[[int], _Impact | None]) -> tuple[NDArray[np.float64], bool]:
-    """Impacts as often as the case asks for: their numbers in columns, and whether they are run in.
+    """Impacts as often as the case asks for: numbers in columns, and whether they are run in.
 
     ``hit`` is given how many there were, and returns None where they end.
     """
@@ -212,7 +196,7 @@ def running_in_columns(found: RunningIn) -> tuple[str, ...]:
 def running_in_rows(
     found: RunningIn, told: Callable[[float, str, int], str]
 ) -> tuple[tuple[str, ...], ...]:
-    """Their numbers, one quantity each row; ``told`` writes a value, its unit and its digits."""
+    """A row for each of their quantities; ``told`` writes a value, its unit and its digits."""
     shown = _shown(found)
 
     def row(title: str, values: np.ndarray, unit: str, digits: int) -> tuple[str, ...]:
@@ -247,19 +231,8 @@ WORN = "worn.yaml"
 def worn_text(text: str, source: Path, found: RunningIn, folder: Path, version: str) -> str:
     """Text of the case with ``contact.worn``, for a file in ``folder``; comments and order stay.
 
-    Parameters
-    ----------
-    text
-        Of the case whose impacts have worn the faces.
-    source
-        Its file.
-    version
-        Of klack.
-
-    Raises
-    ------
-    InputError
-        Where the layout of the text does not allow it.
+    ``text``, from ``source``, is that of the case whose impacts have worn the faces.  InputError
+    where its layout does not allow it.
     """
     data, lines = parse(text, source)
     tree = CaseTree(path=source, text=text, data=data, lines=lines)

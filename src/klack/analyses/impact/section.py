@@ -24,7 +24,8 @@ Ints = NDArray[np.int64]
 
 _PLANE_SHIFT = 1e-8
 """Shift of the cutting plane over the size of the body: swept meshes have element sides exactly in
-y = 0, where a cut would be undefined."""
+y = 0, where a cut would be undefined.
+"""
 
 _MERGED = 1e-6
 """Points of the picture closer than this (over its size) become one."""
@@ -55,23 +56,16 @@ _CENTRE_WEIGHTS = {  # shape functions at the middle: (corners, edge mids); wedg
 def section_picture(mesh: Mesh, displacement: Floats, time: float, body: str) -> SectionPicture:
     """Cut a deformed body open along its axis.
 
+    Displacements are linear between the nodes; curved sides are drawn as two straight ones through
+    the mid node.  A body counts as held if at least one node does not move at all.
+
     Parameters
     ----------
     mesh
         Axisymmetric (columns r, z) or solid (columns x, y, z; axis of motion z).
     displacement (n_dof,) [m]
-        Nodal displacements, ``dimension * node + component``, counted from ``mesh.points``.
+        ``dimension * node + component``, counted from ``mesh.points``.
     time [s]
-        Instant of the picture.
-    body
-        Name of the body.
-
-    Returns
-    -------
-    SectionPicture
-        Displacements are linear between the nodes; curved sides are drawn as two straight ones
-        through the mid node.  ``closing`` is the mean axial displacement of a body that is held
-        nowhere, and zero for a body with at least one node that does not move at all.
 
     Raises
     ------
@@ -103,7 +97,7 @@ def section_picture(mesh: Mesh, displacement: Floats, time: float, body: str) ->
 
 
 def _mean_axial(points: Floats, axial: Floats, triangles: Ints) -> float:
-    """Mean axial displacement of the body of revolution under the section [m]."""
+    """Mean axial displacement [m] of the body of revolution under the section."""
     corner = points[triangles]
     (ax, ay), (bx, by) = (corner[:, 1] - corner[:, 0]).T, (corner[:, 2] - corner[:, 0]).T
     area = 0.5 * np.abs(ax * by - ay * bx)

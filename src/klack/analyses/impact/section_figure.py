@@ -1,11 +1,10 @@
 """The two bodies cut open: meshes on the left, displacement on the right, the contact enlarged.
 
-The needle moves several micrometres as a rigid body while it is stopped.  The colour is the total
-displacement; across the contact only its normal part is continuous, since the surfaces slide.
-The magnified *shape* leaves the rigid closing motion out: magnified with it, the bodies would run
-through each other.  Next to the contact
-strains are so large that magnified elements turn inside out; they are left out.  The enlarged
-contact is drawn at true scale, where the surfaces do touch.
+The colour is the total displacement, with that of the needle as a rigid body, several micrometres;
+across the contact only its normal part is continuous, since the surfaces slide.  The magnified
+*shape* leaves the rigid closing motion out: magnified with it, the bodies would run through each
+other.  Next to the contact strains are so large that magnified elements turn inside out; they are
+left out.  The enlarged contact is drawn at true scale, where the surfaces do touch.
 """
 
 from dataclasses import replace
@@ -32,7 +31,7 @@ _INK = "#22262b"
 _VECTOR_LINES = 4000
 _MAP = "viridis"
 _SHOWN = 0.03
-"""Largest magnified displacement over the size of the picture, at most."""
+"""Largest magnified displacement over the size of the picture."""
 _CRUSHED = 0.2
 """Triangles that magnification leaves less than this share of their area are not drawn."""
 
@@ -83,7 +82,7 @@ def _note(study: ImpactStudy, factor: float) -> str:
 
 
 def _elastic(picture: SectionPicture) -> Floats:
-    """Displacement without the rigid closing motion, shape (n, 2) [m]."""
+    """Displacement (n, 2) [m] without the rigid closing motion."""
     return picture.displacement - np.array([0.0, picture.closing])
 
 
@@ -185,7 +184,6 @@ def _near(picture: SectionPicture, spot: Floats, reach: float) -> SectionPicture
 
 
 def _name(axes: Any, picture: SectionPicture, spot: Floats, reach: float) -> None:
-    """Name of the body where it fills the window."""
     centres = picture.points[picture.triangles].mean(axis=1)
     window = np.array([max(spot[0] - reach, 0.0), spot[1] - reach])
     middle = window + reach
@@ -208,7 +206,7 @@ def _name(axes: Any, picture: SectionPicture, spot: Floats, reach: float) -> Non
 
 
 def _rim(picture: SectionPicture) -> NDArray[np.int64]:
-    """Sides of triangles without a neighbour, the axis left out, shape (s, 2)."""
+    """Sides (s, 2) of triangles without a neighbour, the axis left out."""
     triangles = picture.triangles
     sides = np.sort(
         np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])

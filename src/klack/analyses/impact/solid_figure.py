@@ -1,8 +1,7 @@
 """Both bodies of an impact in space, cut open by a quarter: what is held and where they touch.
 
 In parallel projection, as meshed and placed at the start.  The cut goes through the axis of the
-contact: the middle of the ring of first touch, or of the contact face where all of it touches at
-once.
+contact: the middle of the ring of first touch, or of a contact face that touches all at once.
 """
 
 from dataclasses import dataclass
@@ -44,7 +43,6 @@ _TOUCHING = "contact faces"
 _LONGEST = 32
 """Characters of a name; of both names if all of the legend is to stand in one row."""
 _WIDTH = 720
-"""Pixels across the wider window; rows follow its shape."""
 _BELOW = 0.1
 """Room below the bodies, of their height, for the scale and the axes."""
 _TALLEST = 1.5
@@ -281,7 +279,6 @@ def _touch_look(touch: Floats) -> dict[str, Any]:
 
 
 def _draw_scale(axes: Any, window: Window) -> None:
-    """A bar of a round length in the lower right corner."""
     length = _round_length(0.3 * window.pixel * window.columns)
     end, height = 0.95 * window.columns, 0.04 * window.rows
     start = end - length / window.pixel
@@ -296,7 +293,6 @@ def _round_length(most: float) -> float:
 
 
 def _draw_axes(axes: Any, window: Window) -> None:
-    """Directions of x, y and z in the lower left corner."""
     foot = np.array([0.07, 0.045 * window.columns / window.rows]) * [window.columns, window.rows]
     size = 0.085 * window.columns
     for name, own in zip("xyz", _CAMERA.axes[:2].T, strict=True):

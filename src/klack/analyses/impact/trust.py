@@ -6,12 +6,10 @@ three impacts (docs, *full order*): with n steps per contact the peak force is l
 order also lengthens the periods of the bodies by :math:`(\omega h)^2 / 12`, which 26 steps per
 period keep below half a per cent; modal levels are exact there.
 
-Faces that meet all at once: found from gaps, speed and kept modes before any level runs.
-
-Where a large part of the force rises faster than the highest kept modes can follow, the faces press
-against the static remainder of these modes, which is a spring without mass, and the force
-overshoots and rings however many modes there are.  Bodies with every degree of freedom carry the
-front away.
+Where faces meet all at once, a large part of the force rises faster than the highest kept modes can
+follow: the faces press against the static remainder of these modes, which is a spring without mass,
+and the force overshoots and rings however many modes there are.  Bodies with every degree of
+freedom carry the front away.  Gaps, speed and kept modes tell this before any level runs.
 """
 
 from collections.abc import Iterable, Mapping
@@ -45,7 +43,7 @@ __all__ = [
 
 
 DISAGREEMENT = 0.02
-"""Largest difference of two levels [-] up to which they say the same."""
+"""Largest difference [-] of two levels that say the same."""
 
 STEPS_PER_CONTACT = 100
 """Fewest steps of a contact whose force is known."""
@@ -63,10 +61,7 @@ _KEYS = {"full": "run.full_step", "interface": "run.interface_step"}
 def best_level(results: Mapping[str, LevelResult]) -> str:
     """Level whose numbers are the answer: the finest one that nothing speaks against.
 
-    Parameters
-    ----------
-    results
-        Not empty.  The lumped model and variants of the reduced one are never better than another.
+    The lumped model and variants of the reduced one are never better than another.
     """
     variants = [name for name in results if name.startswith("reduced")]
     known = [name for name in (*_BEST, *variants, *results) if name in results]
@@ -90,12 +85,7 @@ def trust_notes(
 ) -> tuple[str, ...]:
     """Objections to levels, the level of the answer, and the levels it corrects.
 
-    Parameters
-    ----------
-    answer
-        Name of the best level.
-    deviations
-        From the best level.
+    ``answer`` is the best level, from which the deviations are.
     """
     doubted: dict[str, list[str]] = {}
     for name, result in results.items():
@@ -162,8 +152,6 @@ def doubts_of_history(
 
     Parameters
     ----------
-    measures
-        Of this history.
     step [s]
         Of the integration.
     key
@@ -214,7 +202,7 @@ def _shortest_contact(history: ImpactHistory, measures: ImpactMeasures) -> float
 
 
 def _rise(history: ImpactHistory, measures: ImpactMeasures) -> float:
-    """Time that the force takes from a tenth to half of the peak [s], before the peak."""
+    """Time [s] that the force takes from a tenth to half of the peak."""
     strongest = _phases(history, measures)[measures.strongest - 1]
     force = history.force[strongest.first : strongest.last]
     top = float(force.max())
@@ -295,7 +283,6 @@ def doubt_modal_levels(
 
 
 def _material(problem: ContactProblem, body: ElasticBody, solid: str) -> Material | None:
-    """Material at a face; None where it is only in matrices."""
     if problem.case.bodies[body.name].material is None:
         return None
     return problem.case.materials_of(body.name, body.mesh.solids)[solid]

@@ -69,7 +69,7 @@ def answer(study: ImpactStudy) -> str:
 
 
 def leaves_axis(study: ImpactStudy) -> bool:
-    """Whether axisymmetric bodies of this study met off their axis, at points on rings."""
+    """Whether axisymmetric bodies met off their axis, at points on rings."""
     level = study.levels.get("interface")
     in_plane = all(body.model == "axisymmetric" for body in study.bodies)
     if level is None or level.pressure is None or not in_plane:
@@ -78,14 +78,13 @@ def leaves_axis(study: ImpactStudy) -> bool:
 
 
 def which_contact(numbers: ImpactMeasures, number: int) -> str:
-    """Which contact of several in one impact a number belongs to, in brackets; empty for one."""
+    """Which of several contacts a number belongs to, in brackets; empty for one."""
     if numbers.sub_contacts < 2:
         return ""
     return f" (contact {number} of {numbers.sub_contacts} in quick succession)"
 
 
 def _started(study: ImpactStudy, numbers: ImpactMeasures) -> str:
-    """Speed at the start, where forces have changed it before touch."""
     if abs(numbers.approach_speed / study.speed - 1.0) < _SAME_SPEED:
         return ""
     return f", {study.speed:.3g} m/s at the start"
@@ -104,7 +103,6 @@ def verdict(result: LevelResult, deviation: Deviation) -> str:
 
 
 def _estimated(estimate: Deviation) -> str:
-    """Errors that one run of the interface level gives the reduced level."""
     return (
         f"Estimated error of this level: {signed_share(estimate.peak_force)} in peak force, "
         f"{signed_share(estimate.contact_time)} in contact time and "
@@ -120,7 +118,7 @@ _SHOWN = DEVIATION_MEASURES[:5]
 ESTIMATE_COLUMNS = ("", *(measure.name for measure in _SHOWN))
 
 GOOD, FAIR = 0.01, 0.05
-"""The largest error up to which a level counts as good, and as fair."""
+"""Largest errors up to which a level counts as good, and as fair."""
 
 
 def estimate_rows(study: ImpactStudy) -> tuple[tuple[str, ...], ...]:
@@ -141,7 +139,7 @@ def estimate_rows(study: ImpactStudy) -> tuple[tuple[str, ...], ...]:
 
 
 def estimate_sentence(study: ImpactStudy) -> str:
-    """Sentence on whether the reduced level can be used here; empty without an estimate."""
+    """Whether the reduced level can be used here; empty without an estimate."""
     if not study.estimates:
         return ""
     steps = ""

@@ -43,14 +43,14 @@ _LARGE = 0.1
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class YieldingFaces:
-    """How the faces of an impact yield: a law for reduced levels, a limit for contact points.
+    """How the faces of an impact yield.
 
     Parameters
     ----------
     loops
-        For the law of reduced levels; None where they are elastic.
+        For the law of reduced levels.
     limit
-        For the contact points of the interface level; None where they are elastic.
+        For the contact points of the interface level.
     """
 
     loops: YieldingLoops | None
@@ -62,15 +62,7 @@ class YieldingFaces:
     ) -> "YieldingFaces":
         """Faces of an impact whose levels have a law, contact points, or both.
 
-        Parameters
-        ----------
-        problem
-            With its factorisations.
-
-        Warns
-        -----
-        AccuracyWarning
-            Where yield is left out though the materials have it.
+        Warns where yield is left out though the materials have it.
         """
         laws = laws and isinstance(problem.case.contact.local_law, ConsistentLocalLaw)
         loops = problem.yielding(progress) if laws or points else None
@@ -81,31 +73,15 @@ class YieldingFaces:
 
 
 def elastic_twin(problem: ContactProblem, pair: ReducedPair) -> ImpactHistory:
-    """Impact of the same reduced bodies with faces that do not yield.
-
-    Parameters
-    ----------
-    pair
-        With the consistent law.
-    """
+    """Impact of the same reduced bodies, with the consistent law, whose faces do not yield."""
     assert pair.local is not None
     return simulate_bodies(problem.case, pair.upper, pair.lower, pair.local.law)
 
 
 def tell_yield(result: LevelResult, elastic: ImpactHistory, surfaces: str) -> None:
-    """Say what the yield of the faces does to the first impact.
+    """Warn where the yield of the faces does more than elastic levels may miss.
 
-    Parameters
-    ----------
-    result
-        With the law of faces that yield.
-    elastic
-        Of the same bodies, elastic.
-
-    Warns
-    -----
-    AccuracyWarning
-        Where that is more than what elastic levels may miss.
+    ``result`` has the law of faces that yield.
     """
     lost = yield_share(result)
     if lost < SMALL_YIELD:
@@ -125,12 +101,7 @@ def tell_yield(result: LevelResult, elastic: ImpactHistory, surfaces: str) -> No
 def doubt_large_strain(result: LevelResult, loops: YieldingLoops) -> LevelResult:
     """Level with a doubt where the faces yield further than small strain holds.
 
-    Parameters
-    ----------
-    result
-        With the law of faces that yield.
-    loops
-        Behind that law.
+    ``loops`` are behind the law of the level.
     """
     strains = [state.plastic_strain for state in loops.states]
     strain = float(np.interp(result.measures.peak_force, loops.force, strains))
@@ -148,10 +119,7 @@ def doubt_elastic_levels(
 ) -> dict[str, LevelResult]:
     """Levels with a doubt on those of elastic bodies, where yield matters.
 
-    Parameters
-    ----------
-    yielding
-        Names of the levels that have yield.
+    ``yielding`` names the levels that have yield.
     """
     lost = max((yield_share(results[name]) for name in yielding if name in results), default=0.0)
     if lost < SMALL_YIELD:

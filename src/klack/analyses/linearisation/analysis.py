@@ -1,4 +1,4 @@
-"""A linearisation for scripts and terminals, and on disk; see :mod:`klack.analyses.store`.
+"""A linearisation in words and numbers, and on disk.
 
 ``result.zarr/study/A`` is the matrix of the states.
 """
@@ -130,7 +130,7 @@ LINEAR_MODEL = JsonForm(
 
 
 def stability_text(record: LinearModel) -> str:
-    """In plain words whether the point is stable."""
+    """Whether the point is stable, in words."""
     up_to = f" up to {format_si(record.band, 'Hz', 3)}" if record.has_lines else ""
     if record.growing:
         worst = max(record.growing, key=lambda mode: mode.real)
@@ -233,7 +233,7 @@ def sweep_rows(swept: StabilitySweep) -> list[tuple[str, ...]]:
 
 
 def linear_model_told(record: LinearModel) -> Iterator[TextTable | str]:
-    """What a terminal shows: the verdict, the point, the eigenvalues, margins."""
+    """The verdict, the point, the eigenvalues, margins."""
     drive = ", ".join(f"{name} at {format_si(i, 'A')}" for name, i in record.drive.items())
     yield TextTable(
         title=f"Operating point, {record.variant}: {drive or 'no coil'}",

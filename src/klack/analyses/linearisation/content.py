@@ -27,7 +27,7 @@ __all__ = ["linear_charts", "linear_model_content", "write_files"]
 
 
 def write_files(record: LinearModel, folder: Path) -> tuple[str, ...]:
-    """Write all of them into a folder; returns their names."""
+    """Write all of them into a folder; return their names."""
     content = _content(record)
     np.savez_compressed(folder / "linear-model.npz", **content)
     cells = {
@@ -102,7 +102,6 @@ _WORDS = ("states", "state_units", "inputs", "input_units", "outputs", "output_u
 
 
 def _content(record: LinearModel) -> dict[str, Any]:
-    """Matrices and names, as they are in every format."""
     signals = {"state": record.states, "input": record.inputs, "output": record.outputs}
     return {
         "A": record.A,

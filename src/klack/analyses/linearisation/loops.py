@@ -52,14 +52,7 @@ def pid_loop(
 ) -> tuple[Callable[[float], complex], float]:
     """Open loop of a controller over the frequency [Hz], and half its sampling rate [Hz].
 
-    Parameters
-    ----------
-    name
-        Of the component.
-    network
-        As the case has it, with its drivers.
-    rows
-        Of the operating point.
+    ``network`` has its drivers.
 
     Raises
     ------
@@ -97,7 +90,6 @@ def pid_loop(
 
 
 def _actuator(name: str, network: Network, rows: Rows) -> str:
-    """Input of the linear model that a controller sets."""
     for node in network.nodes:
         if any(joint.component == name for joint in node.having(Role.VOLTAGE)):
             return f"{node.having(Role.COIL)[0].component}.voltage"
@@ -150,7 +142,7 @@ Vector = NDArray[np.float64]
 def return_ratio(
     system: LinearSystem, output: int, source: int, sign: float
 ) -> Callable[[float], complex]:
-    """Open loop through one output, which adds ``sign`` times itself to one input, over [Hz]."""
+    """Open loop over [Hz] through one output, which adds ``sign`` times itself to one input."""
 
     def opened(frequency: float) -> complex:
         T = sign * complex(next(transfer(system, np.array([frequency])))[output, source])
@@ -160,14 +152,9 @@ def return_ratio(
 
 
 def loop_margins(name: str, opened: Callable[[float], complex], axis: Vector) -> LoopMargins:
-    """Margins of an open loop, closed by -1.
+    """Margins of an open loop over the frequency [Hz], closed by -1.
 
-    Parameters
-    ----------
-    opened
-        Over the frequency [Hz].
-    axis [Hz]
-        Between whose points the crossings are searched.
+    Crossings are searched between the points of ``axis`` [Hz].
     """
     L = np.array([opened(float(f)) for f in axis])
     gain = _nearest(

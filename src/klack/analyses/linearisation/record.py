@@ -1,4 +1,4 @@
-"""Record of a linearisation: matrices, eigenvalues, responses, margins, and the point itself."""
+"""Record of a linearisation."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ Matrix = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SignalName:
-    """A state, input or output: name and SI unit."""
+    """State, input or output: name and SI unit."""
 
     name: str
     unit: str
@@ -147,7 +147,7 @@ class StabilitySweep:
         Real part of its eigenvalue.
     frequency [Hz]
     damping [-]
-    unstable : array of int
+    unstable
         Number of eigenvalues that grow, those without oscillation among them; -1 where there is no
         point.
     failures
@@ -180,7 +180,7 @@ class LinearModel(CaseRecord):
     band [Hz]
         Up to which the matrices and the eigenvalues hold where there are lines.
     delays [s]
-        Of the segments of lines, both directions; empty without lines.
+        Of the segments of lines, both directions.
     A, B, C, D
         Without delays: those of lines are all-passes.
     eigenvalues
@@ -195,7 +195,7 @@ class LinearModel(CaseRecord):
     sweeps
         None or one.
     cpu_time [s]
-        Processor time without bodies and contact laws.
+        Without bodies and contact laws.
     """
 
     variant: str

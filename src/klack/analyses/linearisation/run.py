@@ -78,13 +78,7 @@ class LinearPoint:
 
 
 def linear_point(found: PointFound, held: Sequence[str] = ()) -> LinearPoint:
-    """Linearise the network of an operating point.
-
-    Raises
-    ------
-    InputError
-        For what has no linear law there.
-    """
+    """Linearise the network of an operating point; InputError for what has no linear law there."""
     network, step = compiled_at(found.rows, found.point)
     drives: dict[str, tuple[str, Rows]] = {}
     for name, coil in coils_of(found.network).items():
@@ -129,13 +123,13 @@ def run_linearisation(
     ----------
     base
         Drive and lift of the operating point.
-    origin : "start" or "far"
+    origin
         Where the search for the point begins.
     band [Hz]
         Up to which matrices and eigenvalues hold where there are lines.
     sources, targets
         Inputs and outputs between which the frequency response is wanted.
-    frequencies : (float, float), optional [Hz]
+    frequencies [Hz]
     loops
         Outputs at which a loop is opened for its margins.
     tree
@@ -146,7 +140,7 @@ def run_linearisation(
     Raises
     ------
     InputError
-        For unknown names, a valve in three dimensions, or a point that has no linear law.
+        Also for a valve in three dimensions, or a point that has no linear law.
     ConvergenceError
         If there is no operating point.
     """
@@ -319,7 +313,6 @@ def _place(option: str, signals: Sequence[Signal], name: str, others: Iterable[s
 def _pairs(
     system: LinearSystem, sources: Sequence[str], targets: Sequence[str]
 ) -> list[tuple[int, int]]:
-    """Places of inputs and outputs, every one with every other."""
     into = [_place("--from", system.inputs, name) for name in sources]
     out = [_place("--to", system.outputs, name) for name in targets]
     if bool(into) != bool(out):

@@ -1,7 +1,6 @@
-"""The numbers of a noise study that a script or a terminal wants, and how they are stored.
+"""A noise study in words and numbers, and on disk.
 
-``result.zarr/study/designs/0/sound/pressure/values`` is the sound pressure of one click; see
-:mod:`klack.analyses.store`.
+``result.zarr/study/designs/0/sound/pressure/values`` is the sound pressure of one click.
 """
 
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 r"""What the forces of the stops do to one held body: energy, mobility, hold, radiation.
 
-What a valve balances within itself, and what it shows to the outside.
-
 Springs, magnets and fluid push the needle from the same housing that the needle hits.  As long as
 nothing but the needle moves, the resultant of all forces on the housing is minus the mass times
 acceleration of the needle,
@@ -53,7 +51,7 @@ _SMALLEST = 1e-30
 
 
 def net_share(net: TimeSeries | None, bands: Sequence[ThirdOctaves]) -> Floats:
-    """Share of the energy of all stops per band that is not balanced, shape (b,).
+    """Share (b,) of the energy of all stops per band that is not balanced.
 
     Parameters
     ----------
@@ -104,7 +102,6 @@ class Surroundings:
 
     Parameters
     ----------
-    efficiency : "piston" or "unity"
     period [s]
         From click to click.
     share (b,) [-]
@@ -127,15 +124,14 @@ def body_noise(
     stop_forces: Mapping[str, TimeSeries],
     around: Surroundings,
 ) -> BodyNoise | None:
-    """Vibration and radiation of one body; None if no stop pushes it.
+    """Vibration and radiation of one body, if a stop pushes it.
 
     Parameters
     ----------
     structure
         Rigidly held, as the forces were computed.
-    stop_forces : mapping of stop to TimeSeries [N]
-    around
-        Of the radiation.
+    stop_forces [N]
+        By stop.
     """
     forces = port_forces(structure, stop_forces)
     if not forces:
@@ -231,7 +227,7 @@ def port_transfers(
 
 
 def damped(structure: Structure) -> Structure:
-    """Give modes without damping the assumed one; without end they would ring, and radiate."""
+    """Give modes without damping the assumed one; they would ring, and radiate, without end."""
     if np.all(structure.damping > 0.0):
         return structure
     damping = np.where(structure.damping > 0.0, structure.damping, ASSUMED_DAMPING)

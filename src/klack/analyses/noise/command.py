@@ -70,7 +70,6 @@ def noise(
 
 
 def _cases(paths: Sequence[Path], own: "OwnComponents") -> "list[AnyCase | None]":
-    """Read every case before the long work begins; None for stored results."""
     from klack.case.any_case import load_any_case
     from klack.case.reader import find_case
 

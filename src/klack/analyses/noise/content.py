@@ -1,4 +1,4 @@
-"""What a noise report says, before it is laid out: the same words for screen and paper."""
+"""Content of a noise report."""
 
 from math import isfinite
 
@@ -37,7 +37,7 @@ __all__ = ["noise_content"]
 
 
 def noise_answer(study: NoiseStudy) -> str:
-    """Say in plain words how loud the first design is, and how the others differ from it."""
+    """How loud the first design is, and how the others differ from it."""
     first = study.reference
     stop = strongest(first)
     begin = f"One {first.kind} of '{first.name}'" if len(study.designs) > 1 else f"One {first.kind}"
@@ -123,7 +123,6 @@ def _forces(study: NoiseStudy) -> tuple[Chart, ...]:
 
 
 def _number_table(study: NoiseStudy) -> Table:
-    """Quantities down, designs across; the difference from the first one stands below."""
     first, *others = study.designs
     rows = []
     for measure in DESIGN_MEASURES:
@@ -178,7 +177,6 @@ def _listen(study: NoiseStudy) -> Section:
 
 
 def _force_table(study: NoiseStudy) -> Table:
-    """Per stop and design: impacts, impulse, level, where most of the energy is."""
     rows = []
     for design in study.designs:
         for stop in design.stops:
@@ -210,7 +208,6 @@ def _force_table(study: NoiseStudy) -> Table:
 
 
 def _energy(study: NoiseStudy) -> Section:
-    """Structure-borne energy of every body, by time and by frequency."""
     rows = []
     for design, body in _bodies(study):
         whose = f"{design.name}, " if len(study.designs) > 1 else ""

@@ -1,4 +1,4 @@
-"""The figures of a noise report, each built from a study by one function.
+"""Figures of a noise report.
 
 One colour and dash per design; the first design is the one that the others are compared with.
 """
@@ -206,7 +206,6 @@ def _same_bands(one: NoiseDesign, other: NoiseDesign) -> bool:
 def _steps(
     octaves: ThirdOctaves, values: Floats, index: int, label: str, *, listed: bool = False
 ) -> Curve:
-    """Values as steps from band edge to band edge."""
     edges = 1e-3 * np.append(octaves.low, octaves.high[-1])
     heights = np.append(values, values[-1])
     return look_of(index).curve(edges, heights, label, listed=listed, drawn="steps")
@@ -244,7 +243,7 @@ def _compared(
 
 
 def _limits(study: NoiseStudy) -> tuple[float, float]:
-    """Frequencies between which every design can be believed [Hz]; nan if no limit is known."""
+    """Frequencies [Hz] between which every design can be believed; nan if no limit is known."""
     tops = [d.valid_up_to for d in study.designs if np.isfinite(d.valid_up_to)]
     return max(d.valid_from for d in study.designs), min(tops, default=float("nan"))
 

@@ -2,14 +2,10 @@
 
 A stroke records the force of a stop in every fine step near an impact, and as means over longer
 records all the time.  Both are joined on the grid of the fine steps: fine steps as they are, and in
-the rest of a record the impulse that is left over from its mean.  So the impulse of every record is
-that of the run, through flight, impact, and rest on the stop.
+the rest of a record the impulse that is left over from its mean.
 
-Forces of magnets and fluid on the housing are not among them.
-
-The part of a long stroke whose noise is followed: as much as fits into memory and time.
-
-Forces are followed to the ear in fine steps, three billion of which make a minute.
+Forces of magnets and fluid on the housing are not among them.  Three billion fine steps make a
+minute: of a long stroke as much is followed as fits into memory and time.
 """
 
 from collections.abc import Mapping, Sequence
@@ -43,12 +39,8 @@ _PER_STEP = 250.0  # bytes at most while one body is followed, all stops togethe
 def first_part(result: NetworkResult, most: int = _MOST_STEPS) -> tuple[NetworkResult, str]:
     """Cut a run off after so many fine steps; with words for that, empty if it is short enough.
 
-    An impact that the cut leaves without its end is one in which the run ends.
-
-    Raises
-    ------
-    InputError
-        If all impacts come later, a single record is longer, or it does not fit into the memory.
+    An impact that the cut leaves without its end is one in which the run ends.  InputError if all
+    impacts come later, a single record is longer, or it does not fit into the memory.
     """
     spacing = float(result.time[1] - result.time[0])
     size, records = round(spacing / result.step), result.time.size - 1
@@ -123,7 +115,7 @@ _ROUND_OFF = 1e-3  # of a fine step, whose parts are longer
 
 
 def impact_force(history: ImpactHistory) -> TimeSeries:
-    """Contact force of an impact [N], means over its intervals, with a zero before the start."""
+    """Contact force [N] of an impact, means over its intervals, with a zero before the start."""
     series = force_series(history)
     return TimeSeries(
         step=series.step,
@@ -175,13 +167,7 @@ def stop_forces(result: NetworkResult) -> Mapping[str, TimeSeries]:
 
 
 def stop_force(result: NetworkResult, stop: str) -> TimeSeries:
-    """Contact and film force of one stop [N], means over fine steps, above zero when it presses.
-
-    Parameters
-    ----------
-    stop
-        Component.
-    """
+    """Contact and film force [N] of one stop, means over fine steps, above zero when it presses."""
     step = result.step
     start, spacing = float(result.time[0]), float(result.time[1] - result.time[0])
     size = round(spacing / step)  # fine steps of a record

@@ -1,8 +1,4 @@
-"""What one noise study leaves behind: from the force of every stop to the sound of a click.
-
-The numbers are plain arrays and small frozen records, so that a stored study can be reported again
-without the solver.
-"""
+"""Record of a noise study: from the force of every stop to the sound of a click."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -46,7 +42,7 @@ class StopForce:
         Means over steps, above zero when it presses.
     first [N]
         The strongest impact alone.
-    frequency, level : array, shape (k,) [Hz], [dB re 1 uN s]
+    frequency, level (k,) [Hz], [dB re 1 uN s]
         Magnitude of the Fourier integral of the strongest impact.
     bands
         Energies of the whole record, from 20 Hz to 200 kHz [N^2 s].
@@ -71,10 +67,10 @@ class Surface:
     ----------
     points (n, dimension) [m]
         (r, z) or (x, y, z).
-    faces : int array, shape (f, 2) or (f, 3 or 4)
+    faces (f, 2) or (f, 3 or 4)
     face_group (f,)
-    velocity : float32 array, shape (b, f) [m/s]
-        Normal velocity in each band, rms over one period of the drive pattern.
+    velocity (b, f) [m/s]
+        Normal velocity, rms over one period of the drive pattern.
     """
 
     points: Floats
@@ -109,7 +105,7 @@ class BodyNoise:
     residual [-]
         Of the balance of energy, over the energy turned over.
     assumed
-        Whether the damping that radiation takes is assumed, because the case gives none.
+        Whether the damping that radiation takes is assumed.
     frequency (k,) [Hz]
     mobility (p, p, k) [m/s/N]
         Drive-point on the diagonal, transfer beside it.
@@ -160,15 +156,12 @@ class ClickSound:
     Parameters
     ----------
     pressure [Pa]
-        Of one click, free field, at :attr:`NoiseSettings.distance`.
-    statistics
-        Of one click.
+        Of one click, as ``statistics`` and ``loudness``; free field, at
+        :attr:`NoiseSettings.distance`.
     bands [Pa^2 s]
         Sound exposures of one click.
     pattern
         Of the drive pattern, over whole periods.
-    loudness
-        Of one click.
     prominence
         Of the drive pattern; None in results of former versions.
     """
@@ -228,21 +221,17 @@ class NoiseDesign:
         What a legend says; what was run, in words.
     kind
         ``"impact"`` or ``"stroke"``.
-    case, case_text, run
-        ``run`` names the variant or level.
+    run
+        Name of the variant or level.
     valid_from, valid_up_to [Hz]
         One over the record, 0 if every force ends as it began; lowest of the highest kept modes of
         the bodies, nan without any.
     net_share (b,) [-]
         Share of the energy of the forces per band that springs, magnets and fluid do not balance
-        within the valve: (mass times acceleration of the needle)^2 over the forces squared.
-        Radiated energy, surface velocity and sound have it.
+        within the valve (:mod:`klack.analyses.noise.body`).  Radiated energy, surface velocity and
+        sound have it.
     bodies
-        Empty if there is no elastic held body.
-    sound
-        None without bodies.
-    own_components
-        See :class:`klack.analyses.stroke.record.StrokeStudy`.
+        Elastic held ones; without any there is no sound.
     """
 
     name: str
@@ -279,7 +268,7 @@ class NoiseDesign:
 
     @property
     def balanced_below(self) -> float:
-        """Frequency below which half of the forces or more is balanced in the valve [Hz]; or 0."""
+        """Frequency [Hz] below which half of the forces or more is balanced in the valve; or 0."""
         balanced = np.flatnonzero(self.net_share < 0.5)
         return float(self.stops[0].bands.high[balanced[-1]]) if balanced.size else 0.0
 
@@ -294,7 +283,7 @@ class NoiseDesign:
 
     @property
     def injected_energy(self) -> float:
-        """Structure-borne energy through all ports of held bodies [J]; nan without bodies."""
+        """Structure-borne energy [J] through all ports of held bodies; nan without bodies."""
         return self._over_bodies(lambda body: body.injected.sum())
 
     @property
@@ -320,13 +309,7 @@ class NoiseDesign:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class NoiseStudy(Record):
-    """One design, or several side by side; the first one is the one to compare with.
-
-    Parameters
-    ----------
-    wall_time : float [s]
-        Of the noise chain, without the runs before.
-    """
+    """One design, or several; ``wall_time`` is that of the noise chain, without the runs before."""
 
     designs: tuple[NoiseDesign, ...]
 

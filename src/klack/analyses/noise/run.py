@@ -58,7 +58,7 @@ def run_noise(
     names: Sequence[str] = (),
     progress: Progress = silent,
 ) -> NoiseStudy:
-    """Follow the noise of some runs from force to ear, and lay them side by side.
+    """Follow the noise of some runs from force to ear, and compare them.
 
     Parameters
     ----------
@@ -67,17 +67,6 @@ def run_noise(
     names
         Of the designs, each different; by default case and run of each source, and a number
         where they repeat.
-    progress
-        Called with stage and fraction.
-
-    Returns
-    -------
-    NoiseStudy
-
-    Raises
-    ------
-    InputError
-        Without a source, and for names that are not one for each, all different.
     """
     begin = perf_counter()
     names = _design_names(sources, names)
@@ -100,16 +89,10 @@ def run_noise(
 def click_sound(
     source: NoiseSource, transfers: Transfers, bands: Sequence[ThirdOctaves] | None = None
 ) -> TimeSeries | None:
-    """Sound pressure of one click: a part of :func:`noise_design`, in a fifth of its time.
+    """Sound pressure of one click, if anything radiates.
 
-    None if nothing radiates.
-
-    Parameters
-    ----------
-    transfers
-        Of its structures, as far as they are known.
-    bands
-        Of the forces of its stops, where they are known.
+    A part of :func:`noise_design`, in a fifth of its time; ``transfers`` of its structures and
+    ``bands`` of the forces of its stops are used where known.
     """
     if bands is None:
         bands = [force_bands(stop.force) for stop in source.stops]
@@ -293,7 +276,6 @@ def _settings(source: NoiseSource) -> NoiseSettings:
 
 
 def _pressure(source: NoiseSource, around: Surroundings, transfers: Transfers) -> TimeSeries | None:
-    """Sound pressure of all ports of all bodies; None without any that radiates."""
     forces = {stop.name: stop.force for stop in source.stops}
     parts = [
         click_pressure(

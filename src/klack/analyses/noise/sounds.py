@@ -1,4 +1,4 @@
-"""Sound files of a noise study: one click and the drive pattern of every design, to one scale."""
+"""Sound files of a noise study, to one scale."""
 
 import re
 from pathlib import Path
@@ -15,7 +15,7 @@ StudySound = tuple[str, NoiseDesign, TimeSeries]
 
 
 def study_sounds(study: NoiseStudy) -> tuple[StudySound, ...]:
-    """Every sound of a study: of each design one click, then its drive pattern [Pa]."""
+    """Of each design one click, then its drive pattern [Pa]."""
     found: list[StudySound] = []
     for design in study.designs:
         if design.sound is None:
@@ -33,13 +33,7 @@ def common_full_scale(sounds: tuple[StudySound, ...]) -> float:
 
 
 def write_sounds(study: NoiseStudy, folder: Path) -> tuple[str, ...]:
-    """Write every sound as a WAV file of 24 bit and 48 kHz, all to the same full scale.
-
-    Returns
-    -------
-    tuple of str
-        Names of the files.
-    """
+    """Write every sound as a WAV file of 24 bit and 48 kHz, to one full scale; return the names."""
     sounds = study_sounds(study)
     scale = common_full_scale(sounds)
     for name, _, pressure in sounds:

@@ -79,8 +79,6 @@ class NoiseSource:
         Lowest of the highest kept modes of all bodies; nan for rigid ones.
     given
         Whether the case has a section ``noise``.
-    own_components
-        See :class:`klack.analyses.stroke.record.StrokeStudy`.
     """
 
     kind: str
@@ -106,15 +104,8 @@ class NoiseSource:
 def load_sources(folder: Path, names: Sequence[str] = ()) -> tuple[NoiseSource, ...]:
     """Take forces and bodies from a stored result of an impact or a stroke.
 
-    Parameters
-    ----------
-    names
-        Variants or levels; the best one of an impact and the first one of a stroke without.
-
-    Raises
-    ------
-    InputError
-        If it is another kind of result, or holds no such variant or level.
+    ``names`` are variants or levels; the best one of an impact and the first one of a stroke
+    without.
     """
     analysis = analysis_in(folder)
     if analysis.form.kind not in (ImpactStudy, StrokeStudy):
@@ -123,13 +114,7 @@ def load_sources(folder: Path, names: Sequence[str] = ()) -> tuple[NoiseSource, 
 
 
 def sources_of(record: object, names: Sequence[str] = ()) -> tuple[NoiseSource, ...]:
-    """Take forces and bodies from the record of an impact or a stroke.
-
-    Raises
-    ------
-    InputError
-        If it is another kind of record, or holds no such variant or level.
-    """
+    """Take forces and bodies from the record of an impact or a stroke."""
     if isinstance(record, ImpactStudy):
         return impact_sources(record, names)
     if isinstance(record, StrokeStudy):
@@ -155,10 +140,8 @@ def run_sources(
 ) -> tuple[NoiseSource, ...]:
     """Run a case and take forces and bodies from it.
 
-    Parameters
-    ----------
-    names
-        Levels of an impact, ``reduced`` without; variants of a stroke, the first one without.
+    ``names`` are levels of an impact, ``reduced`` without; variants of a stroke, the first one
+    without.
     """
     if isinstance(case, ValveCase):
         variants = tuple(names) or case.run.variants[:1]
@@ -236,7 +219,7 @@ def stroke_sources(
 ) -> tuple[NoiseSource, ...]:
     """Forces of all stops of a stroke, in some variants; in the first one without.
 
-    The section ``noise`` and the materials are those of the text of the study, or of ``case``.
+    ``case`` as for :func:`impact_sources`.
     """
     _require_structures(study)
     wanted = tuple(variants) or (study.reference.name,)
@@ -330,7 +313,7 @@ def _end(event: ImpactEvent) -> float:
 
 
 def net_force(study: StrokeStudy, variant: StrokeVariant) -> TimeSeries | None:
-    """Mass times acceleration of the centre of mass of the needle [N], in records."""
+    """Mass times acceleration [N] of the centre of mass of the needle, in records."""
     masses = [body.mass for body in study.bodies if body.name == study.needle]
     speed = variant.channel(study.channels.velocity)
     if not masses or speed is None:
@@ -373,7 +356,7 @@ def _contact_notes(contacts: Sequence[ContactSummary | StopSummary]) -> tuple[st
 
 
 def _yield_notes(result: LevelResult) -> tuple[str, ...]:
-    """Say that faces were new, where their yield took more than elastic levels may miss."""
+    """Note that faces were new, where their yield took more than elastic levels may miss."""
     share = yield_share(result)
     if share < SMALL_YIELD:
         return ()
@@ -431,10 +414,7 @@ def _kept_up_to(bodies: Sequence[BodySummary]) -> float:
 def _noise_of(
     text: str, case: Case | ValveCase | None
 ) -> tuple[CaseNoise, bool, Mapping[str, CaseMaterial]]:
-    """Section ``noise``, whether it is given, and materials: of a case, or of its text.
-
-    The text was checked when it was run.
-    """
+    """Section ``noise``, whether it is given, and materials: of a case, or of its text."""
     if case is not None:
         return case.noise or CaseNoise(), case.noise is not None, case.materials
     data = YAML(typ="safe").load(text)  # faster than the reader of cases, which knows the lines

@@ -39,7 +39,7 @@ _MOST = 4  # pictures side by side
 
 
 def shown_bands(study: NoiseStudy) -> tuple[int, ...]:
-    """Indices of the bands in which the bodies radiate most: of what can be heard, and of all."""
+    """Bands in which the bodies radiate most: of what can be heard, and of all."""
     designs = [design for design in study.designs if design.bodies]
     if not designs:
         return ()
@@ -52,7 +52,7 @@ def shown_bands(study: NoiseStudy) -> tuple[int, ...]:
 
 
 def surface_figure(study: NoiseStudy) -> Picture | None:
-    """Draw all bodies of every design in the loudest bands; None without bodies."""
+    """Draw all bodies of every design in the loudest bands."""
     designs = [design for design in study.designs if design.bodies]
     if not designs:
         return None
@@ -157,7 +157,7 @@ def _draw_solids(axes: Any, bodies: Sequence[BodyNoise], band: int, scale: Norma
 
 
 def _normals(corners: Floats) -> Floats:
-    """Outward normals of faces, shape (f, 3); a quadrangle that repeats a corner is a triangle."""
+    """Outward normals (f, 3) of faces; a quadrangle that repeats a corner is a triangle."""
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     size = np.linalg.norm(normals, axis=1, keepdims=True)
     return np.asarray(normals / np.maximum(size, 1e-300))

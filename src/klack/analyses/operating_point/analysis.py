@@ -1,4 +1,4 @@
-"""Operating points for scripts and terminals, and on disk; see :mod:`klack.analyses.store`.
+"""Operating points in words and numbers, and on disk.
 
 ``result.zarr/study/quantities/0/values`` is the first quantity at every point.
 """
@@ -74,7 +74,7 @@ OPERATING_POINTS = JsonForm(
 
 
 def operating_point_told(record: OperatingPoints) -> Iterator[TextTable | str]:
-    """What a terminal shows: the table of one point, or the main quantities along a sweep."""
+    """The table of one point, or the main quantities along a sweep."""
     drive = ", ".join(f"{name} at {format_si(i, 'A')}" for name, i in record.drive.items())
     title = f"{record.variant}: " + (drive or "no coil")
     if not record.swept:
@@ -160,7 +160,6 @@ def shown_quantities(record: OperatingPoints) -> list[PointQuantity]:
 
 
 def _same(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
-    """Whether a quantity is nothing but what was swept."""
     known = np.isfinite(one)
     return bool(np.allclose(one[known], other[known], rtol=1e-9, atol=0.0))
 

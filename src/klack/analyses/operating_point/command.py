@@ -19,7 +19,7 @@ def show_operating_points(
     component: Components,
     asked: WantedResult,
 ) -> int:
-    """Find the operating points that were asked for, write and print them; the exit code."""
+    """Find operating points, write and print them; return the exit code."""
     with show_progress(asked.quiet):
         from klack.analyses.operating_point.analysis import OPERATING_POINT
         from klack.analyses.operating_point.conditions import (

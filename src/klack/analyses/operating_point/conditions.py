@@ -1,4 +1,4 @@
-"""What is held constant at an operating point, and what a sweep changes, as the user writes it."""
+"""What is constant at an operating point, and what a sweep changes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -24,7 +24,6 @@ Origin = Literal["start", "far"]
 
 _MOST_POINTS = 2000
 _OWN: Mapping[str, Kind] = {"lift": LENGTH, "current": CURRENT, "voltage": VOLTAGE}
-"""Quantities of a sweep that are no keys of a case."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,11 +32,11 @@ class Conditions:
 
     Parameters
     ----------
-    current, voltage : mapping of str to float [A], [V]
+    current, voltage [A], [V]
         By coil; an empty name stands for every coil.
     lift [m]
         At which the needle is held; None lets it find its place.
-    changes : mapping of Key to str or float
+    changes
         What stands in the case instead.
     """
 
@@ -49,10 +48,7 @@ class Conditions:
     def currents(self, network: Network, usual: Mapping[str, float]) -> dict[str, float]:
         """Current of each coil [A]: as stated, else that of the start of a run.
 
-        Raises
-        ------
-        InputError
-            For an unknown coil, or one with current and voltage.
+        InputError for an unknown coil, or one with current and voltage.
         """
         coils = coils_of(network)
         for name in (*self.current, *self.voltage):
@@ -87,12 +83,7 @@ class Conditions:
 class Sweep:
     """A quantity and the values that it takes.
 
-    Parameters
-    ----------
-    name
-        Key of the case, or one of ``lift``, ``current``, ``voltage``.
-    place
-        Of a key.
+    ``name`` is a key of the case, with its ``place``, or one of ``lift``, ``current``, ``voltage``.
     """
 
     name: str
@@ -113,12 +104,7 @@ class Sweep:
 
 
 def stated_drive(texts: Sequence[str], option: str, kind: Kind) -> dict[str, float]:
-    """Values by coil from ``"3 A"`` or ``"coil=3 A"``; an empty name stands for all coils.
-
-    Raises
-    ------
-    InputError
-    """
+    """Values by coil from ``"3 A"`` or ``"coil=3 A"``; an empty name stands for all coils."""
     found: dict[str, float] = {}
     for text in texts:
         name, _, value = text.rpartition("=")
@@ -136,12 +122,7 @@ def stated_drive(texts: Sequence[str], option: str, kind: Kind) -> dict[str, flo
 def asked_sweeps(
     case: ValveCase, tree: CaseTree, given: Sequence[tuple[str, str, str, int]]
 ) -> tuple[Sweep, ...]:
-    """Check key, ends and number of points of every sweep.
-
-    Raises
-    ------
-    InputError
-    """
+    """Check key, ends and number of points of every sweep."""
     if len(given) > 2:
         raise _refused("--sweep", f"{len(given)} sweeps", "one or two", "leave the others out.")
     sweeps = tuple(_sweep(case, tree, *row) for row in given)

@@ -72,11 +72,6 @@ def sweep_charts(
         Quantity on the x axis, ``"component quantity"``; the first swept one by default.
     shown
         Quantities to draw; the main ones by default.
-
-    Raises
-    ------
-    InputError
-        For a quantity that the record does not have.
     """
     if not record.swept:
         return ()

@@ -21,14 +21,9 @@ _NONE_AT_REST = ("velocity", "peak force", "film force", "driver state", "flow",
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Measured:
-    """Numbers of one operating point.
+    """Numbers of one operating point: ``values`` by component, quantity and unit.
 
-    Parameters
-    ----------
-    values : mapping of (component, quantity, unit) to float
-    force_left [N]
-    flow_left [m^3/s]
-    voltage_left [V]
+    What is left: ``force_left`` [N], ``flow_left`` [m^3/s], ``voltage_left`` [V].
     """
 
     values: Mapping[Key, float]

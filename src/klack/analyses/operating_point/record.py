@@ -40,12 +40,7 @@ class SweptQuantity:
 class PointQuantity:
     """One quantity of a component at every point.
 
-    Parameters
-    ----------
-    unit
-        SI.
-    values (points,)
-        nan at a point that was not found, or that does not have it.
+    ``values`` (points,) [SI] are nan at a point that was not found, or that does not have it.
     """
 
     component: str
@@ -89,7 +84,7 @@ class OperatingPoints(CaseRecord):
     doubts
         What has to be known of each point, one line each.
     cpu_time [s]
-        Processor time of all points, without bodies and contact laws.
+        Of all points, without bodies and contact laws.
     """
 
     variant: str
@@ -116,5 +111,5 @@ class OperatingPoints(CaseRecord):
         return np.array([not text for text in self.failures], dtype=bool)
 
     def quantity(self, name: str) -> PointQuantity | None:
-        """Quantity by ``"component quantity"``; None if there is none."""
+        """Quantity by ``"component quantity"``."""
         return next((item for item in self.quantities if item.name == name), None)

@@ -70,14 +70,7 @@ _BEYOND = 1e-9  # of the travel: a lift that lies on its stop
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PointFound:
-    """An operating point, and what has to be known of it.
-
-    Parameters
-    ----------
-    network
-        With everything that drives it constant.
-    currents [A]
-    """
+    """An operating point, its network with constant drives, and what has to be known of it."""
 
     point: OperatingPoint
     network: Network
@@ -103,21 +96,20 @@ def run_operating_points(
     Parameters
     ----------
     tree
-        The same as it was written.
+        The case as it was written.
     variant
         The first one of the case by default.
     base
         Drive and lift; those of the start of a run by default.
     sweeps
         None, one or two.
-    origin : "start" or "far"
+    origin
         Where the search begins: bodies where they are drawn, or at the stops farthest from there.
 
     Raises
     ------
     InputError
-        For a motion in three dimensions, an unknown coil, and for a single point that does not
-        exist.
+        Also for a motion in three dimensions, and for a single point that does not exist.
     ConvergenceError
         For a single point that is not found.
     """
@@ -190,13 +182,7 @@ def find_point(
     conditions: Conditions,
     origin: Origin = "start",
 ) -> PointFound:
-    """Find one operating point, and look for others from other places.
-
-    Raises
-    ------
-    InputError
-    ConvergenceError
-    """
+    """Find one operating point, and look for others from other places."""
     network = variant_network(valve, variant)
     currents = conditions.currents(network, start_currents(network))
     network = driven(network, currents).at_start()
@@ -291,7 +277,7 @@ def _differs(rows: Rows, one: OperatingPoint, other: OperatingPoint) -> bool:
 
 
 def _travels(rows: Rows) -> dict[str, float]:
-    """Way between the stops of every free body [m]."""
+    """Way [m] between the stops of every free body."""
     travel, found = Travel.of(rows), dict[str, float]()
     for row in rows.bodies:
         if row.body.rigid_count:
@@ -369,7 +355,6 @@ def _own_notes(point: OperatingPoint, rows: Rows, held: set[str]) -> list[str]:
 
 
 def _swept(sweeps: Sequence[Sweep]) -> tuple[SweptQuantity, ...]:
-    """Values of the swept quantities at every point; the first sweep runs fastest."""
     grids = np.meshgrid(*(sweep.values for sweep in sweeps), indexing="ij") if sweeps else []
     return tuple(
         SweptQuantity(
@@ -400,7 +385,7 @@ def _column(values: Sequence[float | None]) -> Vector:
 
 
 def _told(failures: Sequence[str], doubts: Sequence[str], sweeps: Sequence[Sweep]) -> list[str]:
-    """Warnings of the whole record: each doubt once, and how many points are missing."""
+    """Each doubt once, and how many points are missing."""
     if not sweeps:
         return [line for line in doubts[0].splitlines() if line]
     told = []

@@ -1,7 +1,4 @@
-"""The few numbers of a reduction that a script or a terminal wants.
-
-What it leaves behind are the bodies themselves.
-"""
+"""A reduction in words and numbers."""
 
 from collections.abc import Iterable, Iterator
 from typing import Any

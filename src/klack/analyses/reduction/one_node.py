@@ -65,8 +65,8 @@ class OneNode:
     ----------
     node
         In the mesh of the body, from 0.
-    place : array, shape (2,) or (3,) [m]
-        Of the node in the drawing of the body.
+    place (2,) or (3,) [m]
+        In the drawing of the body.
     distance [m]
         Between the node and the place that the case asks for.
     correction
@@ -92,10 +92,7 @@ class OneNode:
 class OneNodeImpact:
     """The impact of the recipe with its gap between nodes, and between the ports.
 
-    Parameters
-    ----------
-    modes
-        Kept elastic modes of each body; attachment modes come in addition.
+    ``modes`` are the kept elastic ones of each body; attachment modes come in addition.
     """
 
     modes: int
@@ -112,10 +109,7 @@ def one_nodes(
 ) -> tuple[OneNode, ...]:
     """Transfer functions from the contact force to the nodes that a case names.
 
-    Raises
-    ------
-    InputError
-        For a place outside of the body, with its distance and the nearest point of the body.
+    InputError for a place outside of the body, with its distance and the nearest point of the body.
     """
     nodes = {} if problem.case.run.transfer is None else problem.case.run.transfer.nodes
     found: list[OneNode] = []

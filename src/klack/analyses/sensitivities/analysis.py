@@ -112,7 +112,7 @@ _RECORD = JsonForm(
 
 
 def sensitivities_told(record: SensitivityRecord) -> Iterator[TextTable | str]:
-    """What a terminal shows: for each measure its derivatives, then the check and the impacts."""
+    """For each measure its derivatives, then the check and the impacts."""
     for item in record.measures:
         value = "no value" if item.value is None else _quantity(item.value, item.unit)
         yield TextTable(

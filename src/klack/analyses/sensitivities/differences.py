@@ -58,20 +58,9 @@ def run_differences(
 ) -> SensitivityRecord:
     """Differentiate measures of an impact by differences.
 
-    Parameters
-    ----------
-    case, tree, source, parameters, measures, check, threads, progress
-        See :func:`~klack.analyses.sensitivities.run.run_sensitivities`; parameters may be any
-        numbers of the case, also of its bodies.
-    level
-        ``reduced``, or that of the study, by default.
-
-    Raises
-    ------
-    InputError
-        For a parameter, a measure or a level that does not exist.
-    ConvergenceError
-        If the impact itself cannot be computed.
+    Parameters as of :func:`~klack.analyses.sensitivities.run.run_sensitivities`; they may be any
+    numbers of the case, also of its bodies.  ``level`` is that of the study, or ``reduced``, by
+    default.
     """
     begin = perf_counter()
     space = slope_space(case, source, parameters)
@@ -168,26 +157,10 @@ def _slopes(
 def sensitivities_of(
     case: AnyCase, variant: str | None = None, level: str | None = None
 ) -> Callable[..., SensitivityRecord]:
-    """Return what differentiates a case: a stroke by exact tangents, an impact by differences.
+    """What differentiates a case: a stroke by exact tangents, an impact by differences.
 
-    Parameters
-    ----------
-    case : Case or ValveCase
-    variant
-        Of a stroke.
-    level
-        Of an impact.
-
-    Returns
-    -------
-    callable
-        :func:`~klack.analyses.sensitivities.run.run_sensitivities` or
-        :func:`~klack.analyses.sensitivities.differences.run_differences`, which take the rest.
-
-    Raises
-    ------
-    InputError
-        For a variant of an impact, or a level of a stroke.
+    Returns :func:`~klack.analyses.sensitivities.run.run_sensitivities` or :func:`run_differences`,
+    which take the rest.  InputError for a variant of an impact, or a level of a stroke.
     """
     require_way(case, variant, level)
     if isinstance(case, Case):

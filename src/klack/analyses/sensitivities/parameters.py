@@ -21,7 +21,7 @@ __all__ = ["SlopeSpace", "VariedKey", "asked_measures", "slope_space"]
 
 
 def asked_measures(source: StudySource | None, names: Sequence[str] = ()) -> tuple[str, ...]:
-    """Names that are given; without any, measures and constraints of the study, if there is one."""
+    """Given names; without any, measures and constraints of the study."""
     if names or source is None:
         return tuple(names)
     return tuple(dict.fromkeys((*source.study.measures, *source.study.constraints)))
@@ -37,13 +37,9 @@ _EXPECTED = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VariedKey:
-    """A parameter, its value, and the size by which its changes are small or large.
+    """A parameter, its value [SI], and the size [SI] by which its changes are small or large.
 
-    Parameters
-    ----------
-    value [SI]
-    size [SI]
-        Of the value; of its range where that is zero.
+    The size is that of the value; of its range where that is zero.
     """
 
     name: str
@@ -63,7 +59,7 @@ class SlopeSpace:
 
     Parameters
     ----------
-    others : mapping of str to value [SI]
+    others [SI]
         Parameters of the study that stay as they are.
     kinds
         Of all keys of the case that are set.
@@ -96,19 +92,9 @@ class SlopeSpace:
     def change_together(
         self, share: float, slopes: Sequence[float | None]
     ) -> tuple[float | None, float]:
-        """Change of a measure under :meth:`together`, by its slopes, and the scale of its parts.
+        """Change of a measure under :meth:`together` by its slopes, None where one is missing.
 
-        Parameters
-        ----------
-        slopes
-            With each parameter, per its unit.
-
-        Returns
-        -------
-        predicted : float or None
-            None where a slope is missing.
-        scale : float
-            Root of the sum of the squares of the parts.
+        And the scale: root of the sum of the squares of the parts.
         """
         shifts = self.together(share).values()
         parts = [x * slope for x, slope in zip(shifts, slopes, strict=True) if slope is not None]
@@ -116,7 +102,7 @@ class SlopeSpace:
         return predicted, sqrt(sum(part * part for part in parts))
 
     def at(self, values: Values) -> "SlopeSpace":
-        """The same about another point: values [SI] of all parameters of the study."""
+        """The same about other values [SI] of all parameters of the study."""
         return replace(
             self,
             varied=tuple(replace(item, value=float(values[item.name])) for item in self.varied),
@@ -126,10 +112,7 @@ class SlopeSpace:
     def written(self, shifts: Mapping[str, float]) -> dict[str, PointValue]:
         """What the case has where parameters are shifted by so much [SI], by the path of the key.
 
-        Parameters
-        ----------
-        shifts
-            By name; 0 for those not named.
+        Parameters without a shift stay.
         """
         values = dict(self.others)
         values |= {item.name: item.value + shifts.get(item.name, 0.0) for item in self.varied}
@@ -150,8 +133,8 @@ def slope_space(case: AnyCase, source: StudySource | None, names: Sequence[str] 
     Raises
     ------
     InputError
-        For a key that the case does not have, one that is no number with a unit, one that the run
-        itself follows from, and of a whole valve one that bodies or contact laws follow from.
+        Also for a key that is no number with a unit, one that the run itself follows from, and of a
+        whole valve one that bodies or contact laws follow from.
     """
     space = space_of(case, source) if source is not None else Space(parameters=(), linked=())
     found: dict[str, VariedKey] = {}
@@ -224,7 +207,7 @@ def _is_fixed(space: Space, name: str) -> bool:
 
 
 def _reason(case: AnyCase, item: VariedKey, linked: Sequence[Linked]) -> tuple[str, str] | None:
-    """Why there is no derivative with a parameter, and what to do instead; None if there is."""
+    """Why there is no derivative with a parameter, and what to do instead."""
     if item.size == 0.0:
         return "a value of zero", "a range in a study tells how large a small change of it is."
     follow = [other.name for other in linked if item.name in other.words.values()]
@@ -240,7 +223,6 @@ def _reason(case: AnyCase, item: VariedKey, linked: Sequence[Linked]) -> tuple[s
 
 
 def _reason_at(case: AnyCase, place: Key) -> tuple[str, str] | None:
-    """Why there is no derivative with what stands at one key."""
     if place[0] == "run":
         return "a setting of the run", "klack advise tells what its steps change."
     if not isinstance(case, ValveCase):

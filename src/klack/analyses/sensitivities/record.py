@@ -1,4 +1,4 @@
-"""What ``klack sensitivities`` finds: derivatives of measures, and how far they hold."""
+"""Record of ``klack sensitivities``: derivatives of measures, and how far they hold."""
 
 from dataclasses import dataclass
 
@@ -18,15 +18,7 @@ MISSED = 0.05
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlopeParameter:
-    """A parameter and its value.
-
-    Parameters
-    ----------
-    name
-        Path of its key, or a word of the study.
-    unit
-        SI; ``"1"`` for a pure number.
-    """
+    """A parameter (path of its key, or a word of the study) and its value in the SI unit."""
 
     name: str
     unit: str
@@ -41,10 +33,6 @@ class MeasureSlopes:
     ----------
     title
         What it is.
-    unit
-        SI.
-    value
-        None where the run does not have it.
     slopes
         With each parameter, per its unit; None where it has no value a little further on.
     predicted, secant
@@ -82,7 +70,7 @@ class MeasureSlopes:
 
     @property
     def deviation(self) -> float | None:
-        """Difference of both predictions over the scale of the change; None without both."""
+        """Difference of both predictions over the scale of the change, if there are both."""
         if self.predicted is None or self.secant is None or self.scale == 0.0:
             return None
         return abs(self.predicted - self.secant) / self.scale
@@ -162,7 +150,7 @@ class SensitivityRecord(CaseRecord):
     runs_time, run_time [s]
         Processor time of the derivatives, and of one run without them.
     by_differences
-        Whether they are those of runs with changed parameters, not exact tangents.
+        From runs with changed parameters, not exact tangents.
     """
 
     variant: str
@@ -175,24 +163,12 @@ class SensitivityRecord(CaseRecord):
     by_differences: bool = False
 
     def derivative(self, measure: str, parameter: str) -> float | None:
-        """Derivative in the unit of the measure per unit of the parameter [SI].
-
-        Raises
-        ------
-        InputError
-            For a name that the record does not have.
-        """
+        """Derivative in the unit of the measure per unit of the parameter [SI]."""
         of, k = self._at(measure, parameter)
         return of.slopes[k]
 
     def elasticity(self, measure: str, parameter: str) -> float | None:
-        """Relative change of a measure over that of a parameter; None at a value of zero.
-
-        Raises
-        ------
-        InputError
-            For a name that the record does not have.
-        """
+        """Relative change of a measure over that of a parameter; None at a value of zero."""
         of, k = self._at(measure, parameter)
         return of.elasticity(k, self.parameters[k])
 

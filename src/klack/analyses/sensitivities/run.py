@@ -57,8 +57,6 @@ def run_sensitivities(
 
     Parameters
     ----------
-    tree
-        The same as it was written.
     source
         A study with parameters and measures; that of the case by default, if it has one and no
         parameters are given.
@@ -72,16 +70,11 @@ def run_sensitivities(
     check
         Whether three more strokes are computed: the derivatives have to predict two of them, and
         the values have to be those of the third.
-    threads
-        Of the factorisations of bodies.
 
     Raises
     ------
     InputError
-        For a parameter, a measure or a variant that cannot be differentiated, and for a motion in
-        three dimensions.
-    ConvergenceError
-        When a step fails.
+        Also for what cannot be differentiated, and for a motion in three dimensions.
     """
     require_axial(case, "klack sensitivities")
     begin = perf_counter()
@@ -172,10 +165,7 @@ def _left_out(
 class _Others:
     """Strokes without derivatives: as they are, and with all parameters changed.
 
-    Parameters
-    ----------
-    time [s]
-        Processor time of one of them.
+    ``time`` [s] is the processor time of one of them.
     """
 
     time: float
@@ -272,7 +262,6 @@ def _impacts(
 
 
 def _why(others: _Others) -> str:
-    """What the strokes of the check tell of the reason."""
     same, *ends = (_in_order(end.variant) for end in (others.same, others.plus, others.minus))
     for end, words in zip(ends, ("so", "the other way"), strict=True):
         pairs = enumerate(zip(same, end, strict=False))
@@ -297,7 +286,6 @@ def _in_order(variant: StrokeVariant) -> list[str]:
 
 
 def _touch_time(variant: StrokeVariant, stop: str, number: int) -> float | None:
-    """Time of an impact on a stop of another run."""
     fastest = max((event.approach_speed for event in variant.impacts(stop)), default=0.0)
     events = [e for e in variant.impacts(stop) if e.approach_speed > 0.02 * fastest]
     return events[number - 1].time if number <= len(events) else None

@@ -1,7 +1,5 @@
 r"""Strokes with derivatives, at the case or about another point of the same parameters.
 
-Forces of a run with derivatives, at fixed times: what the noise follows from.
-
 A run with derivatives records means over intervals whose ends move along,
 :math:`t(p) = t + \dot t\,\delta p`.  Noise is a function of the force over the time of a clock.
 The impulse of an interval that moves is :math:`f h`; what enters and leaves at the ends of one that
@@ -66,14 +64,7 @@ Floats = NDArray[np.float64]
 class MovedForces:
     """Forces behind the noise of a run, and their derivatives with one parameter.
 
-    Parameters
-    ----------
-    source
-        Of the run.
-    stops [N per unit]
-        Derivative of the force of each stop at the times of ``source``.
-    net [N per unit]
-        Of the net force.
+    ``stops`` and ``net`` [N per unit] are derivatives at the times of ``source``.
     """
 
     source: NoiseSource
@@ -101,12 +92,7 @@ def moved_forces(
 ) -> MovedForces:
     """Differentiate the forces of a run at fixed times.
 
-    Parameters
-    ----------
-    study
-        Of this run alone.
-    case
-        Whose section ``noise`` counts.
+    The section ``noise`` is that of ``case``.
     """
     source = stroke_sources(study, case=case)[0]
     variant = study.reference
@@ -132,14 +118,8 @@ def moved_forces(
 def transported(values: Floats, late: Floats, step: float) -> Floats:
     """What enters intervals that stay less what leaves them, where times move, per interval.
 
-    Parameters
-    ----------
-    values (n,)
-        Means over the intervals.
-    late (n + 1,) [s per unit]
-        Derivatives of the times of their ends.
-    step [s]
-        Length of an interval.
+    ``values`` (n,) are means over the intervals, ``late`` (n + 1,) [s per unit] derivatives of the
+    times of their ends, ``step`` [s] their length.
     """
     at_ends = np.concatenate([values[:1], 0.5 * (values[:-1] + values[1:]), values[-1:]])
     return -np.diff(at_ends * late) / step

@@ -1,4 +1,4 @@
-"""A study of shots on disk; see :mod:`klack.analyses.store`.
+"""A study of shots in words and numbers, and on disk.
 
 ``result.zarr/study/shots/restitution`` holds one number per shot.
 """
@@ -109,7 +109,7 @@ def shots_to_json(study: ShotsStudy) -> ShotsJson:
 
 
 def shots_told(study: ShotsStudy) -> Iterator[TextTable | str]:
-    """Terminal output: the distribution of each measure, and the rule."""
+    """The distribution of each measure, and the rule."""
     title = f"{study.title}: {study.shots.count} shots, seed {study.seed}"
     yield TextTable(title=title, columns=DISTRIBUTION_COLUMNS, rows=distribution_rows(study))
     yield study.rule.sentence
@@ -124,7 +124,7 @@ def shots_measured(study: ShotsStudy) -> Iterator[Measured]:
 
 
 def distribution_rows(study: ShotsStudy) -> tuple[tuple[str, ...], ...]:
-    """Rows of :data:`DISTRIBUTION_COLUMNS`, one per measure, as text."""
+    """Rows of :data:`DISTRIBUTION_COLUMNS`."""
     rows = []
     for measure in FIRST_IMPACT:
         values = getattr(study.shots, measure.key)

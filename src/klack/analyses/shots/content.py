@@ -43,7 +43,6 @@ from klack.report.wording import count, quantity, signed, signed_share
 __all__ = ["shots_content"]
 
 _LISTED = 100
-"""Shots in the table; the result holds all of them."""
 _RELATED = 0.5
 """Least rank correlation that is worth a sentence."""
 
@@ -103,7 +102,6 @@ def _rule(study: ShotsStudy) -> str:
 
 
 def _related(study: ShotsStudy, shown: Shown) -> float:
-    """Rank correlation of a drawn quantity with the rebound height."""
     return rank_correlation(shown.of(study.shots), study.shots.rebound_height)
 
 
@@ -171,7 +169,6 @@ def _drawn(study: ShotsStudy) -> Section:
 
 
 def _shots(study: ShotsStudy) -> Section:
-    """One row per shot, the centred impact first."""
     shown = [column for column in _columns(study) if column[3] or _varies(study.shots, column[2])]
     rows = [("centred", *(text(study.centric.row(0)) for _, text, _, _ in shown))]
     for i in range(min(study.shots.count, _LISTED)):
@@ -219,7 +216,6 @@ def _fixed(column: str, factor: float, decimals: int) -> _ShotText:
 
 
 def _number_table(study: ShotsStudy) -> Table:
-    """Centred, highest, and the spread of all shots."""
     rows = [_number_row(study, measure) for measure in (*FIRST_IMPACT, *_shares(study))]
     worst = largest_size(study.shots.energy_residual)
     rows.append(("energy residual, largest", "", "", "", "", f"{worst:.1e}".replace("-", "−")))
@@ -259,7 +255,6 @@ def _number_row(study: ShotsStudy, measure: Measure[Shot]) -> tuple[str, ...]:
 
 
 def _shares(study: ShotsStudy) -> tuple[Measure[Shot], ...]:
-    """Shares of the energy of approach that a page of this study has."""
     rubbing = (FRICTION_LOSS,) if study.faces else ()
     yielding = (PLASTIC_LOSS,) if np.any(study.shots.plastic_loss) else ()
     return (ROCKING, *rubbing, *yielding)

@@ -1,9 +1,8 @@
 r"""Random draws of the quantities that vary between drops of one valve.
 
 Each shot has its own stream of numbers, seeded by (seed, index): its draw depends neither on how
-many shots there are nor on who computes them.  Every quantity always takes the same members of that
-stream, so a change of one distribution leaves the draws of all others as they were; a new quantity
-takes a member behind all others.
+many shots there are nor on who computes them.  Every quantity takes the same members of that
+stream, so a change of one distribution leaves the draws of all others as they were.
 
 With a guide and no stated distribution, the axis of the moving body passes through one point of the
 clearance disc at the lowest guiding height, and one at the highest, each uniform over its disc:
@@ -59,7 +58,7 @@ class ShotDraw:
     Parameters
     ----------
     index
-        Number of the shot, from 0; -1 for the centred one.
+        From 0; -1 for the centred one.
     aside (2,) [m]
         Position of the axis of the moving body at the height of first touch.
     lean (2,) [rad]
@@ -108,17 +107,8 @@ def face_friction(case: Case) -> Distribution:
 def draw_shot(case: Case, seed: int, index: int, height: float) -> ShotDraw:
     """Draw shot ``index`` of a case.
 
-    Parameters
-    ----------
-    case
-        With a section ``shots``.
-    height [m]
-        z of first touch in the drawing of the moving body.
-
-    Raises
-    ------
-    InputError
-        When the guide leaves no room for the stated eccentricity and tilt.
+    ``height`` [m] is z of first touch in the drawing of the moving body.  InputError when the guide
+    leaves no room for the stated eccentricity and tilt.
     """
     shots = shots_of(case)
     stream = _stream(seed, index, 0)
@@ -146,11 +136,11 @@ def draw_shot(case: Case, seed: int, index: int, height: float) -> ShotDraw:
 
 
 def centric_draw(case: Case) -> ShotDraw:
-    """Return the shot that all others scatter around: centred, upright, round, with the mean force.
+    """Shot that all others scatter around: centred, upright, round, with the mean force.
 
     It has no Coulomb friction in the guide, which a centred body does not touch; viscous drag there
-    is no scatter and stays.  Friction between the faces belongs to the valve: they slip on each
-    other in a centred impact, too, with the mean coefficient.
+    is no scatter and stays.  Faces slip on each other in a centred impact, too, with the mean
+    coefficient.
     """
     return ShotDraw(
         index=-1,
@@ -189,7 +179,7 @@ def extreme_placements(
 def runs_asked(
     stated: Shots | StrokeShots, count: int | None, seed: int | None, workers: int | None, runs: str
 ) -> tuple[int, int, int]:
-    """How many shots or strokes, their seed, and processes: as asked for, else as stated."""
+    """Number of shots or strokes, seed, and processes: as asked for, else as stated."""
     wanted = stated.count if count is None else count
     require_positive("shots: count", wanted, runs)
     own = stated.seed if seed is None else seed
@@ -229,13 +219,7 @@ def drawn_face_friction(shots: StrokeShots, seed: int, index: int) -> float:
 def drawn_position(
     case: AnyCase, shots: Shots | StrokeShots, seed: int, index: int, height: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Position of the axis at a height, and its slope, of one shot.
-
-    Raises
-    ------
-    InputError
-        When the guide leaves no room for the stated eccentricity and tilt.
-    """
+    """Position of the axis of one shot at a height, and its slope, as :func:`draw_shot`."""
     for attempt in range(_ATTEMPTS):
         stream = _stream(seed, index, attempt)
         if shots.eccentricity is None and shots.tilt is None:
@@ -257,7 +241,6 @@ def drawn_position(
 
 
 def _vector(size: Distribution | None, shares: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Vector of a drawn length in any direction, all directions alike."""
     if size is None:
         return np.zeros(2)
     angle = 2.0 * pi * shares[1]

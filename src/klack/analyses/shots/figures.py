@@ -1,4 +1,4 @@
-"""The figures of a report of shots, each built from a study by one function.
+"""Figures of a report of shots.
 
 The highest shot is red and the centred impact black in all of them.
 """
@@ -85,14 +85,13 @@ Floats = NDArray[np.float64]
 
 _ALL, _CENTRED, _HIGHEST = "all shots", "centred impact", "highest rebound"
 _MOST_TRACES = 60
-"""Thin lines of shots; more would only cover each other and cost bytes."""
 _LONGER = 1.08
 """Length of a time axis over the time that matters."""
 
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """A column of shots on an axis: its label, its unit there, and the factor from SI to it."""
+    """A column of shots on an axis, with the factor from SI to the unit there."""
 
     column: str
     label: str
@@ -281,7 +280,7 @@ def force_traces_chart(study: ShotsStudy) -> Chart:
 
 
 def _last(time: Floats, values: NDArray[np.float32]) -> float:
-    """Last time at which something is known, (k,) or (k, n) of it [s]."""
+    """Last time [s] at which something is known, (k,) or (k, n) of it."""
     known = np.isfinite(values).reshape(len(time), -1).any(axis=1)
     return float(time[known][-1]) if known.any() else float(time[-1])
 
@@ -297,10 +296,7 @@ def _lines(
     factors: tuple[float, float],
     limit: float,
 ) -> tuple[Curve, ...]:
-    """Many thin lines up to ``limit`` [s], the first with the name of all; on top the bold ones.
-
-    The bold ones are lowest, highest and centred, see :func:`_bold`.
-    """
+    """Many thin lines up to ``limit`` [s], the first with the name of all; on top the bold ones."""
     shots = study.shot_traces
     thin = range(min(study.shots.count, _MOST_TRACES))
     looks: list[tuple[ShotTraces, int, str, Colour, Style, float]] = [

@@ -1,8 +1,7 @@
 """The model that all shots of a valve share: built once, centred, in first touch.
 
 Its bodies with their modes follow from shapes, materials and supports alone; contact points, guide
-and flight also from speed, forces and distributions.  Designs that differ in the latter only share
-the bodies.
+and flight also from speed, forces and distributions.
 """
 
 from dataclasses import dataclass, replace
@@ -36,16 +35,9 @@ _MORE = 1.6  # force per length of the most loaded sector over the mean
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ShotModel:
-    """Result of :func:`shot_model`.
+    """Model of shots: ``touch_height`` [m] is z of first touch in the drawing of the moving body.
 
-    Parameters
-    ----------
-    touch_height [m]
-        z of first touch in the drawing of the moving body.
-    modes
-        Kept elastic modes of both bodies.
-    notes
-        Doubts about bodies and contact.
+    ``modes`` are the kept elastic ones of both bodies, ``notes`` doubts about bodies and contact.
     """
 
     setup: ShotSetup
@@ -55,10 +47,10 @@ class ShotModel:
 
 
 def centred_case(case: Case) -> Case:
-    """Return the case with the moving body centred, upright and in first touch.
+    """The case with the moving body centred, upright and in first touch.
 
-    Between the faces acts the mean friction of the shots, as in the centred one.  Transfer
-    functions, which take more modes, are left to ``klack impact``.
+    Between the faces acts the mean friction of the shots.  Transfer functions, which take more
+    modes, are left to ``klack impact``.
     """
     motion = case.motion.model_copy(update={"placement": Placement()})
     faces = case.contact.faces.scaled(face_friction(case).mean)
@@ -93,16 +85,10 @@ def shot_bodies(case: Case, progress: Progress, *, threads: int | None = None) -
 
 
 def shot_model(case: Case, bodies: ImpactBodies, progress: Progress) -> ShotModel:
-    """Model of the shots of a case.
+    """Model of the shots of a case, with all contact points that any allowed placement can close.
 
-    The contact points are all those that any placement allowed by the distributions can close.
-
-    Parameters
-    ----------
-    case
-        With a section ``shots``.
-    bodies
-        From :func:`shot_bodies` of this case, or of one with the same bodies; they stay open.
+    ``bodies`` are those of :func:`shot_bodies` for this case, or for one with the same bodies; they
+    stay open.
     """
     with collected_warnings() as notes:
         problem = contact_problem(centred_case(case), bodies.placed, progress)

@@ -1,4 +1,4 @@
-"""One drop of a valve at the interface level: from a draw to its numbers, and how they are kept."""
+"""One drop of a valve at the interface level: from a draw to its numbers."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -111,7 +111,7 @@ class ShotSetup:
         return ShotGaps(self.gaps, added, self.opposite_gap, self.opposite_slope)
 
     def placement(self, draw: ShotDraw) -> NDArray[np.float64]:
-        """Rigid placement of the moving body at the start, but for its height, shape (6,)."""
+        """Rigid placement (6,) of the moving body at the start, but for its height."""
         return rigid_placement(draw.aside, draw.lean, self.about, self.model.centre)
 
 
@@ -125,7 +125,7 @@ class ShotGaps:
     opposite_slope: NDArray[np.float64]
 
     def __call__(self, placement: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Gaps, shape (nc,) [m], at a placement, shape (6,) [m], [rad]."""
+        """Gaps (nc,) [m] at a placement (6,) [m], [rad]."""
         seat = self.exact(placement) + self.added
         return np.concatenate([seat, self.opposite_gap + self.opposite_slope @ placement])
 
@@ -138,7 +138,7 @@ class ShotOutcome:
     ----------
     numbers
         One for each field of :class:`klack.analyses.shots.record.ShotColumns`.
-    height, force : float32 array
+    height, force
         On the grids of the setup.
     approach [m]
         Largest way of the moving body after first touch.

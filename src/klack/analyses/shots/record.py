@@ -1,8 +1,4 @@
-"""Record of ``klack shots``: many drops of one valve, and the centred drop.
-
-The numbers are plain columns, one row per shot, so that a stored study can be reported again
-without the solver.
-"""
+"""Record of ``klack shots``, one row per shot: many drops of one valve, and the centred drop."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -50,9 +46,7 @@ class RuleVerdict:
     rank
         How many shots rebound at least as high as the centred one.
     holds
-        True if the relative bias of the restitution is below 1 %.
-    sentence
-        The answer in words.
+        Whether the relative bias of the restitution is below 1 %.
     """
 
     restitution_bias: float
@@ -165,7 +159,7 @@ FIRST_IMPACT: tuple[Measure[Shot], ...] = described_in(
         definition="Integral of the contact force over the first impact, with all its contacts.",
     ),
 )
-"""What is measured of the first impact; the first two tell how high it comes back."""
+"""Of the first impact; the first two tell how high it comes back."""
 
 ROCKING = Measure[Shot](
     key="rocking",
@@ -240,7 +234,6 @@ SHOT_MEASURES: tuple[Measure[Shot], ...] = described_in(
         form="power",
     ),
 )
-"""All columns of a shot, in their order."""
 
 RESULTS = tuple(item for item in SHOT_MEASURES if item not in DRAWN)
 """What a shot ends with."""
@@ -305,13 +298,11 @@ class ShotTraces:
 
     Parameters
     ----------
-    time (k,) [s]
+    time (k,), force_time (m,) [s]
         From the first touch.
-    height : float32 array, shape (n, k) [m]
+    height (n, k) [m]
         Of the centre of mass, above that at first touch; nan after the end of the shot.
-    force_time (m,) [s]
-        From the first touch.
-    force : float32 array, shape (n, m) [N]
+    force (n, m) [N]
         Axial contact force of the first impact.
     """
 
@@ -334,17 +325,11 @@ class ShotsStudy(CaseRecord):
     speed [m/s]
         At the start, ``start_height`` [m] above first touch.
     step [s]
-        Of the time loop.
-    distributions
-        Distributions, in words.
+    distributions, guide, faces, layer
+        In words; the last three are empty without a guide, friction between the faces, and
+        asperities.
     surfaces
         For example ``"needle.tip on housing.seat"``.
-    guide
-        The guide in words; empty without one.
-    faces
-        Friction between the faces in words; empty without.
-    layer
-        Asperities of rough faces in words; empty for smooth ones.
     mass [kg]
         Of the moving body.
     modes

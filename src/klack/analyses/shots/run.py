@@ -78,26 +78,17 @@ def run_shots(
 
     Parameters
     ----------
-    case
-        With a section ``shots``.
     count, seed
         Instead of those of the case.
     workers
         Processes; as many as there are cores without.
     folder
         Where finished shots are kept until all are there: an interrupted run resumes from them.
-        See :class:`klack.analyses.unfinished.UnfinishedLog`.
-    progress
-        Called with stage and fraction.
-    threads
-        Of the factorisations.
 
     Raises
     ------
     InputError
-        A case without shots, numbers that cannot be, a contact that leaves the contact points.
-    ConvergenceError
-        A shot that cannot be computed.
+        Also for a contact that leaves the contact points.
     """
     begin = perf_counter()
     stated = shots_of(case)
@@ -162,14 +153,9 @@ def run_shots(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DroppedShots:
-    """Computed shots of a model, and the centred one.
+    """Computed shots of a model, and ``alone`` the centred one.
 
-    Parameters
-    ----------
-    outcomes
-        Of the draws, in their order.
-    alone
-        The centred shot; faces that yield are for it as the last of the others has left them.
+    Faces that yield are for that one as the last of the others has left them.
     """
 
     draws: tuple[ShotDraw, ...]
@@ -201,13 +187,7 @@ def drop_shots(
     log: ShotLog,
     progress: Progress,
 ) -> DroppedShots:
-    """Draw so many shots of a case, compute those that the log does not have, and the centred one.
-
-    Raises
-    ------
-    InputError, ConvergenceError
-        Of the first shot that fails; it is named.
-    """
+    """Draw so many shots, compute those that the log does not have, and the centred one."""
     draws = [draw_shot(case, seed, index, model.touch_height) for index in range(count)]
     progress("shots", 0.0)
     setup, centric = model.setup, centric_draw(case)
@@ -239,13 +219,7 @@ def _one_after_another(
 def run_shots_on(
     workers: int, setup: ShotSetup, draws: Sequence[ShotDraw], log: ShotLog, progress: Progress
 ) -> None:
-    """Run the shots missing in the log, and add them.
-
-    Raises
-    ------
-    InputError, ConvergenceError
-        Of the first shot that fails; it is named.
-    """
+    """Run the shots missing in the log, and add them; an error names the first that fails."""
     with LoggedWork(run_shot, setup, workers, log, "shot {}".format, fewest=3) as work:
         progress("shots", len(log.done) / len(draws))
         for _ in work.completed({draw.index: draw for draw in draws}):
@@ -310,7 +284,6 @@ def _pressures(
 
 
 def _worn(shots: ShotColumns) -> Iterator[str]:
-    """What shots on faces that yield are told of."""
     if np.any(shots.plastic_loss):
         yield (
             "the faces yield: every shot meets them as those before have left them, the centred "
@@ -336,7 +309,6 @@ def _distributions(case: Case) -> dict[str, str]:
 
 
 def _faces_in_words(case: Case) -> str:
-    """Friction between the faces; empty where no shot has any."""
     faces = case.contact.faces.scaled(face_friction(case).mean)
     if faces.is_none:
         return ""

@@ -1,4 +1,4 @@
-"""Words that reports of many shots and of many strokes share, and the answer of shots."""
+"""Words for reports of many shots and of many strokes."""
 
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
@@ -28,7 +28,7 @@ _SMALL = 1e-4
 
 
 def shots_answer(study: ShotsStudy) -> str:
-    """Text on whether the rule holds, and on the spread of the shots."""
+    """Whether the rule holds, and the spread of the shots."""
     shots = study.shots
     spread = [
         f"{measure.name} {measure.printed(float(np.nanmin(values)))} to "
@@ -66,7 +66,7 @@ def largest_size(values: ArrayLike) -> float:
 
 
 def length_unit(values: ArrayLike) -> tuple[str, float]:
-    """Unit in which lengths [m] are easy to read, and the factor from metres to it.
+    """Unit in which lengths [m] are easy to read, and the factor to it.
 
     >>> length_unit([2e-5]), length_unit([4.6e-3])
     (('µm', 1000000.0), ('mm', 1000.0))
@@ -92,16 +92,9 @@ def drawn_section(
     runs: str,
     spent: float,
 ) -> Section:
-    """What varies from run to run, and what all of them share.
+    """What varies from run to run, and the facts that all of them share.
 
-    Parameters
-    ----------
-    facts : iterable of (str, str)
-        What they share.
-    runs
-        What they are called, ``"shots"``.
-    spent [s]
-        Wall time of the runs alone.
+    ``runs`` is what they are called, ``"shots"``; ``spent`` [s] the wall time of the runs alone.
     """
     processes = f"{study.workers} process{'es' if study.workers != 1 else ''}"
     shared = [

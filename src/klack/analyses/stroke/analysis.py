@@ -1,4 +1,4 @@
-"""A stroke study in words and numbers, and on disk; see :mod:`klack.analyses.store`.
+"""A stroke study in words and numbers, and on disk.
 
 ``result.zarr/study/variants/wet/result/channels/coil current/values`` is the current of the wet
 run; its unit stands beside it as ``unit``.
@@ -234,7 +234,7 @@ STUDY = JsonForm(
 
 
 def stroke_told(study: StrokeStudy) -> Iterator[TextTable | str]:
-    """Terminal output: variants side by side, times at shares of the lift, impacts."""
+    """Variants side by side, times at shares of the lift, impacts."""
     yield text_table(study.title, "variant", VARIANT_MEASURES, study.variants.items())
     if times := time_rows(study):
         title = "times at shares of the lift"
@@ -326,7 +326,7 @@ def _axis_told(study: StrokeStudy, variant: StrokeVariant) -> Iterator[TextTable
 
 
 def yield_told(variant: StrokeVariant) -> Iterator[str]:
-    """What yield has left on the faces of each stop; nothing where they stay elastic."""
+    """What yield has left on the faces of each stop."""
     for stop, faces in variant.result.faces.items():
         if faces.set > 0.0:
             lost = variant.result.books.losses.get(f"{stop} contact", 0.0)
@@ -338,7 +338,7 @@ def yield_told(variant: StrokeVariant) -> Iterator[str]:
 
 
 def touch_event(variant: StrokeVariant, passage: Passage) -> ImpactEvent | None:
-    """Impact that ends a passage; None if it does not reach its stop."""
+    """Impact that ends a passage, if it reaches its stop."""
     return next(
         (
             event
@@ -382,7 +382,6 @@ def _from_to(displacements: list[float]) -> str:
 
 
 def _lift(times: LiftTimes) -> str:
-    """Reference of the shares: between stops, or the largest lift of the run."""
     if times.lift is None:
         return "none"
     return f"{1e6 * times.lift:.4g}{'' if times.between_stops else ' (largest)'}"
@@ -393,7 +392,7 @@ def _moment(time: float | None) -> str:
 
 
 def stroke_answer(study: StrokeStudy) -> str:
-    """Opening, closing and the impacts of the reference, and how the other variants differ."""
+    """Opening, closing and impacts of the reference, and how the other variants differ."""
     variant = study.reference
     times = variant.needle_times
     ways = [_opening(study, variant), _closing(study, variant)]
@@ -478,7 +477,6 @@ def _hit(study: StrokeStudy, variant: StrokeVariant, event: ImpactEvent) -> str:
 
 
 def _compared(reference: StrokeVariant, other: StrokeVariant) -> str:
-    """Difference of the opening and closing times of another variant."""
     parts = []
     here, there = reference.needle_times, other.needle_times
     for word, one, two in (
@@ -493,7 +491,7 @@ def _compared(reference: StrokeVariant, other: StrokeVariant) -> str:
 
 
 def _renewed(study: StrokeStudy) -> StrokeStudy:
-    """None for the nan with which earlier versions said that there is no such number; names."""
+    """None for the nan of earlier versions; names of today."""
     names = {name for variant in study.variants.values() for name in variant.result.channels}
     if any(name.endswith(" flow") for name in names):
         study = _renamed(study)

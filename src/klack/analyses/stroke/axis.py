@@ -1,4 +1,4 @@
-"""Where the axis of a needle is that moves in three dimensions: at each touch, and in figures."""
+"""Axis of a needle that moves in three dimensions: at each touch, and in figures."""
 
 from dataclasses import dataclass
 
@@ -28,14 +28,7 @@ _LEAST_PLACE, _LEAST_TILT = 1e-5, 1e-6  # [um], [mrad]; less is round-off, and s
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AxisPlace:
-    """Position of the axis at the height of the seat, and its slope.
-
-    Parameters
-    ----------
-    x, y [m]
-    tilt_x, tilt_y [rad]
-        Of the axis along x and along y, upwards.
-    """
+    """Position [m] of the axis at the height of the seat, and its slope [rad], upwards."""
 
     x: float
     y: float
@@ -81,7 +74,7 @@ def acts_across(variant: StrokeVariant) -> tuple[str, ...]:
 
 
 def guide_of(study: StrokeStudy) -> ValveGuide | None:
-    """Section ``guide`` of the case, which was checked when it was run; None without."""
+    """Section ``guide`` of the case, which was checked when it was run."""
     given = YAML(typ="safe").load(study.case_text).get("guide")
     return None if given is None else ValveGuide.model_validate(given)
 
@@ -162,7 +155,7 @@ def axis_path_chart(study: StrokeStudy) -> Chart | None:
 
 
 def axis_over_time_chart(study: StrokeStudy) -> Chart | None:
-    """Position at the seat, tilt, and forces of the guide; None for a motion along the axis."""
+    """Position at the seat, tilt, and forces of the guide, for a motion in three dimensions."""
     variant = study.reference
     if not moves_in_space(study, variant):
         return None
@@ -203,7 +196,7 @@ def axis_over_time_chart(study: StrokeStudy) -> Chart | None:
 
 
 def _path(variant: StrokeVariant, number: int) -> Floats:
-    """Position of the axis at a height of the guide [um], shape (n, 2)."""
+    """Position (n, 2) [um] of the axis at a height of the guide."""
     found = [variant.channel(f"guide {number} {a}") for a in "xy"]
     return 1e6 * np.column_stack([channel.values for channel in found if channel is not None])
 

@@ -1,4 +1,4 @@
-"""Content of a stroke report before its layout: the same texts for screen and paper."""
+"""Content of a stroke report."""
 
 from collections.abc import Callable
 from math import isfinite
@@ -117,7 +117,7 @@ def _flexible(study: StrokeStudy) -> list[str]:
 
 
 def _comparison(study: StrokeStudy, *, wet: bool) -> Section:
-    """Lay dry over wet, or lumped over flexible; empty if there is nothing to compare."""
+    """Compare dry with wet, or lumped with flexible, if there is something to compare."""
     if wet:
         names, title = _flexible(study), "Dry and wet"
         kinds = {study.variants[name].wet for name in names}
@@ -164,7 +164,6 @@ def _comparison(study: StrokeStudy, *, wet: bool) -> Section:
 
 
 def _ring_sections(study: StrokeStudy) -> list[Section]:
-    """Line loads and film pressures of every variant that moves in three dimensions."""
     sections = []
     for variant in study.variants.values():
         if not moves_in_space(study, variant):

@@ -1,4 +1,4 @@
-"""Controllers that whoever runs a case gives it: FMUs, by component."""
+"""Controllers in place of those of a case: FMUs, by component."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -13,12 +13,7 @@ __all__ = ["controller_files", "controller_notes", "with_controllers"]
 
 
 def controller_files(given: Sequence[str]) -> dict[str, Path]:
-    """Files by component, of texts NAME=FILE.fmu.
-
-    Raises
-    ------
-    InputError
-    """
+    """Files by component, of texts NAME=FILE.fmu."""
     files: dict[str, Path] = {}
     for text in given:
         name, sign, file = text.partition("=")
@@ -34,13 +29,7 @@ def controller_files(given: Sequence[str]) -> dict[str, Path]:
 
 
 def with_controllers(case: ValveCase, files: Mapping[str, Path]) -> ValveCase:
-    """Return a case with FMUs in place of the controllers of some components.
-
-    Raises
-    ------
-    InputError
-        For a component that has no controller, and for an FMU that does not fit.
-    """
+    """A case with FMUs in place of the controllers of some components."""
     components = dict(case.network.components)
     controlled = [name for name, part in components.items() if isinstance(part, Controlled)]
     for name, file in files.items():
@@ -60,7 +49,7 @@ def with_controllers(case: ValveCase, files: Mapping[str, Path]) -> ValveCase:
 
 
 def controller_notes(case: ValveCase) -> tuple[str, ...]:
-    """Say which FMUs control a run: its record holds the case, not them."""
+    """Which FMUs control a run: its record holds the case, not them."""
     notes = []
     for name, part in case.network.components.items():
         law = part.own_law if isinstance(part, Controlled) else None

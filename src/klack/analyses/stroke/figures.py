@@ -1,7 +1,6 @@
-"""The figures of a stroke report, each built from a study by one function.
+"""Figures of a stroke report, with the units of the workshop: ms, us, V, A, N, bar, um, m/s.
 
-Units on the axes are those of the workshop: ms, us, V, A, N, bar, um, m/s.  Long records are
-thinned to the smallest and the largest value of each pixel column.
+Long records are thinned to the smallest and the largest value of each pixel column.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -195,7 +194,7 @@ def first_impact_chart(
 ) -> Chart | None:
     """First impact on a stop in fine steps: contact force, film force, gap, velocity.
 
-    None if none of the variants hits the stop.
+    None if no variant hits the stop.
     """
     hits = [
         (variant, event)
@@ -397,7 +396,7 @@ def _staggered(marks: Sequence[Mark]) -> tuple[Mark, ...]:
 
 
 def stop_law_chart(stop: StopSummary, *, in_space: bool = False) -> Chart | None:
-    """Static approach of the two bodies at a stop and its share in the local law; None without.
+    """Static approach of the two bodies at a stop and its share in the local law.
 
     ``in_space`` the law is without the friction of the faces, which contact points have.
     """

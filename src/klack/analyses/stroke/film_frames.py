@@ -16,8 +16,8 @@ __all__ = ["film_charts", "recorded_impacts"]
 def recorded_impacts(variant: StrokeVariant) -> tuple[tuple[int, ImpactEvent, SpatialImpact], ...]:
     """Impacts of a variant whose contact forces were recorded: number, event, record.
 
-    Numbers count all impacts of the variant from 1, as the table of impacts does.  A touch that is
-    no impact, such as a tremble while the stop is left, is not among them.
+    Numbers count all impacts of the variant from 1, as the table of impacts does, without touches
+    that are no impact, such as a tremble while the stop is left.
     """
     return tuple(
         (number, event, record)

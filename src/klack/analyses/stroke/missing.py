@@ -14,14 +14,9 @@ __all__ = ["cut_records", "missing_notes", "rest_note"]
 def missing_notes(
     variants: Mapping[str, StrokeVariant], not_run: Sequence[str], failure: Exception | None
 ) -> tuple[str, ...]:
-    """Say what is missing in the variants of a study; empty if nothing is.
+    """What is missing in the variants of a study; empty if nothing is.
 
-    Parameters
-    ----------
-    not_run
-        Variants that were asked for and have no record.
-    failure
-        That ended the study.
+    ``not_run`` are asked-for variants without a record, ``failure`` what ended the study.
     """
     notes = []
     for name, variant in variants.items():
@@ -60,11 +55,6 @@ def rest_note(variant: str, result: NetworkResult, seat: str) -> str:
     """Note that the needle never left its seat; empty if it did.
 
     The smallest force on the seat is what was missing to lift it at the best moment.
-
-    Parameters
-    ----------
-    seat
-        Component.
     """
     pressing = result.channels.get(f"{seat} contact force")
     if pressing is None or pressing.values.size < 2:

@@ -1,8 +1,4 @@
-"""Record of a stroke study: the same valve in several variants.
-
-The numbers are plain arrays and small frozen records, so that a stored study can be reported again
-without the solver.
-"""
+"""Record of a stroke study: the same valve in several variants."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -65,8 +61,6 @@ class LineSummary:
 
     Parameters
     ----------
-    name
-        Component.
     length [m]
     sound_speed [m/s]
         Of its waves, with the elasticity of the wall.
@@ -96,24 +90,18 @@ class StopSummary:
         At the start; of the opening stop, the lift.
     film
         Whether a squeeze film acts beside the contact.
-    indentation, force : array, shape (k,) [m], [N]
+    indentation, force (k,) [m], [N]
         Local law; empty for a law that is given.
     share (k,) [-]
         Share of the static compliance that the law carries, at each force.
-    approach, static_force, area : array, shape (n,) [m], [N], [m^2]
+    approach, static_force, area (n,) [m], [N], [m^2]
         Static contact of the two full bodies, from first touch.
     pattern_force [N]
         Force whose pressure pattern the ports carry; nan for a law that is given.
     half_width [m]
         Of the contact at that force.
-    size_ratio [-]
-        Element size across the contact over the half width; good up to 1, doubtful above 1.5.
-    points_across
-        Loaded contact points across the whole width then; 0 if unknown.
-    doubts
-        Why no error of impacts on this stop can be judged, each in a few words.
-    needed_yield [Pa]
-        Yield stress from which on both bodies stay elastic; nan where it is not known.
+    size_ratio, points_across, doubts, needed_yield
+        See :class:`klack.analyses.impact.record.ContactSummary`.
     friction [-]
         Coulomb's coefficient between the faces.
     returning (k,) [N]
@@ -179,12 +167,12 @@ class StrokeVariant:
     name
         ``"wet"``, ``"dry"``, ``"wet-lumped"`` or ``"dry-lumped"``.
     label
-        What a legend says, for example ``"n-heptane at 5 bar, 20 + 40 modes"``.
+        For a legend, for example ``"n-heptane at 5 bar, 20 + 40 modes"``.
     modes
         Degrees of freedom of all bodies.
     opening_time [s]
-        From time zero to the first touch of the opening stop in the stroke of ``times``; None if
-        it is not touched.
+        From time zero to the first touch of the opening stop in the stroke of ``times``, if it is
+        touched.
     closing_time [s]
         The same for the seat, after the largest lift of that stroke.  A valve that starts open
         closes before it opens.  Neither is ever negative.
@@ -257,13 +245,11 @@ class StrokeStudy(CaseRecord):
     switch_off [s]
         When the drivers' command ends; None if no driver says.
     duration, step [s]
-    variants : mapping of name to StrokeVariant
+    variants
         The first one is the one to compare with; the last one may be incomplete, see
         :attr:`~klack.simulation.network_result.NetworkResult.failure`.
     bodies
         Their ``compliance_share`` is the smallest of all contact ports.
-    fluid
-        None for a case without fluid.
     structures
         Held bodies as sources of sound, their stops by the names of the end stops.
     schematic
@@ -291,23 +277,17 @@ class StrokeStudy(CaseRecord):
 
     @property
     def opening_time(self) -> float | None:
-        """Opening time of the reference [s]; None if it does not reach its stop."""
+        """Opening time of the reference [s], if it reaches its stop."""
         return self.reference.opening_time
 
     @property
     def closing_time(self) -> float | None:
-        """Closing time of the reference [s]; None if it does not reach its seat."""
+        """Closing time of the reference [s], if it reaches its seat."""
         return self.reference.closing_time
 
 
 class IncompleteStrokeError(ConvergenceError):
-    """A variant failed during the run; ``study`` has it until then, and all variants before it.
-
-    Parameters
-    ----------
-    study
-        Says in its warnings what is missing.
-    """
+    """A variant failed during the run; ``study`` has it until then, and all variants before it."""
 
     def __init__(self, text: str, study: StrokeStudy) -> None:
         super().__init__(text)

@@ -19,7 +19,7 @@ _NOTHING = 1e-9  # of the highest load: round-off
 
 
 def line_load_picture(variant: StrokeVariant) -> Picture | None:
-    """Draw the first impacts of a variant; None where none was recorded."""
+    """Draw the first impacts of a variant, if any were recorded."""
     found = recorded_impacts(variant)
     shown = found[:_SHOWN]
     if not shown:

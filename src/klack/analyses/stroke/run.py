@@ -81,7 +81,7 @@ def run_stroke(
     progress: Progress = silent,
     threads: int | None = None,
 ) -> StrokeStudy:
-    """Compute one actuation in several variants and lay them side by side.
+    """Compute one actuation in several variants and compare them.
 
     Parameters
     ----------
@@ -89,14 +89,6 @@ def run_stroke(
         Among :data:`klack.case.levels.VARIANTS`; those of the case by default.
     after
         Continue from the end of this study of the same case, for another duration.
-    progress
-        Called with stage and fraction.
-    threads
-        Of the factorisations.
-
-    Returns
-    -------
-    StrokeStudy
 
     Raises
     ------
@@ -185,12 +177,7 @@ def variant_network(valve: Valve, variant: Variant) -> Network:
 class VariantRun:
     """One variant of a stroke, the rows that it ran on, and why it ended early.
 
-    Parameters
-    ----------
-    failure
-        With ``variant`` up to there.
-    steps
-        None where they were not checked.
+    Where the steps were not checked, ``steps`` is None.
     """
 
     variant: StrokeVariant
@@ -216,16 +203,14 @@ def stroke_study(
     warnings: tuple[str, ...] = (),
     schematic: str = "",
 ) -> StrokeStudy:
-    """Record of variants that were computed.
+    """Record of variants that were computed, from a valve that may be without meshes and contacts.
 
     Parameters
     ----------
-    valve
-        Its meshes and contacts are not needed.
     made
         See :func:`~klack.analyses.record.run_fields`: by which version, when, in which time.
     schematic
-        Picture of the network (SVG).
+        SVG.
     """
     case = valve.case
     rows = [run.rows for run in runs.values()]
@@ -378,8 +363,6 @@ def one_variant(
 
 
 class _Attempt(NamedTuple):
-    """A run, the rows that it ran on, and why it ended early."""
-
     rows: Rows
     result: NetworkResult
     failure: ConvergenceError | None

@@ -1,9 +1,9 @@
 """How much impacts depend on the time steps: against a run with all steps twice as long.
 
 An error of first order in the steps doubles with them, and one of second order becomes four times
-as large: the difference of the two runs is the error of the shorter steps, or three times that,
-where errors fall so evenly.  It is no bound: an error that depends on where a step happens to lie
-may differ less, and what both runs share, the model and what counts as an impact, is not seen.
+as large: the difference of the two runs is the error of the shorter steps, or three times that.  It
+is no bound: an error that depends on where a step happens to lie may differ less, and what both
+runs share, the model and what counts as an impact, is not seen.
 """
 
 from collections.abc import Iterator, Sequence
@@ -158,7 +158,7 @@ class CheckedSteps(NamedTuple):
     doubt
         Sentence on what still depends on the steps, or on why they were not checked.
     halvings
-        How often all steps were halved.
+        Of all steps.
     """
 
     changes: tuple[ImpactChange, ...] = ()
@@ -170,7 +170,7 @@ class CheckedSteps(NamedTuple):
         return max((change.over_promise(accuracy) for change in self.changes), default=0.0)
 
     def certificate(self, accuracy: Accuracy) -> tuple[int, float]:
-        """How often all steps were halved, and the change over the promise: inf in other doubt."""
+        """Halvings of all steps, and the change over the promise: inf in other doubt."""
         largest = self.largest(accuracy)
         return self.halvings, inf if self.doubt and largest <= SHARE else largest
 
@@ -180,7 +180,7 @@ def checked_steps(
 ) -> CheckedSteps:
     """Compare a run with one in steps twice as long, up to where the first of them ends.
 
-    What comes after ``until`` [s] does not count: nothing was asked for there.
+    Only what comes before ``until`` [s] counts.
     """
     end = min(until, *(float(one.time[-1]) for one in (run, longer)))
     late = ImpactChange(number=0, reason=_AFTER)

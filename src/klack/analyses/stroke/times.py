@@ -53,8 +53,6 @@ class LiftTimes:
 
     Parameters
     ----------
-    body
-        Component.
     starts
         ``"closed"`` or ``"open"``: the nearer end of the lift at the start.  A valve that starts
         open closes first, and its opening is the one after that.
@@ -84,12 +82,7 @@ def all_lift_times(
 ) -> tuple[LiftTimes, ...]:
     """Times of the needle first, then of every other body that stops hold on both sides.
 
-    Parameters
-    ----------
-    rows
-        Of the same run.
-    needle, point
-        Component, and its port whose displacement is the lift.
+    ``point`` is the port of the needle whose displacement is the lift.
     """
     travel = Travel.of(rows)
     found = []
@@ -134,9 +127,9 @@ def lift_times(
     time (n,) [s]
     displacement (n,) [m]
         Along +z, the direction of opening.
-    ends : (float, float) [m]
+    ends [m]
         Displacements closed and open; infinite where no stop ends the lift.
-    stops : (str, str)
+    stops
         End stops there.
     """
     closed, opened = ends
@@ -227,7 +220,6 @@ def _mirrored(motion: Passage) -> Passage:
 
 
 def _crossing(time: Vector, share: Vector, k: int, level: float) -> float:
-    """Time of a level between the records ``k`` and ``k + 1``."""
     part = (level - share[k]) / (share[k + 1] - share[k])
     return float(time[k] + part * (time[k + 1] - time[k]))
 

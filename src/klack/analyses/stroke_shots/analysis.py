@@ -1,4 +1,4 @@
-"""Many strokes on disk; see :mod:`klack.analyses.store`.
+"""Many strokes in words and numbers, and on disk.
 
 ``result.zarr/study/variants/dry/stops/seat/peak_force`` holds one number per stroke.
 """
@@ -208,7 +208,7 @@ def _ratio(wet: Scattered, dry: Scattered) -> RatioJson:
 
 
 def stroke_shots_told(study: StrokeShotsStudy) -> Iterator[TextTable | str]:
-    """Terminal output: scatter of each variant, correlations, wet against dry, and the answers."""
+    """Scatter of each variant, correlations, wet against dry, and the answers."""
     row = "in a row" if study.carry else "independent"
     for name, shots in study.variants.items():
         title = f"{study.title}: {study.count} strokes {name}, {row}, seed {study.seed}"
@@ -222,7 +222,7 @@ def stroke_shots_told(study: StrokeShotsStudy) -> Iterator[TextTable | str]:
 
 
 def scatter_rows(shots: Variant) -> tuple[tuple[str, ...], ...]:
-    """Rows of :data:`SCATTER_COLUMNS`, one per measure, as text."""
+    """Rows of :data:`SCATTER_COLUMNS`."""
     rows = []
     for item in scattered(shots):
         known = item.values[np.isfinite(item.values)]

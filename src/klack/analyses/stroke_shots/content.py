@@ -1,4 +1,4 @@
-"""Content and figures of a report of many strokes before its layout, for screen and paper."""
+"""Content and figures of a report of many strokes."""
 
 from math import ceil
 
@@ -39,11 +39,10 @@ Floats = NDArray[np.float64]
 
 VARIANT_COLOURS: dict[str, Colour] = {"wet": "blue", "dry": "green"}
 _MOST_TRACES = 60
-"""Thin lines of strokes; more would only cover each other and cost bytes."""
 
 
 def rebound_chart(study: StrokeShotsStudy, stop: str) -> Chart | None:
-    """Rebound height and restitution over the eccentricity at touch; None without a rebound."""
+    """Rebound height and restitution over the eccentricity at touch, if any stroke rebounds."""
     every = [shots.stops[stop] for shots in study.variants.values()]
     if not any(np.isfinite(columns.eccentricity).any() for columns in every):
         return None
@@ -265,7 +264,6 @@ def _plane(
 
 
 _LISTED = 100
-"""Strokes in a table; the result holds all of them."""
 
 
 def stroke_shots_content(study: StrokeShotsStudy) -> Content:
@@ -357,7 +355,6 @@ def _drawn(study: StrokeShotsStudy) -> Section:
 
 
 def _strokes(name: str, shots: VariantShots, stop: str) -> Table:
-    """One row per stroke with its first impact on a stop, the centred one first."""
     columns = shots.stops[stop]
     best = highest_rebound(shots, stop)
     heads = (
@@ -408,7 +405,6 @@ def _printed(value: float, unit: str, digits: int) -> str:
 
 
 def _numbers(study: StrokeShotsStudy) -> Table:
-    """Centred stroke, mean and standard deviation of every variant."""
     parts = {name: {item.key: item for item in scattered(v)} for name, v in study.variants.items()}
     keys = dict.fromkeys(key for items in parts.values() for key in items)
     rows = []

@@ -1,4 +1,4 @@
-"""One stroke of many: where it starts, its numbers, and how they are kept while others run."""
+"""One stroke of many: where it starts, and its numbers."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -69,7 +69,7 @@ class StrokeStart:
         Position of the axis of the needle at the height of its seat.
     lean (2,) [rad]
         Slope of that axis over the height: towards x and y.
-    placement : array, shape (6,) [m], [rad]
+    placement (6,) [m], [rad]
         The same as a translation of the centre of mass and a rotation vector; with a turn about
         the axis, which guides with friction leave behind.
     friction [-]
@@ -92,8 +92,6 @@ class Starts:
 
     Parameters
     ----------
-    case
-        With a section ``shots`` and a guide.
     height [m]
         Of the seat in the drawing of the needle.
     centre (3,) [m]
@@ -118,12 +116,8 @@ class Starts:
     def drawn(self, index: int) -> StrokeStart:
         """Start of an independent stroke, or of the first one of a row.
 
-        It depends on the seed and on its number alone.
-
-        Raises
-        ------
-        InputError
-            When the guide leaves no room for the stated eccentricity and tilt.
+        It depends on the seed and on its number alone.  InputError when the guide leaves no room
+        for the stated eccentricity and tilt.
         """
         if self.case.placement is not None:
             position = placement_of(self.case, self.height)
@@ -146,10 +140,8 @@ class Starts:
     def after(self, index: int, end: Vector) -> StrokeStart:
         """Start of a stroke where the one before has left the needle across its axis.
 
-        Parameters
-        ----------
-        end : array, shape (6,) [m], [rad]
-            Translation of the centre of mass and rotation vector at the end of the one before.
+        ``end`` (6,) [m], [rad] is the translation of its centre of mass and its rotation vector
+        there.
         """
         lean = np.array([end[4], -end[3]])
         aside = end[:2] + (self.height - self.centre[2]) * lean
@@ -178,10 +170,7 @@ class Starts:
 def shots_of_valve(case: ValveCase) -> StrokeShots:
     """Section ``shots`` of the case of a valve.
 
-    Raises
-    ------
-    InputError
-        For a motion along the axis, in which all strokes are alike, and without a section.
+    InputError for a motion along the axis, in which all strokes are alike.
     """
     where = str(case.path or "case")
     refuse_if(
@@ -216,15 +205,7 @@ _ENERGIES = {
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StrokeSetup:
-    """What all strokes share; sent to each process once.
-
-    Parameters
-    ----------
-    valve
-        Without meshes and contacts.
-    spatial
-        Of the valve.
-    """
+    """What all strokes share, sent to each process once: a valve without meshes and contacts."""
 
     valve: Valve
     spatial: SpatialValve
@@ -256,10 +237,10 @@ class StrokeOutcome:
         Of the variant in words.
     stroke
         One for each field of :class:`klack.analyses.stroke_shots.record.StrokeColumns`.
-    stops : mapping of str to mapping of str to float
+    stops
         By end stop, likewise of :class:`~klack.analyses.stroke_shots.record.StopColumns`.
-    lift : float32 array, shape (k,) [m]
-    end : array, shape (6,) [m], [rad]
+    lift (k,) [m]
+    end (6,) [m], [rad]
         Where it leaves the needle: translation of the centre of mass and rotation vector.
     failure
         Why it ended early; empty if it did not.
@@ -313,7 +294,6 @@ def run_one_stroke(setup: StrokeSetup, task: StrokeTask) -> StrokeOutcome:
 
 
 def _faces(spatial: SpatialValve, start: StrokeStart) -> InterfaceModel:
-    """Model with the friction of the draw between all faces."""
     model = spatial.model
     if np.isnan(start.contact_friction):
         return model
@@ -321,7 +301,6 @@ def _faces(spatial: SpatialValve, start: StrokeStart) -> InterfaceModel:
 
 
 def _nothing(setup: StrokeSetup, task: StrokeTask, failure: str) -> StrokeOutcome:
-    """Outcome of a stroke that could not begin."""
     return StrokeOutcome(
         variant=task.variant,
         label=task.variant,
@@ -416,7 +395,6 @@ def _unrest(setup: StrokeSetup, result: NetworkResult, path: SpatialPath) -> str
 
 
 def _lower(spatial: SpatialValve) -> str:
-    """Stop at the lower end of the needle; empty without one."""
     side = [float(np.sum(spatial.model.axial[a:b])) for _, a, b in spatial.model.contacts]
     return next((s for s, up in zip(spatial.stops, side, strict=True) if up > 0.0), "")
 
@@ -454,20 +432,11 @@ def _stop_numbers(
 def rebound_height(
     events: Sequence[ImpactEvent], event: ImpactEvent, path: SpatialPath, side: float
 ) -> float:
-    """Farthest turn of the centre of mass from a stop after an impact, before another is touched.
+    """Farthest turn [m] of the centre of mass from a stop before another is touched.
 
-    Parameters
-    ----------
-    events
-        Of the whole stroke.
-    side
-        1 for a stop below the needle, -1 for one above.
-
-    Returns
-    -------
-    float [m]
-        From the place at first touch; 0 where the needle comes to rest there, nan where it does
-        not turn, or still moves away at the end.
+    From the place at first touch of an impact; 0 where the needle comes to rest there, nan where it
+    does not turn, or still moves away at the end.  ``events`` are those of the whole stroke;
+    ``side`` is 1 for a stop below the needle, -1 for one above.
     """
     others = [e.time for e in events if e.time > event.time and e.stop != event.stop]
     until = min(others, default=float(path.time[-1]))

@@ -1,8 +1,4 @@
-"""Record of ``klack shots`` of a whole valve: many strokes, and the centred one.
-
-The numbers are plain columns, one row per stroke, so that a stored study can be reported again
-without the solver.
-"""
+"""Record of ``klack shots`` of a whole valve, one row per stroke, and the centred one."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -44,7 +40,7 @@ class HighestRebound:
     stroke
         Its number.
     rebound_height, eccentricity [m]
-        Its own; the eccentricity is that at first touch.
+        The eccentricity is that at first touch.
     place
         In the order of that eccentricity; 1 is the most centred.
     count
@@ -236,7 +232,6 @@ AT_TOUCH: tuple[Measure[Row], ...] = described_in(
         digits=3,
     ),
 )
-"""Position of the needle when it touches a stop."""
 
 COMPARED: tuple[Measure[Row], ...] = described_in(
     _THEORY,
@@ -300,7 +295,6 @@ FIRST_TOUCH_MEASURES: tuple[Measure[Row], ...] = described_in(
         kind="whole",
     ),
 )
-"""All columns of the first impact on a stop."""
 
 HIGHEST_MEASURES: tuple[Measure[HighestRebound], ...] = described_in(
     _THEORY,
@@ -349,11 +343,9 @@ HIGHEST_MEASURES: tuple[Measure[HighestRebound], ...] = described_in(
         form="signed",
     ),
 )
-"""Of the stroke with the highest rebound from a stop."""
 
 
 _STORED = (*STARTED, *RESULTS[:2], *STROKE_MEASURES[-2:-1], *RESULTS[2:], *STROKE_MEASURES[-1:])
-"""Measures of a stroke in the order of the store."""
 
 
 @with_columns(_STORED, later=("contact_friction", "faces_loss"))
@@ -373,17 +365,14 @@ class VariantShots:
     Parameters
     ----------
     name, label
-        ``"wet"`` or ``"dry"``; what a legend says.
+        ``"wet"`` or ``"dry"``; for a legend.
     stops
         By end stop, the seat first.
-    centric
+    centric, centric_stops
         One row: started centred and upright, without Coulomb friction in the guide.
-    centric_stops
-        One row each.
     time (k,) [s]
-    lift : float32 array, shape (n, k) [m]
+    lift (n, k), centric_lift (k,) [m]
         Displacement of the point of the lift; nan after the end of a stroke that failed.
-    centric_lift : float32 array, shape (k,) [m]
     failures
         By the number of the stroke, why it ended early; its row holds what was known by then.
     """
@@ -416,9 +405,7 @@ class StrokeShotsStudy(CaseRecord):
         Of each stroke.
     needle, seat, opening_stop
         Components; empty where the valve has no such stop.
-    guide
-        In words.
-    distributions
+    guide, distributions
         In words.
     largest_eccentricity [m]
         At the height of each stop: what the guide allows to the axis of a rigid needle.
@@ -454,7 +441,7 @@ class StrokeShotsStudy(CaseRecord):
 
 
 def highest_rebound(shots: VariantShots, stop: str) -> HighestRebound | None:
-    """Find the highest rebound of all strokes of a variant; None where no stroke has one."""
+    """Find the highest rebound of all strokes of a variant, if any stroke has one."""
     columns, alone = shots.stops[stop], shots.centric_stops[stop]
     height, off = columns.rebound_height, columns.eccentricity
     known = np.flatnonzero(np.isfinite(height) & np.isfinite(off))

@@ -67,25 +67,13 @@ def run_stroke_shots(
 
     Parameters
     ----------
-    case
-        In three dimensions, with a guide and a section ``shots``.
     variants
         ``wet``, ``dry``; those of the case by default.
-    count, seed
-        Instead of those of the case.
-    workers
-        Processes; as many as there are cores without.
-    folder
-        Where finished strokes are kept until all are there: an interrupted run resumes from them.
-    progress
-        Called with stage and fraction.
-    threads
-        Of the factorisations.
+    count, seed, workers, folder
+        As for :func:`klack.analyses.shots.run.run_shots`.
 
     Raises
     ------
-    InputError
-        A case without strokes in three dimensions, numbers that cannot be.
     ConvergenceError
         Where no stroke of a variant can be computed, or one on which the next ones depend.
     """
@@ -192,12 +180,7 @@ def compute_strokes(
 ) -> None:
     """Compute the strokes that the log does not have, the centred one first, and keep them there.
 
-    Raises
-    ------
-    InputError
-        For a position that the guide has no room for.
-    ConvergenceError
-        For a stroke that failed, where the next one would start from its end.
+    ConvergenceError for a stroke that failed, where the next one would start from its end.
     """
     carry = shots_of_valve(starts.case).carry
     total = len(variants) * (count + 1)
@@ -260,7 +243,6 @@ def _variant(setup: StrokeSetup, name: Variant, count: int, log: StrokeLog) -> V
 
 
 def _require_some(found: Mapping[str, VariantShots]) -> None:
-    """Raise the first failure of a variant of which no stroke has ended."""
     for name, shots in found.items():
         if len(shots.failures) == shots.strokes.count:
             first, text = next(iter(shots.failures.items()))
@@ -271,7 +253,6 @@ def _require_some(found: Mapping[str, VariantShots]) -> None:
 
 
 def _largest(case: ValveCase, spatial: SpatialValve, starts: Starts) -> dict[str, float]:
-    """What the guide allows to the axis at the height of each stop [m]."""
     if case.guide is None:
         return {}
     heights = {

@@ -48,11 +48,7 @@ _CERTAIN = 0.95
 class Scattered:
     """One measure of all strokes of a variant, and of the centred one.
 
-    Parameters
-    ----------
-    stop
-        Whose first impact it is of; empty for the whole stroke.
-    values (n,)
+    ``stop`` is the one whose first impact it is of; empty for the whole stroke.
     """
 
     stop: str
@@ -103,12 +99,8 @@ def median_interval(values: Values) -> tuple[float, float]:
 class ScatterRatio:
     """Standard deviation of a measure over that of another variant.
 
-    Parameters
-    ----------
-    low, high
-        95 % interval; nan for fewer than five pairs.
-    pairs
-        Strokes that have a value in both.
+    ``low`` and ``high`` end the 95 % interval; nan for fewer than five ``pairs``, strokes that have
+    a value in both.
     """
 
     ratio: float
@@ -139,7 +131,7 @@ def scatter_ratio(one: Values, other: Values) -> ScatterRatio:
 
 
 def wet_and_dry(study: StrokeShotsStudy) -> Mapping[str, tuple[Scattered, Scattered]]:
-    """Measures that both variants have, wet and dry; none for a study of one variant."""
+    """Measures that both variants have, wet and dry."""
     if not {"wet", "dry"} <= set(study.variants):
         return {}
     dry = {item.key: item for item in scattered(study.variants["dry"])}
@@ -171,10 +163,7 @@ _RATIOS = ("peak_force", "rebound_height", "injected_energy")
 def stroke_answers(study: StrokeShotsStudy, told: Told = told_value) -> Iterator[str]:
     """Scatter of each variant, wet against dry, and the highest rebound from each stop.
 
-    Parameters
-    ----------
-    told
-        Writes a value with its unit and so many digits.
+    ``told`` writes a value with its unit and so many digits.
     """
     yield from scatter_answers(study, told)
     yield from ratio_answers(study)

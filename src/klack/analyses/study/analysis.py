@@ -1,4 +1,4 @@
-"""A study on disk; see :mod:`klack.analyses.store`.
+"""A study in words and numbers, and on disk.
 
 ``result.zarr/study/measures/0/values`` holds one number per point.
 """
@@ -302,7 +302,7 @@ def _column(item: StudyColumn) -> StudyColumnJson:
 
 
 def study_told(record: StudyRecord) -> Iterator[TextTable | str]:
-    """What a terminal shows: how each parameter varies, and the range of each measure."""
+    """How each parameter varies, and the range of each measure."""
     yield TextTable(
         title=f"{record.title or record.case}, {variant_words(record)}",
         columns=("parameter", "today", "values"),

@@ -39,7 +39,7 @@ class PointSteps(NamedTuple):
     Parameters
     ----------
     halvings
-        How often all steps were halved.
+        Of all steps.
     change [-]
         Largest change of the impacts that the measures depend on with all steps twice as long, over
         what the accuracy promises; inf where one has no counterpart, nan where nothing was checked.
@@ -62,10 +62,8 @@ class PointRow:
 
     Parameters
     ----------
-    values
-        Of the measures, in their order.
     failure
-        Why there are none; empty if it was computed.
+        Why there are no values; empty if it was computed.
     notes
         Doubts about the numbers.
     others
@@ -115,9 +113,8 @@ Taken = Callable[[], Sequence[warnings.WarningMessage]]
 class PointKind(ABC, Generic[CaseT, Built]):
     """What a study computes at its points: strokes of a valve, impacts and shots of two bodies.
 
-    Points are computed one by one, each by the functions of a single run, so that a row depends
-    neither on who computes it nor on the other points.  Those with the same bodies share what is
-    built for them.
+    Each point is computed by the functions of a single run.  Those with the same bodies share what
+    is built for them.
     """
 
     builds: int
@@ -129,49 +126,23 @@ class PointKind(ABC, Generic[CaseT, Built]):
     def asked_variant(self, study: CaseStudy) -> str | None:
         """What the study says of the variant.
 
-        Raises
-        ------
-        InputError
-            For a key of the study that this kind of case does not have; ``where`` is that key.
+        An error names a key of the study that this kind of case does not have.
         """
 
     @abstractmethod
     def variant(self, case: CaseT, name: str | None, chosen: Sequence[ChosenMeasure]) -> str:
-        """Check that a case can run a variant, or level; its own one by default.
+        """Check that a case can run a variant, or level, for some measures; its own by default.
 
-        Parameters
-        ----------
-        chosen
-            What the points are computed for.
-
-        Returns
-        -------
-        str
-            What is computed at the points: with equal values of its keys a point is the same if
-            this is.
-
-        Raises
-        ------
-        InputError
+        Returns what is computed at the points: with equal values of its keys a point is the same if
+        this is.
         """
 
     @abstractmethod
     def measures(self, case: CaseT, names: Iterable[str]) -> tuple[ChosenMeasure, ...]:
-        """Measures by their names, each once.
-
-        Raises
-        ------
-        InputError
-            With the nearest name, at ``measures``.
-        """
+        """Measures by their names, each once; an error proposes the nearest name."""
 
     def require_keys(self, keys: Iterable[PointKey]) -> None:
-        """Refuse points that exchange what is the same for all of them.
-
-        Raises
-        ------
-        InputError
-        """
+        """Refuse points that exchange what is the same for all of them."""
         section, what, hint = self.same
         for key in keys:
             refuse_if(
@@ -201,16 +172,7 @@ class PointKind(ABC, Generic[CaseT, Built]):
     ) -> Built:
         """Bodies, modes and laws of a group.
 
-        Parameters
-        ----------
-        tree
-            With the values of the group.
-        case : Case or ValveCase
-            Of the first point.
-
-        Raises
-        ------
-        KlackError, LinAlgError, MemoryError
+        ``tree`` has the values of the group; ``case`` is that of the first point.
         """
 
     def close(self, built: Built) -> None:
@@ -225,10 +187,7 @@ class PointKind(ABC, Generic[CaseT, Built]):
     ) -> int:
         """Threads for these points: one, where they hold the interpreter.
 
-        Raises
-        ------
-        InputError
-            If so many points at a time do not fit into the memory.
+        InputError if so many points at a time do not fit into the memory.
         """
         return 1
 
@@ -253,12 +212,7 @@ class PointKind(ABC, Generic[CaseT, Built]):
 
     @abstractmethod
     def pressure(self, asked: "AskedPoints[CaseT]", built: Built, place: int) -> TimeSeries | None:
-        """Sound of a click of one point; None where there is none.
-
-        Raises
-        ------
-        KlackError
-        """
+        """Sound of a click of one point, if there is one."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -267,8 +221,6 @@ class AskedPoints(Generic[CaseT]):
 
     Parameters
     ----------
-    tree
-        The same as it was written.
     variant
         Of the stroke; of an impact its level, ``"shots"``, or both.
     checks
@@ -294,12 +246,7 @@ class AskedPoints(Generic[CaseT]):
 class PointGroup:
     """Points with the same bodies and contact laws.
 
-    Parameters
-    ----------
-    made : mapping of Key to value
-        What these points exchange that bodies and laws follow from.
-    places
-        Of the points.
+    ``made`` is what they exchange that bodies and laws follow from.
     """
 
     made: Mapping[Key, PointValue]

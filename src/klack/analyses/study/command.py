@@ -91,7 +91,6 @@ def optimise(
 
 
 def _tree(case: Path, component: Components, check_steps: bool | None) -> "CaseTree":
-    """Case as it was written, with the check of the steps that the command line asks for."""
     from klack.case.any_case import read_case_tree, tree_of
     from klack.case.reader import find_case
     from klack.case.rewriting import with_values

@@ -1,8 +1,8 @@
 """Points of one case on the threads of this process, those with the same bodies together.
 
 Meshes, modes and contact laws are made once for all points that leave them as they are.  Every
-point is computed alone and from rest, by the very functions that compute a single run: its numbers
-depend neither on the number of threads nor on the other points.
+point is computed from rest, by the very functions that compute a single run: its numbers depend
+neither on who computes it nor on the other points.
 """
 
 import threading
@@ -60,12 +60,10 @@ def on_threads(
 ) -> None:
     """Compute something for every item on threads.
 
-    Beside :mod:`klack.analyses.workers`, whose processes each load klack and hold their own arrays.
+    The processes of :mod:`klack.analyses.workers` each load klack and hold their own arrays.
 
     Parameters
     ----------
-    items
-        Taken in their order.
     compute
         Gets an item and a function to call now and then, which raises :class:`Stopped` once the
         work has been given up.  Must not raise anything else.
@@ -150,12 +148,8 @@ def _controller() -> ThreadpoolController:
 def warnings_of_threads() -> Iterator[Callable[[], list[warnings.WarningMessage]]]:
     """Collect warnings of each thread apart from those of the others.
 
-    Within, nothing else may exchange the filters of warnings: they belong to the whole process.
-
-    Yields
-    ------
-    callable
-        Warnings of the thread that calls it, since it called last.
+    Yields a function: warnings of the thread that calls it, since it called last.  Within, nothing
+    else may exchange the filters of warnings: they belong to the whole process.
     """
     caught: dict[int, list[warnings.WarningMessage]] = {}
 
@@ -184,15 +178,10 @@ def warnings_of_threads() -> Iterator[Callable[[], list[warnings.WarningMessage]
 
 
 class Agenda:
-    """Hands points out.
+    """Hands out points, by their groups of the same bodies.
 
     A worker gets the next points of the bodies that it has; then bodies that no worker has begun
     with; then those that others have begun with the longest ago.
-
-    Parameters
-    ----------
-    groups : sequence of sequence of int
-        Places of the points that share their bodies.
     """
 
     def __init__(self, groups: Sequence[Sequence[int]]) -> None:
@@ -204,12 +193,7 @@ class Agenda:
     def take(self, worker: object = None, most: int = 1) -> tuple[int, ...]:
         """Next points for a worker, all with the same bodies; none if no point is left.
 
-        Parameters
-        ----------
-        worker
-            Compared with those of other calls; None for one that has no bodies yet.
-        most
-            Points at a time.
+        ``worker`` is compared with those of other calls; None for one that has no bodies yet.
         """
         group = self._group_for(worker)
         if group is None:
@@ -282,7 +266,7 @@ class Builds(Closing):
         self._found: OrderedDict[tuple[object, ...], tuple[AskedPoints, Any]] = OrderedDict()
 
     def find(self, asked: AskedPoints, group: PointGroup) -> Any:
-        """What a group needs; None if it is not there."""
+        """What a group needs, if it is there."""
         return self._found.get(self._key(asked, group), (None, None))[1]
 
     def keep(self, asked: AskedPoints, group: PointGroup, built: Any) -> None:
@@ -316,26 +300,15 @@ def compute_points(
 ) -> int:
     """Compute some of the points, those with the same bodies one after another.
 
+    Returns how many were computed at a time, at most.  InputError where so many do not fit into the
+    memory; Ctrl-C after the rows that were finished have been kept.
+
     Parameters
     ----------
-    places
-        Of the points that are wanted.
     keep
         Called in this thread with each place and its row, in the order of their end.
     builds
         Bodies and laws that were made before.
-
-    Returns
-    -------
-    int
-        Points that were computed at a time, at most.
-
-    Raises
-    ------
-    InputError
-        Where so many points at a time do not fit into the memory.
-    KeyboardInterrupt
-        Ctrl-C, after the rows that were finished have been kept.
     """
     wanted, most = list(places), 0
     tally = Tally(len(asked.points), len(wanted), keep, progress)
@@ -374,17 +347,9 @@ def _run_group(
 
 
 def compute_alone(asked: AskedPoints, builds: Builds) -> list[PointRow]:
-    """Compute all points in this thread, one after another.
+    """Compute all points in this thread, one after another, from bodies that were made before.
 
-    Parameters
-    ----------
-    builds
-        Bodies and laws that were made before.
-
-    Returns
-    -------
-    list of PointRow
-        In the order of the points; warnings of the bodies go with the last one.
+    Warnings of the bodies go with the last row.
     """
     found: dict[int, PointRow] = {}
     with warnings.catch_warnings(record=True) as caught, one_thread_of_blas():
@@ -444,7 +409,7 @@ def _build(
 
 
 def sounds_of(asked: AskedPoints, progress: Progress) -> tuple[TimeSeries | None, ...]:
-    """Sound of a click of every point, computed once more; None where there is none."""
+    """Sound of a click of every point, computed once more, if there is one."""
     found: list[TimeSeries | None] = [None] * len(asked.points)
     done = 0
     with warnings.catch_warnings(), one_thread_of_blas():
@@ -463,10 +428,7 @@ def sounds_of(asked: AskedPoints, progress: Progress) -> tuple[TimeSeries | None
 
 
 class PointWorkers(Closing):
-    """Threads, processes or a cluster that compute points, which end when it is closed.
-
-    A row does not depend on who computes it: every point is computed alone, by one thread.
-    """
+    """Threads, processes or a cluster that compute points, which end when it is closed."""
 
     count: int
     """Points that are computed at a time."""
@@ -481,32 +443,14 @@ class PointWorkers(Closing):
         keep: Callable[[int, PointRow], None],
         progress: Progress,
     ) -> None:
-        """Compute some of the points.
+        """Compute some of the points, and keep each row once, as :func:`compute_points` does.
 
-        Parameters
-        ----------
-        places
-            Of the points that are wanted.
-        keep
-            Called in this thread with each place and its row, once, in the order of their end.
-
-        Raises
-        ------
-        InputError
-            Where no point can be computed: the memory is too small, a file is missing there.
-        KeyboardInterrupt
-            Ctrl-C, after the rows that were finished have been kept.
+        InputError where no point can be computed: the memory is too small, a file is missing there.
         """
 
 
 class ThreadWorkers(PointWorkers):
-    """Threads of this process: strokes run outside of the interpreter.
-
-    Parameters
-    ----------
-    threads
-        All cores by default.
-    """
+    """Threads of this process, all cores by default: strokes run outside of the interpreter."""
 
     words = "threads"
 

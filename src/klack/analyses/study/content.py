@@ -48,12 +48,10 @@ from klack.studies.fronts import spread_over
 __all__ = ["study_content"]
 
 _LISTED = 100
-"""Points in the table; the result holds all of them."""
 _OF_FRONT = 24
 """Points of a front in its table."""
 _MANY_ROWS = 1024
 _FEWEST = 8
-"""Points from which a rank correlation means something."""
 
 
 def study_content(record: StudyRecord) -> Content:
@@ -166,7 +164,7 @@ def _answer(
 
 
 def _best_answer(record: StudyRecord, labels: dict[str, str]) -> str:
-    """The point that is recommended, against that of today; empty without an optimum."""
+    """The recommended point, against that of today; empty without an optimum."""
     found = record.optimum
     if found is None or found.best < 0:
         return ""
@@ -225,7 +223,6 @@ def _optimum_sections(record: StudyRecord, labels: dict[str, str]) -> tuple[Sect
 
 
 def _listen(record: StudyRecord, found: Optimum, labels: dict[str, str]) -> Section:
-    """Sounds of the case as it is and of points of the front, at one scale."""
     if not record.sounds:
         return Section(title="Listen")
     scale = full_scale_of(*(item.pressure for item in record.sounds))
@@ -296,7 +293,6 @@ def _related_table(
 
 
 def _missed_section(record: StudyRecord) -> Section:
-    """How often drawn points miss each bound; empty without bounds."""
     rows = tuple(missed_cells(item) for item in record.missed)
     return Section(
         title="How often a drawn valve misses a bound",
@@ -305,7 +301,6 @@ def _missed_section(record: StudyRecord) -> Section:
 
 
 def _screening_section(record: StudyRecord, labels: dict[str, str]) -> Section:
-    """Effects of each parameter on each measure; empty without trajectories."""
     rows = [
         (labels[item.measure], labels[item.parameters[k]], *cells)
         for item in record.screenings
@@ -324,7 +319,6 @@ def _screening_section(record: StudyRecord, labels: dict[str, str]) -> Section:
 
 
 def _sensitivity_section(record: StudyRecord, labels: dict[str, str]) -> Section:
-    """Bars and numbers of Sobol's indices; empty without them."""
     known = [item for item in record.sensitivities if np.isfinite(item.total).any()]
     told = [
         f"{labels[item.measure]}: {item.reason}." for item in record.sensitivities if item.reason
@@ -351,7 +345,6 @@ def _sensitivity_section(record: StudyRecord, labels: dict[str, str]) -> Section
 def _share_tables(
     items: Sequence[Sensitivity | StudySurrogate], labels: dict[str, str]
 ) -> tuple[Table, ...]:
-    """Shares of the variance of each measure; none without any."""
     rows = tuple(
         (labels[item.measure], labels[name], *index_cells(item, k))
         for item in items
@@ -362,7 +355,7 @@ def _share_tables(
 
 
 def _surrogate_sections(record: StudyRecord, labels: dict[str, str]) -> tuple[Section, ...]:
-    """How well surrogates predict, and what follows from those that do; none without them."""
+    """How well surrogates predict, and what follows from those that do."""
     if not record.surrogates:
         return ()
     used = [item for item in record.surrogates if not item.reason]

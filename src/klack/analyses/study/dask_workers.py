@@ -1,4 +1,4 @@
-"""Points on a cluster, by dask.distributed: its tasks, and what comes back."""
+"""Points on a cluster, by dask.distributed."""
 
 import asyncio
 from collections import Counter, deque
@@ -31,7 +31,7 @@ Given = TypeVar("Given")
 LOST = (OSError, futures.CancelledError, asyncio.CancelledError)
 """Raised where a worker, or the scheduler, is lost; a timeout is the first of them."""
 _FETCH = 5.0
-"""For the rows of a task to come from its worker [s]."""
+"""Time for the rows of a task to come from its worker [s]."""
 _ROUNDS = 2
 """Times that dask gives a point up, each after four workers: over a neighbour, then over itself."""
 
@@ -39,12 +39,7 @@ _ROUNDS = 2
 class DaskTasks:
     """Tasks of a client, each with some points.
 
-    Parameters
-    ----------
-    tally
-        Gets the rows.
-    learn
-        Gets each answer.
+    ``tally`` gets the rows, ``learn`` each answer.
     """
 
     def __init__(
@@ -77,10 +72,7 @@ class DaskTasks:
     def settle(self, patience: float) -> None:
         """Wait for tasks that end, at most so long [s], and keep their rows.
 
-        Raises
-        ------
-        InputError
-            Where a worker cannot compute any point.
+        InputError where a worker cannot compute any point.
         """
         ended = {*self._taken(patience), *self._lost}
         self._lost.clear()
@@ -117,12 +109,8 @@ class DaskTasks:
         """Fetch the rows of a task; return why its worker refused, if it did.
 
         The worker that has them may be lost at this moment.  Dask has them computed again then; a
-        fetch of all tasks at once would wait for that, and lose the rows of others meanwhile.
-
-        Raises
-        ------
-        Exception
-            Where what has come cannot be read: it would not be read another time either.
+        fetch of all tasks at once would wait for that, and lose the rows of others meanwhile.  It
+        raises where what has come cannot be read: it would not be read another time either.
         """
         try:
             address, found = future.result(timeout=_FETCH)
@@ -192,12 +180,7 @@ _FEWEST = 16
 
 
 def require_dask() -> None:
-    """Refuse a cluster without dask.distributed.
-
-    Raises
-    ------
-    MissingExtraError
-    """
+    """Refuse a cluster without dask.distributed."""
     try:
         import distributed  # noqa: F401
     except ImportError:
@@ -207,21 +190,9 @@ def require_dask() -> None:
 class DaskWorkers(PointWorkers):
     """Workers of a cluster of dask compute, this process keeps the rows.
 
-    Points that a lost worker had at that moment are computed by others.
-
-    Parameters
-    ----------
-    tree
-        The same as it was written.
-    scheduler : str, Client or Cluster
-        Address, a file with it, a client, which stays open, or a cluster.
-
-    Raises
-    ------
-    MissingExtraError
-        Without dask.distributed.
-    InputError
-        If the scheduler does not answer, or if the case cannot be sent.
+    Points that a lost worker had at that moment are computed by others.  InputError if the
+    scheduler (address, a file with it, a client, which stays open, or a cluster) does not answer,
+    or if the case cannot be sent.
     """
 
     words = "workers of dask"
@@ -249,10 +220,7 @@ class DaskWorkers(PointWorkers):
     ) -> None:
         """Compute some of the points, as :class:`PointWorkers` says.
 
-        Raises
-        ------
-        ConvergenceError
-            If the scheduler is lost.
+        ConvergenceError if the scheduler is lost.
         """
         self._require_a_worker(progress)
         groups = groups_of(asked, places)
@@ -366,13 +334,7 @@ class _TaskSize:
 
 
 def _client(scheduler: "str | Client") -> "tuple[Client, bool]":
-    """A client, and whether it is to be closed.
-
-    Raises
-    ------
-    InputError
-        If the scheduler does not answer.
-    """
+    """A client, and whether it is to be closed; InputError if the scheduler does not answer."""
     from distributed import Client
 
     if isinstance(scheduler, Client):

@@ -1,8 +1,8 @@
 """Rows of points: those that are known, and the others computed and kept.
 
-They are kept for the same case, whatever the studies of it: a file in the folder of the results for
-each case and version of klack; a point is known by what the case has there and by its variant.  A
-later study of the same case finds the points that both have.
+A file in the folder of the results holds them for each case and version of klack; a point is known
+by what the case has there and by its variant.  A later study of the same case finds the points that
+both have.
 """
 
 import json
@@ -50,13 +50,7 @@ _ASIDE = ("study", "calibration", "measurement", "title", "description")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KeptPoint:
-    """Measures of one point by their names, or why it has none.
-
-    Parameters
-    ----------
-    steps
-        See :class:`~klack.analyses.study.asked_points.PointRow`.
-    """
+    """Measures of one point by their names, or why it has none."""
 
     values: Mapping[str, float | None]
     failure: str
@@ -65,7 +59,7 @@ class KeptPoint:
     steps: PointSteps | None = None
 
     def row(self, measures: tuple[str, ...]) -> PointRow | None:
-        """Row of a table of these measures; None if one of them is not known."""
+        """Row of a table of these measures, if all of them are known."""
         if self.failure:
             return PointRow((None,) * len(measures), self.failure, self.notes, steps=self.steps)
         if not all(name in self.values for name in measures):
@@ -174,14 +168,7 @@ def asked_of(
     written: GivenPoints,
     names: Iterable[str],
 ) -> AskedPoints:
-    """Points of a study, with the measures of these names.
-
-    Raises
-    ------
-    InputError
-        With file, line and key: for a measure, a variant or a level that does not exist; and
-        those of :func:`~klack.analyses.study.kinds.ask`.
-    """
+    """Points of a study, with the measures of these names; errors name file, line and key."""
     try:
         variant = kind_of(case).asked_variant(source.study)
         return ask(case, tree, written, names, variant)
@@ -254,12 +241,7 @@ _TOLD = 5
 
 
 def require_some(source: StudySource, rows: Sequence[PointRow]) -> None:
-    """Refuse a study without a single number.
-
-    Raises
-    ------
-    InputError
-    """
+    """Refuse a study without a single number."""
     reasons = Counter(row.failure.partition("\n")[0] for row in rows)
     if rows and not reasons[""]:
         reason, times = reasons.most_common(1)[0]

@@ -42,9 +42,7 @@ __all__ = [
 ]
 
 _MOST_LINES = 4000
-"""More lines hide each other and cost bytes."""
 _MOST_EFFECTS = 3
-"""Main effects that are drawn of one measure."""
 _LEAST_SHARE = 0.01
 _MARGIN = 0.05
 """Of the range of an axis, free at its ends."""

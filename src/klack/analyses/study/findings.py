@@ -104,13 +104,8 @@ _STAGE = "surrogates"
 def require_surrogates(source: StudySource, points: StudyPoints) -> None:
     """Refuse, before the first run, surrogates that could not tell how wrong they are.
 
-    Raises
-    ------
-    InputError
-        For a design that does not fill the ranges, for too many points, and for points of a file
-        that lie outside of the ranges, on few levels, or crowded.
-    MissingExtraError
-        Without scikit-learn.
+    These are of designs that do not fill the ranges, too many points, and points of a file that lie
+    outside of the ranges, on few levels, or crowded.
     """
     if (asked := source.study.surrogate) is None:
         return
@@ -186,12 +181,7 @@ def _axes(points: StudyPoints) -> list[SurrogateAxis]:
 def surrogates_of(
     kind: SurrogateKind, points: StudyPoints, measures: Sequence[StudyColumn], progress: Progress
 ) -> tuple[StudySurrogate, ...]:
-    """Fit a surrogate to each measure.
-
-    Raises
-    ------
-    MissingExtraError
-    """
+    """Fit a surrogate to each measure."""
     axes, names = _axes(points), tuple(item.name for item in points.space.varied)
     values = [[point[name] for point in points.values] for name in names]
     t = np.column_stack([axis.coordinate(own) for axis, own in zip(axes, values, strict=True)])

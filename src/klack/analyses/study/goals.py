@@ -1,4 +1,4 @@
-"""What an optimisation looks for: measures to minimise or maximise, and bounds to keep."""
+"""What an optimisation searches for: measures to minimise or maximise, and bounds to keep."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -33,14 +33,7 @@ _TODAY = re.compile(r"today(?:\s*(?P<sign>[+-])\s*(?P<change>\S.*))?")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bound:
-    """A bound that a measure has to keep.
-
-    Parameters
-    ----------
-    value [unit of the measure]
-    is_most
-        True for the largest allowed value, False for the smallest.
-    """
+    """A bound, in the unit of a measure: the largest (``is_most``) or smallest allowed value."""
 
     measure: str
     value: float
@@ -54,15 +47,7 @@ class Bound:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Goals:
-    """Objectives and bounds.
-
-    Parameters
-    ----------
-    objectives
-        Measures.
-    signs
-        1 for one to minimise, -1 for one to maximise.
-    """
+    """Objectives and bounds; ``signs`` are 1 for an objective to minimise, -1 to maximise."""
 
     objectives: tuple[str, ...]
     signs: tuple[float, ...]
@@ -82,14 +67,9 @@ class Goals:
     def bound_texts(
         self, units: Mapping[str, str], name: Callable[[str, bool], str]
     ) -> tuple[str, ...]:
-        """Bounds in words.
+        """Bounds in words, with the units of the measures.
 
-        Parameters
-        ----------
-        units
-            Of the measures.
-        name
-            Name of the column of a measure and side.
+        ``name`` gives the name of the column of a measure and side.
         """
         named = [(name(bound.measure, bound.is_most), bound) for bound in self.bounds]
         return tuple(
@@ -97,7 +77,7 @@ class Goals:
         )
 
     def objective_values(self, of: Mapping[Side, NDArray[np.float64]]) -> NDArray[np.float64]:
-        """Numbers to minimise, shape (points, objectives), from columns of measures."""
+        """Numbers to minimise (points, objectives), from columns of measures."""
         pairs = zip(self.signs, self.objectives, strict=True)
         return np.column_stack([sign * of[name, sign > 0.0] for sign, name in pairs])
 
@@ -124,18 +104,8 @@ def goals_of(
 ) -> Goals:
     """Objectives and bounds of a study.
 
-    Parameters
-    ----------
-    measures
-        All that are computed, by their names in the study.
-    today
-        Their values in the case as it is.
-
-    Raises
-    ------
-    InputError
-        With file, line and key: for a bound of another unit, and one by the case as it is where
-        that has no value.
+    ``measures`` are all that are computed, by their names in the study; ``today`` their values in
+    the case as it is, which a bound may count from.
     """
     study = source.study
     return Goals(
@@ -148,7 +118,7 @@ def goals_of(
 def bounds_of(
     source: StudySource, measures: Mapping[str, Measure[object]], today: Mapping[str, float]
 ) -> tuple[Bound, ...]:
-    """Bounds of a study; arguments and errors are those of :func:`goals_of`."""
+    """Bounds of a study, as for :func:`goals_of`."""
     bounds = []
     for name, limit in source.study.constraints.items():
         for key, written in (("most", limit.most), ("least", limit.least)):

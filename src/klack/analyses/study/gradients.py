@@ -26,12 +26,9 @@ _AHEAD = 1e-6
 
 
 def require_gradients(source: StudySource, asked: AskedPoints, space: Space) -> SlopeSpace | None:
-    """Space of the derivatives of a polish; None where none is asked for.
+    """Space of the derivatives of a polish, if one is asked for.
 
-    Raises
-    ------
-    InputError
-        With file, line and key: where a measure or a parameter has no derivative.
+    InputError where a measure or a parameter has no derivative.
     """
     if not source.study.search.polish:
         return None
@@ -68,14 +65,8 @@ def require_gradients(source: StudySource, asked: AskedPoints, space: Space) -> 
 class Gradients:
     """Derivatives at points of a search.
 
-    Parameters
-    ----------
-    runner
-        Of the case.
-    chosen
-        Of the objectives and bounds.
-    notes
-        Why a derivative could not be computed.
+    ``chosen`` are the measures of the objectives and bounds, ``notes`` tell why a derivative could
+    not be computed.
     """
 
     runner: SlopeRunner
@@ -109,10 +100,7 @@ class Gradients:
     def at(self, point: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Derivatives of objectives and bounds, each of shape (..., parameters).
 
-        Raises
-        ------
-        NoValue
-            Where the stroke, or a derivative, cannot be computed.
+        NoValue where the stroke, or a derivative, cannot be computed.
         """
         try:
             runner = self.runner.about(self.slopes.at(self.space.at(point)))

@@ -1,8 +1,8 @@
 """Impacts and shots of two bodies as points of a study.
 
 What the measures ask for is computed: one impact at the level of the study, many shots at the
-interface level, or both.  Every point draws its shots from the same random numbers, that is of the
-seed of the case, so that two designs differ by what they are and not by their luck.
+interface level, or both.  Every point draws its shots with the seed of the case, so that two
+designs differ by what they are and not by their luck.
 
 Most of it holds the interpreter, so that threads compute one point at a time.
 """
@@ -80,7 +80,7 @@ class _Built:
         Of the impact; None where every impact builds its own (in full, and of given models), and
         where no measure takes one.
     shots
-        Of the shots, which start centred and in first touch; None where no measure takes them.
+        Of the shots, which start centred and in first touch.
     """
 
     bodies: ImpactBodies | None
@@ -115,15 +115,14 @@ class _Impacts(PointKind[Case, _Built]):
         return _WITH.join([level] * (not all(of_shots)) + [SHOTS] * any(of_shots))
 
     def measures(self, case: Case, names: Iterable[str]) -> tuple[ChosenMeasure, ...]:
-        """Of a level, of its noise, and of shots."""
         return impact_measures(case, names)
 
     def makes_bodies(self, case: Case, place: Key) -> bool:
         """Whether meshes, places or modes may follow from what stands there.
 
-        The static contact, the pressure pattern and the law follow from speed, forces and friction,
-        the contact points of shots from their distributions, too; all of them are those of each
-        point.  So is the guide.  An upper stop is built for the energy of one impact.
+        Each point has its own static contact, pressure pattern and law, which follow from speed,
+        forces and friction, contact points of shots, which follow from their distributions too, and
+        guide.  An upper stop is built for the energy of one impact.
         """
         if place[0] in _ASIDE:
             return place[:2] == ("run", "transfer")  # takes more modes
@@ -140,7 +139,6 @@ class _Impacts(PointKind[Case, _Built]):
         case: Case,
         progress: Progress,
     ) -> _Built:
-        """Bodies and modes, of an impact and of shots each their own."""
         level = _level(asked)
         with ExitStack() as opened:
             bodies = shots = None
@@ -196,11 +194,9 @@ IMPACTS = _Impacts()
 """Impacts and shots of a case of two bodies."""
 
 _WITH = " + "
-"""Between the level of an impact and its shots."""
 
 
 def _level(asked: AskedPoints[Case]) -> str:
-    """Level of the impact; empty where there is none."""
     return asked.variant.partition(_WITH)[0] if asked.variant != SHOTS else ""
 
 
@@ -208,14 +204,8 @@ def _level(asked: AskedPoints[Case]) -> str:
 class _Point:
     """What a point was computed to.
 
-    Parameters
-    ----------
-    notes
-        Doubts; an empty one is none.
-    models
-        Levels with their modes and laws.
-    meshes : tuple of (str, int)
-        Bodies and their nodes.
+    ``models`` are levels with their modes and laws, ``meshes`` bodies and their nodes.  Notes are
+    doubts; an empty one is none.
     """
 
     run: ImpactOfPoint
@@ -230,7 +220,6 @@ class _Point:
         return "; ".join(filter(None, (*self.models, meshes)))
 
     def with_shots(self, other: "_Point") -> "_Point":
-        """Both of an impact and of its shots."""
         return _Point(
             replace(self.run, shots=other.run.shots),
             (*self.notes, *other.notes),

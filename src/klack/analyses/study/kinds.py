@@ -1,4 +1,4 @@
-"""Which kind of calculation the points of a case are."""
+"""Kind of calculation of the points of a case."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -31,20 +31,7 @@ def ask(
     measures: Iterable[str],
     variant: str | None,
 ) -> AskedPoints:
-    """Check everything that can be known before the first run.
-
-    Parameters
-    ----------
-    tree
-        The same as it was written.
-    variant
-        Of a stroke; of an impact its level.
-
-    Raises
-    ------
-    InputError
-        For a key, a unit, a measure or a variant that does not exist.
-    """
+    """Check everything that can be known before the first run; ``variant`` may be a level."""
     kind = kind_of(case)
     chosen = kind.measures(case, measures)
     asked = points_of(case, tree, points)

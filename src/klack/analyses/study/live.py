@@ -17,13 +17,7 @@ _FIRST, _LONGEST = 5.0, 60.0  # [s] until the first line, and between later ones
 
 
 class Pace:
-    """Tells now and then how an evaluation of points gets on.
-
-    Parameters
-    ----------
-    most
-        Points that will have been asked for at the end.
-    """
+    """Tells now and then how an evaluation proceeds of, in the end, ``most`` points."""
 
     def __init__(self, progress: Progress, most: int) -> None:
         self._progress, self._most = progress, most
@@ -78,12 +72,7 @@ _SHARE = 20.0  # times what a record costs, so that it slows the study by 5 % at
 class LiveRecord:
     """Writes the record of an unfinished study again as points come.
 
-    No fault of it ends the study: it is told, and the record written no more.
-
-    Parameters
-    ----------
-    progress
-        Is told of a fault.
+    A fault of it is told through ``progress``, and the record written no more.
     """
 
     def __init__(self, folder: Path, progress: Progress) -> None:
@@ -118,12 +107,7 @@ _FILE = "progress.html"
 class ProgressPage:
     """A page in the folder of the results, written again as points come.
 
-    No fault of the page ends the search: it is told, and the page written no more.
-
-    Parameters
-    ----------
-    progress
-        Is told where the page is.
+    ``progress`` is told where it is, and of a fault, after which the page is written no more.
     """
 
     def __init__(self, folder: Path, progress: Progress) -> None:

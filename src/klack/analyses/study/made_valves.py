@@ -1,4 +1,4 @@
-"""Valves that are made after a design, about whose values theirs scatter; what they make of it."""
+"""Valves made after a design, about whose values theirs scatter."""
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -47,12 +47,7 @@ class _Scattered:
 class Scatter:
     """What scatters from valve to valve, the same for every design.
 
-    Parameters
-    ----------
-    space
-        Of the study.
-    cube (valves, values)
-        Shares of probability of each valve.
+    ``cube`` (valves, values) has shares of probability.
     """
 
     space: Space
@@ -60,13 +55,7 @@ class Scatter:
     cube: NDArray[np.float64]
 
     def made(self, design: Values) -> list[dict[str, PointValue]]:
-        """What the case file has for each valve made after a design.
-
-        Raises
-        ------
-        InputError
-            For an expression without a value.
-        """
+        """What the case file has for each valve made after a design."""
         own = {item.name: design[item.name] for item in self.space.parameters}
         return [self._valve(own, shares) for shares in self.cube]
 
@@ -88,13 +77,10 @@ class Scatter:
 
 
 def scatter_of(case: AnyCase, source: StudySource, space: Space) -> Scatter | None:
-    """Scatter of made valves; None for a study without.
+    """Scatter of made valves, if the study has one.
 
-    Raises
-    ------
-    InputError
-        With file, line and key: for an unknown name, a key that follows from parameters, and a
-        deviation of another unit or not above zero.
+    InputError for a key that follows from parameters, and a deviation of another unit or not above
+    zero.
     """
     given = source.study.robust
     if given is None:
@@ -110,13 +96,8 @@ def scatter_of(case: AnyCase, source: StudySource, space: Space) -> Scatter | No
 def made_space(case: AnyCase, source: StudySource, space: Space) -> Space:
     """Parameters of valves made after the case as it is: what scatters, about its value there.
 
-    Keys that follow from what scatters follow here too; all others keep their value.
-
-    Raises
-    ------
-    InputError
-        With file, line and key: without a scatter, for a word that has no value in the case, and
-        those of :func:`scatter_of`.
+    Keys that follow from what scatters follow here too; all others keep their value.  InputError
+    without a scatter, and for a word that has no value in the case.
     """
     given = source.study.robust
     if given is None:
@@ -234,10 +215,8 @@ Compute = Callable[[Sequence[Written], Sequence[str]], list[PointRow]]
 class MadeValves:
     """Valves made after every design, and what stands for their measures.
 
-    Parameters
-    ----------
-    today : tuple of mapping
-        Valves made after the case as it is; empty where words of the study have no value there.
+    ``today`` are valves made after the case as it is; empty where words of the study have no value
+    there.
     """
 
     scatter: Scatter
@@ -309,13 +288,7 @@ class MadeValves:
 
 
 def made_valves_of(case: AnyCase, source: StudySource, space: Space) -> MadeValves | None:
-    """Made valves of a study; None for one that compares designs as drawn.
-
-    Raises
-    ------
-    InputError
-        With file, line and key.
-    """
+    """Made valves of a study; None for one that compares designs as drawn."""
     given, scatter = source.study.robust, scatter_of(case, source, space)
     if given is None or scatter is None:
         return None

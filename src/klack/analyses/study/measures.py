@@ -68,12 +68,7 @@ NOISE_WORDS = f"of the noise {_NOISE}.KEY with a key of: {one_of(_OF_DESIGNS)}"
 class PointNoise:
     """Noise of a point, computed once a measure asks for it.
 
-    Parameters
-    ----------
-    source
-        Makes what the noise comes from.
-    transfers
-        Of the bodies, as far as they are known.
+    ``source`` makes what the noise comes from; ``transfers`` are those of the bodies, where known.
     """
 
     def __init__(self, source: Callable[[], NoiseSource], transfers: Transfers) -> None:
@@ -109,12 +104,10 @@ class PointNoise:
 
 @dataclass(frozen=True, slots=True)
 class ChosenMeasure:
-    """A measure of the run of a point.
+    """A measure of the run of a point, by its name in the study.
 
     Parameters
     ----------
-    name
-        In the study.
     of
         What it is of: the ``"variant"`` of a stroke or one ``"impact"`` in it, the ``"level"`` of
         an impact, all of its ``"shots"``, a ``"click"`` or the noise ``"design"``.
@@ -133,7 +126,7 @@ class ChosenMeasure:
         return self.of in ("click", "design")
 
     def value(self, run: object) -> float | None:
-        """Value in the unit of the measure; None where the run does not have it."""
+        """Value in the unit of the measure, if the run has it."""
         part = self.part(run)
         if part is None or not self.measure.given(part):
             return None
@@ -161,23 +154,9 @@ def choose_measures(
     words: str,
     example: str,
 ) -> tuple[ChosenMeasure, ...]:
-    """Find measures by their names, each once.
+    """Find measures by their names, each once; an error names the nearest of all ``known``.
 
-    Parameters
-    ----------
-    find
-        Of a name; None where there is no such measure.
-    known
-        All names, for the nearest one.
-    words
-        What names are known.
-    example
-        One of them.
-
-    Raises
-    ------
-    InputError
-        For a name that does not exist, with the nearest one; for none at all.
+    ``words`` say what names are known, ``example`` is one of them.
     """
     wanted = list(dict.fromkeys([names] if isinstance(names, str) else names))
     refuse_if(
@@ -227,12 +206,7 @@ def shot_measure(name: str) -> ChosenMeasure | None:
     """Measure of the shots of a point; None for another name.
 
     ``"shots.restitution.mean"``, ``"shots.centric.restitution"``,
-    ``"shots.rule.relative_restitution_bias"``.
-
-    Raises
-    ------
-    InputError
-        For a result of the shots without a statistic.
+    ``"shots.rule.relative_restitution_bias"``.  InputError for a result without a statistic.
     """
     stem, _, rest = name.partition(".")
     of, _, key = rest.partition(".")
@@ -262,13 +236,7 @@ def shot_measure(name: str) -> ChosenMeasure | None:
 
 
 def shot_notes(names: Iterable[str], found: DroppedShots) -> tuple[str, ...]:
-    """Why measures of these names have no value, or tell less than they are called.
-
-    Parameters
-    ----------
-    names
-        Of measures of the shots.
-    """
+    """Why measures of the shots have no value, or tell less than they are called."""
     parts = [name.split(".")[1:] for name in names]
     columns = dict.fromkeys(of for of, _ in parts if of in _RESULTS)
     single = dict.fromkeys(key for of, key in parts if of == _CENTRIC)
@@ -322,15 +290,7 @@ _OF_LEVELS = {item.key: item for item in LEVEL_MEASURES if item.key not in _OF_T
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImpactOfPoint:
-    """What the measures of a point are read from, as far as they ask for it.
-
-    Parameters
-    ----------
-    level
-        Of the impact.
-    noise
-        Of that impact.
-    """
+    """What the measures of a point are read from, as far as they ask for it."""
 
     level: LevelResult | None = None
     noise: PointNoise | None = None
@@ -341,12 +301,7 @@ def impact_measures(case: Case, names: Iterable[str]) -> tuple[ChosenMeasure, ..
     """Find measures of an impact by their names, each once.
 
     ``"peak_force"`` of the level; ``"noise.radiated_energy"``; ``"shots.restitution.mean"``.
-
-    Raises
-    ------
-    InputError
-        For a name that an impact does not have, with the nearest one; for none at all; for noise
-        of bodies without surfaces, and shots of a case without them.
+    InputError also for noise of bodies without surfaces.
     """
     known, words = impact_measure_names(case), f"one of: {one_of(_OF_LEVELS)}; {NOISE_WORDS}"
     if case.shots is not None:
@@ -416,11 +371,6 @@ def stroke_measures(case: ValveCase, names: Iterable[str]) -> tuple[ChosenMeasur
     ``"opening_time"``; ``"seat.peak_force"`` of the first impact on the stop ``seat`` that is no
     mere tremble, see :func:`~klack.analyses.stroke.analysis.first_impact`; ``"seat.2.peak_force"``
     of the second one in the list of all impacts; ``"noise.sound_exposure_level_weighted"``.
-
-    Raises
-    ------
-    InputError
-        For a name that a stroke of this case does not have, with the nearest one; for none at all.
     """
     stops, known = _stops(case), stroke_measure_names(case)
     return choose_measures(

@@ -48,7 +48,6 @@ __all__ = ["run_optimisation"]
 _EDGE = 1e-3
 """Share that points keep from the ends of a distribution without ends."""
 _REFINED = 8
-"""Most points of the front that are refined."""
 _PLAYED = 8
 """Points of the front whose sound is kept, beside the recommended one and that of today."""
 _ROUNDS = 8
@@ -70,20 +69,12 @@ def run_optimisation(
 ) -> StudyRecord:
     """Search for the best points of a study, and refine those of the front.
 
-    The points depend on nothing but the study and the case: an interrupted search asks for the same
-    points again and finds those that were computed.  Strokes are searched in steps as they are;
-    those of the front are then computed again with their steps checked.
+    The points depend on nothing but the study and the case: an interrupted search finds those that
+    were computed.  Strokes are searched in steps as they are; those of the front are then computed
+    again with their steps checked.
 
     Parameters
     ----------
-    tree
-        The same as it was written.
-    source
-        With objectives.
-    folder
-        Where computed points are kept.
-    where
-        Points are computed.
     seen
         Takes what was found so far, now and then.
     live
@@ -93,8 +84,6 @@ def run_optimisation(
     ------
     InputError
         Before the first run, with file, line and key; and if no point can be computed.
-    MissingExtraError
-        Without pymoo.
     """
     begin = perf_counter()
     require_objectives(source)
@@ -183,13 +172,7 @@ _DRAWS = ("shots.seed", "shots.count")
 
 
 def _require_same_draws(source: StudySource) -> None:
-    """Refuse a search among draws of shots: it would find the luckiest of them.
-
-    Raises
-    ------
-    InputError
-        With file, line and key.
-    """
+    """Refuse a search among draws of shots: it would find the luckiest of them."""
     for name in _DRAWS:
         refuse_if(
             name in source.study.parameters,
@@ -233,13 +216,6 @@ class _Work:
     def asked(
         self, written: Sequence[Mapping[str, PointValue]], names: Sequence[str]
     ) -> AskedPoints:
-        """Points to compute, with the measures of these names.
-
-        Raises
-        ------
-        InputError
-            For a measure that does not exist.
-        """
         today = self.asked_today
         asked = asked_of(today.case, today.tree, self._source, written, names)
         return replace(asked, checks=self.checks)
@@ -314,7 +290,6 @@ class _Work:
         return rows, made, columns
 
     def _best_words(self, front: "_Front") -> str:
-        """The best point so far; empty without one that keeps all bounds."""
         if not front.feasible:
             return ""
         own = dict(zip(self.names, self.found[front.best].numbers, strict=True))
@@ -391,7 +366,6 @@ def _edge(space: Space) -> float:
 
 
 def _refinement(source: StudySource, work: _Work, front: _Front) -> Batches | None:
-    """Refinement of points spread over the front; None without a front."""
     if not front.points.size:
         return None
     order, given = front.ordered, source.study.search

@@ -25,11 +25,6 @@ def case_of_point(
         Where it will lie; files that the case names are looked for there.
     study
         What it is called in the comment at the head of the text.
-
-    Raises
-    ------
-    InputError
-        For a point that the study does not have, and where the text is no case there.
     """
     if point is None and record.optimum is not None:
         point = record.optimum.best

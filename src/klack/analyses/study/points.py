@@ -59,10 +59,8 @@ class Parameter:
     name
         Path of its key in the case; a word of its own where only expressions use it.
     kind
-        Of quantity; None for words and whole numbers.
-    spread : Range, Normal or Listed
-        Its values [SI].
-    today : float, str or None
+        None for words and whole numbers.
+    today
         What stands in the case; None for a word of its own.
     """
 
@@ -128,11 +126,8 @@ def written(value: float | str, kind: Kind | None) -> PointValue:
 def parameters_of(case: AnyCase, source: StudySource) -> tuple[Parameter, ...]:
     """Find the parameters of a study in its case, and read their values.
 
-    Raises
-    ------
-    InputError
-        With file, line and key: for a key that the case does not have, a value of another kind of
-        quantity or outside of the limits of its key, and ends of a range that are swapped.
+    InputError also for a value outside of the limits of its key, and ends of a range that are
+    swapped.
     """
     return tuple(
         _parameter(case, source, name, item) for name, item in source.study.parameters.items()
@@ -297,10 +292,6 @@ class Linked:
 
     Parameters
     ----------
-    name
-        Path of the key.
-    kind
-        Of quantity.
     words
         Parameter, or other key, that each word of the expression means.
     today [SI]
@@ -330,8 +321,6 @@ class Space:
 
     Parameters
     ----------
-    parameters
-        All of the study.
     linked
         In the order in which they can be computed.
     constants [SI]
@@ -353,25 +342,13 @@ class Space:
         return self.values([item.spread.at(float(share)) for item, share in pairs])
 
     def values(self, row: Iterable[float | str]) -> Values:
-        """Values [SI] by name where the parameters that vary have these.
-
-        Raises
-        ------
-        InputError
-            For an expression without a value there.
-        """
+        """Values [SI] by name where the parameters that vary have these."""
         point = dict(zip((item.name for item in self.varied), row, strict=True))
         point |= {item.name: item.spread.at(0.5) for item in self.parameters if item.is_fixed}
         return self.completed(point)
 
     def completed(self, point: Values) -> Values:
-        """Values [SI] of the parameters with those that follow from them.
-
-        Raises
-        ------
-        InputError
-            For an expression without a value there.
-        """
+        """Values [SI] of the parameters with those that follow from them."""
         found = {**self.constants, **point}
         for item in self.linked:
             found[item.name] = item.value(found)
@@ -384,7 +361,7 @@ class Space:
         return {name: written(values[name], kind) for name, kind in kinds.items()}
 
     def today(self) -> NDArray[np.float64]:
-        """Point of the unit cube nearest to the case as it is, shape (parameters that vary,).
+        """Point (parameters that vary,) of the unit cube nearest to the case as it is.
 
         A word of the study stands for the key that it is linked with, if it is by itself.
         """
@@ -414,7 +391,7 @@ class StudyPoints:
 
     Parameters
     ----------
-    values : tuple of mapping of str to value
+    values
         Of each point by name [SI]: parameters, then what follows from them.
     design
         In words.
@@ -430,25 +407,13 @@ class StudyPoints:
 
 
 def space_of(case: AnyCase, source: StudySource) -> Space:
-    """Parameters and expressions of a study, found in its case.
-
-    Raises
-    ------
-    InputError
-        With file, line and key.
-    """
+    """Parameters and expressions of a study, found in its case."""
     parameters = parameters_of(case, source)
     return Space(parameters=parameters, linked=linked_of(case, source, parameters))
 
 
 def points_in(source: StudySource, space: Space) -> StudyPoints:
-    """Points of the design of a study in its space.
-
-    Raises
-    ------
-    InputError
-        With file, line and key.
-    """
+    """Points of the design of a study in its space."""
     kind = source.study.design.kind
     if kind != "file":
         require_varied(source, space.varied)
@@ -464,11 +429,8 @@ def linked_of(
 ) -> tuple[Linked, ...]:
     """Expressions of a study in the order in which they can be computed.
 
-    Raises
-    ------
-    InputError
-        For a key without a quantity, one that is a parameter as well, an unknown name, another
-        unit, and expressions that follow from each other in a circle.
+    InputError for a key without a quantity, one that is a parameter as well, an unknown name,
+    another unit, and expressions that follow from each other in a circle.
     """
     given = source.study.linked
     places = {}
@@ -543,7 +505,6 @@ def _levels(
 
 
 def _drawn(source: StudySource, space: Space) -> StudyPoints:
-    """Points that are drawn in the unit cube."""
     design = source.study.design
     cube, name = _cube(source, space.varied)
     even = design.kind not in ("sobol", "saltelli", "made") or balanced(design.points)

@@ -73,10 +73,7 @@ class SentCase:
     def of(cls, case: AnyCase, tree: CaseTree) -> Self:
         """Case ready to be sent.
 
-        Raises
-        ------
-        InputError
-            For a component whose class other processes cannot import.
+        InputError for a component whose class other processes cannot import.
         """
         try:
             content = pickle.dumps(tree)
@@ -102,11 +99,8 @@ class SentCase:
     def read(self) -> tuple[AnyCase, CaseTree]:
         """Check the case where it has arrived.
 
-        Raises
-        ------
-        InputError
-            Where klack, or a package that decides the bits of a point, has another version; where
-            a file or a class of the case is not there or has another content.
+        InputError where a package that decides the bits of a point has another version, or a file
+        or a class of the case is missing or has another content.
         """
         self._require_versions()
         try:
@@ -175,12 +169,8 @@ _CASES = 4
 class PointOrder:
     """Points that a worker shall compute: plain data.
 
-    Parameters
-    ----------
-    keys
-        All that the points of the study exchange.
-    written : tuple of mapping of str to value
-        What each point exchanges.
+    ``keys`` are all that the points of the study exchange, ``written`` is what each point
+    exchanges.
     """
 
     keys: tuple[PointKey, ...]
@@ -203,13 +193,7 @@ class PointOrder:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """Rows of an order.
-
-    Parameters
-    ----------
-    seconds [s]
-        That the worker took.
-    """
+    """Rows of an order, and the time [s] that the worker took."""
 
     rows: tuple[PointRow, ...]
     seconds: float
@@ -281,7 +265,7 @@ def _plain(item: warnings.WarningMessage) -> warnings.WarningMessage:
 
 
 PROCESS_SIZE = 0.5e9
-"""Memory of a process with klack, the bodies of a small valve, and a stroke [byte]."""
+"""Memory [byte] of a process with klack, the bodies of a small valve, and a stroke."""
 _ATTEMPTS = 3
 
 _Asked = tuple[tuple[int, ...], PointOrder]
@@ -291,17 +275,8 @@ class ProcessWorkers(PointWorkers):
     """Processes of this machine, of one thread each.
 
     They start with the first points, end with this one, however it ends, and do not hear Ctrl-C.
-    One that dies is replaced; its point is computed again.
-
-    Parameters
-    ----------
-    tree
-        The same as it was written.
-
-    Raises
-    ------
-    InputError
-        If so many do not fit into the memory, or if the case cannot be sent.
+    One that dies is replaced; its point is computed again.  InputError if so many do not fit into
+    the memory, or if the case cannot be sent.
     """
 
     words = "processes"
@@ -325,10 +300,7 @@ class ProcessWorkers(PointWorkers):
     ) -> None:
         """Compute some of the points, as :class:`PointWorkers` says.
 
-        Raises
-        ------
-        ConvergenceError
-            If no process can begin.
+        ConvergenceError if no process can begin.
         """
         agenda = Agenda([group.places for group in groups_of(asked, places)])
 

@@ -48,9 +48,7 @@ class StudyColumn:
     today
         In the case as it is; nan where it has none.
     values (points,)
-        Nan where there is none; of words, which of them.
-    words
-        That ``values`` counts.
+        Nan where there is none; places in ``words`` where there are any.
     is_whole
         Whether the case has whole numbers there.
     """
@@ -78,13 +76,11 @@ class Sensitivity:
     Parameters
     ----------
     first, first_low, first_high (parameters,)
-        Share that a parameter causes alone, with its interval of confidence.
+        Share that a parameter causes alone, with its interval of ``confidence``.
     total, total_low, total_high (parameters,)
         Share that vanishes once the parameter is known and the others are free.
     rows, discarded
         Base points used, and those left out because one of their points has no value.
-    confidence
-        Of the intervals.
     reason
         Why there are no numbers; empty if there are.
     """
@@ -133,13 +129,8 @@ class Screening:
 class SurrogateEffect:
     """Mean of a surrogate over all parameters but one.
 
-    Parameters
-    ----------
-    at [SI]
-        Values of the parameter; of words, which of them.
-    words
-        That ``at`` counts.
-    mean : array, as ``at`` [unit of the measure]
+    ``mean`` is in the unit of the measure; ``at`` [SI] are values of the parameter, or places in
+    ``words``.
     """
 
     parameter: str
@@ -201,12 +192,10 @@ class Optimum:
 
     Parameters
     ----------
-    algorithm
+    algorithm, bounds
         In words.
     objectives
         Measures; ``ways`` says whether each is minimised or maximised.
-    bounds
-        In words.
     kept (points,)
         Points that keep all bounds.
     front
@@ -230,14 +219,7 @@ class Optimum:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PointSound:
-    """What a click sounds like.
-
-    Parameters
-    ----------
-    point
-        -1 for the case as it is.
-    pressure [Pa]
-    """
+    """Sound pressure [Pa] of a click; point -1 is the case as it is."""
 
     point: int
     pressure: TimeSeries
@@ -249,8 +231,6 @@ class MissedBound:
 
     Parameters
     ----------
-    bound
-        In words.
     missed, points, failed
         Points that miss it, points with a value, and those without.
     probability, low, high
@@ -295,16 +275,12 @@ class StudyRecord(CaseRecord):
         Why a point has no measures; empty where it was computed.
     notes
         Doubts about the numbers of each point.
-    sensitivities
-        Of each measure, from the design of Saltelli.
-    screenings
-        Of each measure, from the trajectories of Morris.
-    surrogates
-        Of each measure, if asked for.
+    sensitivities, screenings
+        Of each measure, from the design of Saltelli, and from the trajectories of Morris.
     optimum
         Of ``klack optimise``.
     missed
-        Of drawn points: the probability of missing each bound.
+        Of drawn points.
     workers
         What computed them: threads, processes, or workers of dask.
     model

@@ -36,7 +36,6 @@ from klack.machine.stages import StageClock, collected_warnings
 __all__ = ["asked_points", "run_study"]
 
 _DRAWN = ("sobol", "latin-hypercube", "made")
-"""Designs whose points are spread as the parameters are."""
 
 
 def asked_points(
@@ -45,11 +44,6 @@ def asked_points(
     """Check a study as far as that is possible without a run.
 
     The last point asked for is the case as it is.
-
-    Raises
-    ------
-    InputError
-        With file, line and key: for parameters, expressions, measures and designs that cannot be.
     """
     study, space = source.study, space_of(case, source)
     names = (*study.measures, *study.constraints)
@@ -77,13 +71,9 @@ def run_study(
 
     Parameters
     ----------
-    tree
-        The same as it was written.
     folder
         Where computed points are kept: an interrupted study resumes, and another study of the same
         case finds what both have.
-    where
-        Points are computed.
     live
         Is offered a record of the points so far, often.
 

@@ -32,9 +32,7 @@ def run_points(
 
     Parameters
     ----------
-    tree
-        The same as it was written.
-    points : sequence of mappings, or mapping of sequences
+    points
         Key of the case to a value with its unit, for every point; or a list of values by key.
     measures
         See :func:`~klack.analyses.study.measures.stroke_measures` and
@@ -42,16 +40,13 @@ def run_points(
     variant
         The first one of the case by default; of an impact its level, ``reduced`` by default.
     where
-        Points are computed; one thread for a case whose components call Python or an FMU, which
-        need not bear several calls at a time.
-    progress
-        Called with a stage and the share of the points that are done.
+        One thread for a case whose components call Python or an FMU, which need not bear several
+        calls at a time.
 
     Raises
     ------
     InputError
-        Before the first run: for a key, a unit or a measure that does not exist, and where so many
-        strokes at a time do not fit into the memory.
+        Before the first run, also where so many strokes at a time do not fit into the memory.
     RunsInterrupted
         On Ctrl-C, with the table of what was computed until then.
     """
@@ -66,12 +61,7 @@ def run_points(
 
 
 def require_way(case: AnyCase, variant: str | None, level: str | None) -> None:
-    """Refuse a level of a stroke, and a variant of an impact.
-
-    Raises
-    ------
-    InputError
-    """
+    """Refuse a level of a stroke, and a variant of an impact."""
     if variant is not None and isinstance(case, Case):
         raise InputError(
             "variant",

@@ -62,7 +62,7 @@ _ASIDE = (
     *("run", "lumped", "shots", "noise", "study", "measurement", "calibration"),
     *("title", "description"),
 )
-"""Sections that bodies, contact laws and their stops do not depend on,"""
+"""Sections that bodies, contact laws and their stops do not depend on."""
 _RADIATING = ("noise", "surfaces")
 """but for these surfaces of bodies."""
 
@@ -73,10 +73,8 @@ class _Built:
 
     Parameters
     ----------
-    made : mapping of Key to value
-        Of the group.
     tree
-        With these values.
+        With the values ``made`` of the group.
     parts
         The same, checked where no point changes it.
     valve
@@ -121,7 +119,6 @@ class _Strokes(PointKind[ValveCase, _Built]):
         return case.one_variant(name)
 
     def measures(self, case: ValveCase, names: Iterable[str]) -> tuple[ChosenMeasure, ...]:
-        """Of a stroke, its impacts and its noise."""
         return stroke_measures(case, names)
 
     def makes_bodies(self, case: ValveCase, place: Key) -> bool:
@@ -185,13 +182,7 @@ class _Strokes(PointKind[ValveCase, _Built]):
         places: Sequence[int],
         threads: int | None,
     ) -> int:
-        """Threads for these points: one where the time loop is in Python.
-
-        Raises
-        ------
-        InputError
-            If so many strokes at a time do not fit into the memory.
-        """
+        """Threads for these points: one where the time loop is in Python."""
         crew = min(available_cores() if threads is None else threads, max(len(places), 1))
         for i in places:
             try:
@@ -279,7 +270,6 @@ def _stroke_of(
     built: _Built,
     check: Callable[[], None],
 ) -> tuple[StrokeOfPoint, PointSteps, ValveRoles]:
-    """Stroke of a valve of this case, in one variant."""
     roles = find_roles(case, valve.network)
     variant = case.one_variant(asked.variant)
 

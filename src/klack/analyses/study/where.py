@@ -38,17 +38,10 @@ class Where:
         All cores by default.
     workers
         Processes, in place of threads.
-    dask : str, Client or Cluster of distributed, optional
+    dask
         Address of a scheduler, or a file that has it.
     is_free
         Whether klack may take processes in place of threads where that is faster.
-
-    Raises
-    ------
-    InputError
-        For numbers that cannot be, and for two places at once.
-    MissingExtraError
-        For a cluster without dask.distributed.
     """
 
     threads: int | None = None
@@ -78,13 +71,7 @@ class Where:
             require_dask()
 
     def open(self, case: AnyCase, tree: CaseTree) -> PointWorkers:
-        """Workers for the points of a case.
-
-        Raises
-        ------
-        InputError
-            If they do not fit into the memory; if the scheduler of a cluster does not answer.
-        """
+        """Workers for the points of a case, if they fit into the memory."""
         if self.dask is not None:
             from klack.analyses.study.dask_workers import DaskWorkers
 
