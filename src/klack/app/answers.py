@@ -65,12 +65,8 @@ class Curve:
 class Number:
     """A number beside the charts.
 
-    Parameters
-    ----------
-    value
-        In ``unit``.
-    difference
-        How a difference is given: ``"%"`` of the pinned one, ``"us"``, ``"dB"`` or ``"1"``.
+    ``difference`` is how a difference is given: ``"%"`` of the pinned one, ``"us"``, ``"dB"`` or
+    ``"1"``.
     """
 
     key: str
@@ -122,10 +118,7 @@ class Answer:
 class Judgement:
     """Whether the numbers can be relied on; follows once the sliders rest.
 
-    Parameters
-    ----------
-    grade
-        ``"good"``, ``"fair"``, ``"out"`` of range, or ``"none"`` where there is no estimate.
+    ``grade`` is ``"good"``, ``"fair"``, ``"out"`` of range, or ``"none"`` without an estimate.
     """
 
     grade: str
@@ -134,12 +127,10 @@ class Judgement:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Hearing:
-    """Loudness, spectrogram and drive pattern; follows once the sliders rest.
+    """Loudness now and of the pinned design, spectrogram and drive pattern; follows as a judgement.
 
     Parameters
     ----------
-    number, pinned
-        Loudness now, and of the pinned design.
     spectrogram
         Time [ms], frequency [kHz], level [dB re 20 uPa].
     pattern_wav
@@ -156,12 +147,7 @@ class Hearing:
 class Heard:
     """Click of a point of a study beside that of the case as it is.
 
-    Parameters
-    ----------
-    wav, base_wav
-        To one full scale, which ``scale`` has in words.
-    level, base_level [dB(A)]
-        Sound exposure levels.
+    Both sounds have one full scale, ``scale`` in words; levels are sound exposure levels [dB(A)].
     """
 
     point: int
@@ -176,12 +162,8 @@ class Heard:
 class ResultCard:
     """A stored result in short.
 
-    Parameters
-    ----------
-    compares
-        Whether two of its kind can be compared.
-    has_points
-        Whether it is a study, whose points have a page.
+    ``compares``: two of its kind can be compared; ``has_points``: it is a study, with a page of
+    points.
     """
 
     command: str
@@ -196,16 +178,12 @@ class ResultCard:
 
 @dataclass(frozen=True)
 class Slider:
-    """One number of the case that moves.
+    """One number of the case that moves, ``"motion.speed"``.
 
     Parameters
     ----------
-    key
-        ``"motion.speed"``.
     unit
-        SI; empty for a pure number.
-    low, high, start, step
-        In ``unit``.
+        SI, of ``low``, ``high``, ``start`` and ``step``; empty for a pure number.
     needs_mesh
         Whether bodies follow from it, so that it does not move here.
     written
@@ -251,13 +229,7 @@ class Opened:
 
 @dataclass(frozen=True, kw_only=True)
 class MeasureOffer:
-    """A measure that a study of a case can have.
-
-    Parameters
-    ----------
-    is_first
-        Whether it is ticked at first.
-    """
+    """A measure that a study of a case can have; ``is_first`` if it is ticked at first."""
 
     name: str
     unit: str
@@ -267,17 +239,7 @@ class MeasureOffer:
 
 @dataclass(frozen=True, kw_only=True)
 class StudyOffer:
-    """What a new study of a case can be made of.
-
-    Parameters
-    ----------
-    title, kind
-        Of the case.
-    parameters
-        Numbers of the case.
-    designs
-        Designs, with what they are for.
-    """
+    """What a new study of a case can be made of; ``designs`` come with what they are for."""
 
     title: str
     kind: str
@@ -290,12 +252,8 @@ class StudyOffer:
 class StudyChoice:
     """What was chosen of a :class:`StudyOffer`.
 
-    Parameters
-    ----------
-    ranges : mapping of str to pair of str
-        Lowest and highest value, with their units, by the key of the case.
-    objectives
-        ``"minimise"`` or ``"maximise"``.
+    ``ranges`` are lowest and highest values, with their units, by the key of the case;
+    ``objectives`` are ``"minimise"`` or ``"maximise"``.
     """
 
     ranges: Mapping[str, tuple[str, str]]
@@ -314,9 +272,7 @@ class FormField:
     written
         As the file has it; empty where it does not have the key.
     kind
-        ``"a length"``; empty for words and plain numbers.
-    example
-        Of a quantity.
+        ``"a length"``, with an ``example``; empty for words and plain numbers.
     limits
         ``"> 0"``.
     choices
@@ -346,12 +302,10 @@ class Checked:
     ----------
     error
         Its message; empty for a valid case.
-    title, kind
-        Of a valid case; ``"impact"`` or ``"stroke"``; ``"study"`` of a study in a file of its own.
-    fields
-        Of a valid case.
-    has_study, has_objectives
-        Whether there is a study, with something to search for.
+    kind
+        ``"impact"`` or ``"stroke"``; ``"study"`` of a study in a file of its own.
+    has_objectives
+        Whether its study has something to search for.
     case
         Case that a study names.
     """
@@ -421,7 +375,7 @@ class Review:
     Parameters
     ----------
     text
-        Of the case; empty where an error stands in its way.
+        Of the case; empty where there is an error.
     steps
         Bodies whose STEP files the case names, as ``needle.step`` beside it.
     """

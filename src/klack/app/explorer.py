@@ -92,7 +92,7 @@ def drawn(x: Floats, y: Floats) -> tuple[Floats, Floats]:
 
 
 def _travelled(history: ImpactHistory) -> tuple[Floats, Floats]:
-    """Displacement of the centre of mass of the moving body since the start, up is positive.
+    """Displacement (up is positive) of the centre of mass of the moving body since the start.
 
     The integral of its velocity, which every level records.
     """
@@ -212,7 +212,6 @@ _FIRST: tuple[tuple[str, ...], ...] = (
     ("stiffness",),
     ("pressure",),
 )
-"""Last words of keys that most people move, in this order."""
 _NEVER = ("study", "calibration", "measurement", "run", "reduction", "include", "lumped", "parts")
 _STEPS = 200
 
@@ -265,7 +264,7 @@ def _from_zero(place: Key, label: str, unit: str, high: float) -> Slider:
 
 
 def written(slider: Slider, value: float) -> str | float:
-    """A value as the page shows it and the case file gets it: what is computed is what is read."""
+    """A value as the page shows it and the case file gets it."""
     if not isfinite(value):
         raise InputError(slider.key, got=str(value), expected="a number", hint="move the slider.")
     text = slider.text(value)
@@ -345,13 +344,7 @@ _REFERENCE = 20e-6  # [Pa]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Computed:
-    """One position.
-
-    Parameters
-    ----------
-    bands
-        Of the forces of its stops.
-    """
+    """One position; ``bands`` are of the forces of its stops."""
 
     source: NoiseSource
     bands: tuple[ThirdOctaves, ...]
@@ -377,13 +370,7 @@ class Explorer:
         self._pools = ThreadpoolController()
 
     def open(self, text: str, path: str) -> Opened:
-        """Build the bodies of a case and compute it as it stands.
-
-        Raises
-        ------
-        InputError
-            For a case that is not valid.
-        """
+        """Build the bodies of a case and compute it as it stands."""
         if self._design is not None:
             self._design.close()
             self._design = None
@@ -410,12 +397,8 @@ class Explorer:
     def move(self, values: Values, pin: bool = False) -> Answer:
         """Force, motion, bands and click at a position of the sliders.
 
-        Parameters
-        ----------
-        values
-            Of sliders that are off their place in the case.
-        pin
-            Compare later positions with this one.
+        ``values`` are of sliders that are off their place in the case; ``pin`` compares later
+        positions with this one.
         """
         begin = perf_counter()
         design = self._require_open()
@@ -447,10 +430,7 @@ class Explorer:
         return Judgement(grade=grade, words=words)
 
     def listen(self, values: Values) -> Hearing | None:
-        """Loudness, spectrogram and drive pattern of a position: once the sliders rest.
-
-        None if nothing radiates.
-        """
+        """Loudness, spectrogram and drive pattern of a position: once the sliders rest."""
         with self._one_thread():
             found = self._computed(values)
             pressure, drive = found.pressure, found.source.noise.drive
@@ -507,7 +487,7 @@ class Explorer:
         return case_at(kind, self._tree, self._tree, changes)
 
     def _hardest(self, sliders: Sequence[Slider]) -> Case | None:
-        """Case with all sliders of the motion at their upper ends; None if it is refused."""
+        """Case with all sliders of the motion at their upper ends, unless it is refused."""
         highest = {
             slider.key: slider.high
             for slider in sliders
@@ -528,8 +508,6 @@ class Explorer:
 
 
 class _Impacts:
-    """Impacts of two bodies at the reduced level."""
-
     run, time_unit = "reduced", "us"
 
     def __init__(self, case: Case, hardest: Case | None) -> None:
@@ -570,7 +548,6 @@ class _Impacts:
         )
 
     def judged(self, case: Case) -> tuple[str, str]:
-        """Compare with one run at the interface level."""
         study = self._study(case, certify=True)
         if self.run not in study.estimates:
             return "none", study.estimate_doubt or "There is no estimate for this case."
@@ -588,8 +565,6 @@ class _Impacts:
 
 
 class _Strokes:
-    """Strokes of a valve in its first variant."""
-
     time_unit = "ms"
 
     def __init__(self, case: ValveCase) -> None:
@@ -650,7 +625,7 @@ def _loudness(pressure: TimeSeries) -> Number:
 
 
 def _sounds(now: TimeSeries | None, pinned: TimeSeries | None) -> tuple[bytes, bytes, str]:
-    """Both clicks to one full scale: that of the pinned one with room above, or of the louder."""
+    """Both clicks to the full scale of :func:`common_scale`."""
     if now is None or pinned is None:
         return b"", b"", ""
     scale = common_scale(now, pinned)

@@ -45,18 +45,12 @@ _ENDINGS = (*_CASE_ENDINGS, *_STEP_ENDINGS)
 
 @dataclass(frozen=True)
 class Found:
-    """Cases and results below the folder.
+    """Cases, results and STEP files below the folder, by their path from it.
 
     Parameters
     ----------
-    cases
-        Files, by their path from the folder.
-    results
-        Folders that hold a result.
     is_whole
         False where there is more than was looked at.
-    steps
-        STEP files.
     odd
         What has the name of a case, a STEP file or a folder and is not looked into, with the
         reason.
@@ -70,13 +64,7 @@ class Found:
 
 
 class OpenFolder:
-    """A folder and what is below it.
-
-    Parameters
-    ----------
-    path
-        An existing folder.
-    """
+    """An existing folder and what is below it."""
 
     def __init__(self, path: Path) -> None:
         if not path.is_dir():
@@ -139,13 +127,7 @@ class OpenFolder:
         )
 
     def require_plain(self, relative: str) -> None:
-        """Refuse a folder with an entry that reading may wait for without end.
-
-        Raises
-        ------
-        InputError
-            For a pipe, a socket or a device anywhere in it.
-        """
+        """Refuse a folder with a pipe, a socket or a device in it: reading them may never end."""
         for place, _, names in os.walk(self.absolute(relative)):
             for path in (Path(place, name) for name in names):
                 try:
@@ -159,10 +141,8 @@ class OpenFolder:
     def read(self, relative: str, *, largest: int = LARGEST_FILE) -> bytes:
         """Content of a file below the folder.
 
-        Raises
-        ------
-        InputError
-            For a path that leads out, is a link, is no plain file, or is larger than is read.
+        InputError for a path that leads out, is a link, is no plain file, or is larger than is
+        read.
         """
         with self._parent(relative) as (held, name):
             handle = held.open(name, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
@@ -195,13 +175,7 @@ class OpenFolder:
             replace_file(held, name, data)
 
     def make_file(self, relative: str, text: str) -> None:
-        """Make a new text file, and the folder for it; what is there stays.
-
-        Raises
-        ------
-        InputError
-            If there is something of that name already.
-        """
+        """Make a new text file, and the folder for it; what is there stays."""
         parent, _, _ = relative.rpartition("/")
         if parent and not self.exists(parent):
             with self._parent(parent) as (held, name):
@@ -211,13 +185,7 @@ class OpenFolder:
         self.write(relative, text)
 
     def make_folder(self, name: str, files: Mapping[str, bytes]) -> None:
-        """Make a new folder with files in it, all of them or nothing.
-
-        Raises
-        ------
-        InputError
-            If there is something of that name already.
-        """
+        """Make a new folder with files in it, all of them or nothing."""
         if self.exists(name):
             raise _refused(name, "a file or folder that is there already", _RENAME)
         new = f".klack-{secrets.token_hex(8)}"
@@ -237,10 +205,7 @@ class OpenFolder:
     def own(self, *names: str) -> Iterator[HeldFolder]:
         """The application's own folder, or one in it, made where it is not there, held.
 
-        Raises
-        ------
-        InputError
-            Where a link or a file has taken its name: what is behind it is not ours.
+        InputError where a link or a file has taken its name: what is behind it is not ours.
         """
         with self._parent(OWN) as (held, _), ExitStack() as stack:
             for name in (OWN, *names):
@@ -252,13 +217,7 @@ class OpenFolder:
             yield held
 
     def require_own(self, relative: str) -> None:
-        """Refuse to have a result written where a link leads out of the folder.
-
-        Raises
-        ------
-        InputError
-            If the entry, or a folder above it, is a link.
-        """
+        """Refuse to have a result written where a link leads out of the folder."""
         path = PurePosixPath(relative)
         for place in (path, *path.parents[:-1]):
             if (self.path / place).is_symlink():
@@ -281,13 +240,7 @@ class OpenFolder:
         return found if isinstance(found, dict) else {}
 
     def absolute(self, relative: str) -> Path:
-        """Path of an entry below the folder that is there and no link.
-
-        Raises
-        ------
-        InputError
-            For one that leads out, or is not there.
-        """
+        """Path of an entry below the folder that is there and no link."""
         with self._parent(relative) as (held, name):
             state = held.state(name)
             if state is None or stat.S_ISLNK(state.st_mode):
@@ -320,13 +273,7 @@ class OpenFolder:
                 raise _failed(relative, error) from None
 
     def require_here(self) -> None:
-        """Refuse to continue in a folder that was renamed or removed meanwhile.
-
-        Raises
-        ------
-        InputError
-            With what to do.
-        """
+        """Refuse to continue in a folder that was renamed or removed meanwhile."""
         if not self.path.is_dir():
             raise InputError(
                 f"folder {self.path}",
@@ -340,8 +287,6 @@ class OpenFolder:
 def result_names(cases: Iterable[str]) -> dict[str, str]:
     """Name of the result of each case: no two cases of a folder write to one place.
 
-    Examples
-    --------
     >>> result_names(["valve/case.yaml", "valve/soft.yaml", "other/soft.yaml"])
     {'valve/case.yaml': 'valve', 'valve/soft.yaml': 'valve-soft', 'other/soft.yaml': 'other-soft'}
     """
@@ -361,7 +306,7 @@ def result_names(cases: Iterable[str]) -> dict[str, str]:
 
 
 def replace_file(held: HeldFolder, name: str, data: bytes) -> None:
-    """Replace a file of a held folder by one rename, once it is on the disk."""
+    """Replace a file by one rename, once the new one is on the disk."""
     new = f".klack-{secrets.token_hex(8)}"
     try:
         with os.fdopen(held.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL), "wb") as file:
@@ -393,7 +338,6 @@ def _shown(name: str) -> str:
 
 
 def _oddness(entry: "os.DirEntry[str]", is_folder: bool) -> str:
-    """Why an entry is not looked into; empty if it is."""
     if not _is_text(entry.name):
         return "a name that is not UTF-8"
     if is_folder or entry.is_file(follow_symlinks=False):

@@ -44,13 +44,7 @@ _PAUSE = 1.0  # [s] after a wrong password, for everybody
 
 @dataclass
 class PasswordGate:
-    """A password, checked at most once a second after a wrong one.
-
-    Parameters
-    ----------
-    password : str
-        Kept only as its scrypt hash.
-    """
+    """A password, kept as its scrypt hash, checked at most once a second after a wrong one."""
 
     _salt: bytes
     _hash: bytes
@@ -100,7 +94,7 @@ class Access:
 
     @property
     def cookie(self) -> str:
-        """Name of the cookie: cookies of one host are shared by all of its ports."""
+        """Name of the cookie, with the port: all ports of a host share their cookies."""
         return f"klack_{self.port}"
 
     @property
@@ -121,10 +115,7 @@ class Access:
 def access_for(host: str, port: int, password: str | None) -> Access:
     """Access to a server on a host.
 
-    Raises
-    ------
-    InputError
-        For a host other than the own machine without a password, or with a short one.
+    InputError for another host than this machine without a password, or with a short one.
     """
     if host in LOCAL_HOSTS:
         return Access(host=host, port=port, names=(host, *LOCAL_HOSTS))
@@ -192,7 +183,6 @@ POLICY = (
     "connect-src 'self'; frame-src 'self'; "
     "base-uri 'none'; form-action 'self'; frame-ancestors 'self'; object-src 'none'"
 )
-"""Content security policy of every page of the application: nothing from another host."""
 
 _HEADERS = (
     (b"x-content-type-options", b"nosniff"),
@@ -211,14 +201,7 @@ class _TooLarge(Exception):
 
 
 class Guard:
-    """ASGI application around another one.
-
-    Parameters
-    ----------
-    app : ASGI application
-    largest [byte]
-        Of the body of a request.
-    """
+    """ASGI application around another one; bodies of requests end at ``largest`` [byte]."""
 
     def __init__(self, app: App, access: Access, *, largest: int = LARGEST_BODY) -> None:
         self.app, self._access, self._largest = app, access, largest

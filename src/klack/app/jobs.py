@@ -1,7 +1,7 @@
 """Runs that were started from the application, each in a process of its own.
 
-Everything about a run lies in a folder of its own below ``.klack-app/jobs``, so that a server that
-was killed finds it again, running or ended::
+Its folder below ``.klack-app/jobs`` holds all of it, so that a server that was killed finds it
+again::
 
     job.json       what was asked for: command, case, folder of the result
     process.json   number of the process and when it began
@@ -64,20 +64,17 @@ class Job:
     ----------
     name
         Of its folder.
-    command, case, out
-        Command of klack; case file and result by their path from the folder.
+    case, out, study
+        Case file, result and file of the study by their path from the folder; the last is empty if
+        the study stands in the case.
     started [s]
         Since 1970.
     stage
-        What it does now.
-    fraction
-        Of the stage.
+        What it does now, to a ``fraction``.
     code
         Exit code, when it has ended.
     told
         The last of what it printed.
-    study
-        File of the study, by its path from the folder; empty if it stands in the case.
     points
         Of a study that has begun to compute.
     """
@@ -110,13 +107,8 @@ class Jobs:
     ) -> Job:
         """Start a run that outlives this server.
 
-        A study that was stopped resumes: its points lie in the folder of its result.
-
-        Raises
-        ------
-        InputError
-            For an unknown command, a case that is not below the folder, too many runs at a time,
-            or one that writes to the same folder.
+        A study that was stopped resumes: its points lie in the folder of its result.  InputError
+        for too many runs at a time, or one that writes to the same folder.
         """
         if command not in COMMANDS:
             raise _refused(command, f"one of: {', '.join(COMMANDS)}")
@@ -127,13 +119,7 @@ class Jobs:
             return self._started(command, case, path, out, options, study)
 
     def start_case(self, command: str, case: str) -> Job:
-        """Run a saved case; its result has the name of the case, in ``klack-results``.
-
-        Raises
-        ------
-        InputError
-            As :meth:`start`.
-        """
+        """Run a saved case; its result has the name of the case, in ``klack-results``."""
         names = result_names({*self._folder.look().cases, case})
         return self.start(command, case, f"klack-results/{names[case]}")
 
@@ -179,7 +165,7 @@ class Jobs:
             held.remove(name)
 
     def _launch(self, name: str, held: HeldFolder, arguments: list[str]) -> None:
-        """Start the process of a run, and write down which one it is."""
+        """Start the process of a run, and store which one it is."""
         # by its handle where the system can: nothing is written behind a link in its place
         place, new = held.steady_path, os.O_WRONLY | os.O_CREAT | os.O_EXCL
         with (

@@ -43,12 +43,7 @@ def outline_of_table(body: str, text: str) -> dict[str, Any]:
         2.5, 1.9, taper
 
     The outline closes by itself; commas, semicolons, tabs or blanks separate, and a comma is a
-    decimal sign where semicolons or tabs separate.
-
-    Raises
-    ------
-    InputError
-        With the number of the row, for what is no row of a drawing.
+    decimal sign where semicolons or tabs separate.  An error names the row.
     """
     rows = list(_rows(body, text))
     if len(rows) < 3:
@@ -142,7 +137,7 @@ class Part:
     ----------
     path
         STEP file; None for a drawing.
-    profiles : mapping of str to Profile, or None
+    profiles
         Half section of each solid; None for a part that is not turned.
     """
 
@@ -251,13 +246,7 @@ class Part:
 
 
 def part_of_step(name: str, path: Path) -> Part:
-    """Read a STEP file.
-
-    Raises
-    ------
-    InputError
-        If it is none, has no solid, or solids that overlap.
-    """
+    """Read a STEP file; InputError also for one without a solid, or with solids that overlap."""
     content = step_content(path)
     profiles, why = None, ""
     try:
@@ -270,13 +259,7 @@ def part_of_step(name: str, path: Path) -> Part:
 
 
 def part_of_table(name: str, text: str) -> Part:
-    """Read the rows of a drawing.
-
-    Raises
-    ------
-    InputError
-        For rows that are none, and for an outline that crosses itself or does not close.
-    """
+    """Read the rows of a drawing; InputError also for an outline that crosses itself or is open."""
     outline = Outline.model_validate(outline_of_table(name, text))
     try:
         profile = outline.profile(1.0 / MM)

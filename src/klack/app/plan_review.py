@@ -53,16 +53,10 @@ def case_text(
     duration: float,
     files: Mapping[str, str],
 ) -> str:
-    """YAML of a case.
+    """YAML of a case; ``duration`` in s.
 
-    Parameters
-    ----------
-    profiles : mapping of body to profiles, or None
-        Half sections; None for a body that stays in its STEP file.
-    sizes : mapping of body to BodySizes
-    duration [s]
-    files : mapping of body to str
-        STEP files as the case names them.
+    ``profiles`` are half sections, None for a body that stays in its STEP file; ``files`` are these
+    as the case names them.
     """
     return "\n".join(_lines(plan, profiles, sizes, duration, files)) + "\n"
 
@@ -109,7 +103,6 @@ def _origin(plan: ValvePlan) -> str:
 
 
 def _materials(plan: ValvePlan) -> dict[str, str]:
-    """Material of the library by its name in the case."""
     found = {f"{body}_material": plan.of(body, "material") for body in BODIES}
     if plan.noise:
         found["sheet"] = "X6Cr17"
@@ -218,14 +211,7 @@ class _Meeting:
 
 
 def review(plan: ValvePlan, parts: Mapping[str, Part], place: Path) -> Review:
-    """Check a plan, and write its case.
-
-    Parameters
-    ----------
-    parts : mapping of body to Part
-    place
-        Of the case file; it need not be there.
-    """
+    """Check a plan, and write its case for a file at ``place``, which need not be there."""
     findings = list(_sizes_of_parts(parts))
     missing = _missing(plan)
     if missing:
@@ -467,7 +453,7 @@ def _first_touch(meeting: _Meeting) -> Finding:
 
 
 def _overlap(plan: ValvePlan, parts: Mapping[str, Part], shift: float) -> str:
-    """Words for what both bodies share with the needle shifted along z; empty for nothing."""
+    """What both bodies share with the needle shifted along z, in words; empty for nothing."""
     from netgen.occ import gp_Vec
 
     shape = parts["needle"].shape.Move(gp_Vec(0.0, 0.0, shift * MM))

@@ -76,13 +76,7 @@ class Reader:
         )
 
     def require_study(self, folder: str) -> None:
-        """Refuse a result that has no points.
-
-        Raises
-        ------
-        InputError
-            For one of another command.
-        """
+        """Refuse a result that has no points."""
         form = analysis_in(Path(folder)).form
         if form.kind is not StudyRecord:
             raise InputError(
@@ -108,10 +102,7 @@ class Reader:
     def compare(self, first: str, second: str) -> tuple[Answer, Answer]:
         """Two results of one kind, with their clicks to one full scale.
 
-        Raises
-        ------
-        InputError
-            For two that cannot be compared, told before they are read.
+        InputError for two that cannot be compared, before they are read.
         """
         analyses = [analysis_in(Path(folder)) for folder in (first, second)]
         kinds = {analysis.form.kind for analysis in analyses}
@@ -139,7 +130,6 @@ class Reader:
 
 
 def _doubts(record: Any) -> tuple[str, ...]:
-    """Warnings of a record, and what speaks against its contacts."""
     contacts: Sequence[MeshedContact] = ()
     if isinstance(record, ImpactStudy):
         contacts = (record.contact,)

@@ -90,11 +90,6 @@ def serve(
         Needed where the host is not this machine.
     ready
         Called with the access once the port is ours.
-
-    Raises
-    ------
-    InputError
-        For a folder that is none, a host without a password, a port that is taken.
     """
     access_for(host, port, password)  # refused before a port is opened
     state = State(OpenFolder(folder))
@@ -201,7 +196,6 @@ def _add_static(outer: FastAPI) -> None:
 
 
 def _add_files(outer: FastAPI, state: State) -> None:
-    """Reports of the folder, and sounds from memory."""
 
     async def report(request: Request, path: str = "") -> Response:
         place = path[:_LONGEST_QUERY]

@@ -22,7 +22,7 @@ from klack.viewer.view import View, payload_of
 __all__ = ["LARGEST_SCENE", "Shapes", "packed_scene"]
 
 LARGEST_SCENE = 48_000_000
-"""Characters of a payload; a million triangles or so, which a browser draws slowly."""
+"""Characters of a payload; about a million triangles, which a browser draws slowly."""
 
 
 _MOST_PARTS = 8  # in memory
@@ -87,13 +87,7 @@ class Shapes:
         return found
 
     def case_scene(self, text: str, path: str) -> bytes:
-        """Bodies of a case; a text that is not saved yet counts as well.
-
-        Raises
-        ------
-        InputError
-            For a case that is not valid, and for shapes that cannot be meshed.
-        """
+        """Bodies of a case; a text that is not saved yet counts as well."""
         return packed_scene(view_of_case(tree_of(text, Path(path)).any_case()))
 
     def result_scene(self, folder: str) -> bytes:
@@ -102,13 +96,7 @@ class Shapes:
 
 
 def packed_scene(view: View) -> bytes:
-    """Payload of a view.
-
-    Raises
-    ------
-    InputError
-        If it is larger than a browser should get.
-    """
+    """Payload of a view; InputError if it is larger than a browser should get."""
     histories = tuple(
         replace(line, x_unit=typed(line.x_unit), y_unit=typed(line.y_unit))
         for line in view.histories

@@ -39,10 +39,7 @@ class Uploads:
     async def take(self, parts: AsyncIterator[bytes]) -> str:
         """Keep a file as a whole; return its path from the folder.
 
-        Raises
-        ------
-        InputError
-            For one that is no STEP file, or larger than is taken.
+        InputError for one that is no STEP file, or larger than is taken.
         """
         name = f"{secrets.token_hex(12)}.step"
         with self._folder.own(_PLACE) as held:
@@ -77,7 +74,7 @@ def _tidy(held: HeldFolder) -> None:
 
 
 def _words(head: bytes) -> str:
-    """Beginning of a file that was no STEP file, to be recognised by who sent it."""
+    """Beginning of a file that was no STEP file, to be recognised by its sender."""
     text = head[:24].decode("utf-8", errors="replace").split("\n")[0]
     return repr(text) if text.isprintable() else "bytes that are no text"
 
@@ -104,12 +101,7 @@ LONGEST_NOTE = 20_000  # characters
 class Sounds:
     """The latest sounds in memory, by names that cannot be guessed; or scenes.
 
-    Parameters
-    ----------
-    most
-        Kept; older ones are forgotten.
-    place, ending
-        Of their addresses.
+    ``most`` are kept; ``place`` and ``ending`` are those of their addresses.
     """
 
     most: int = 200
@@ -161,19 +153,9 @@ class Notes:
         self._change(self._draft_name(of), of, text or "")
 
     def exchange_draft(self, of: str, known: str | None, text: str | None) -> bool:
-        """Keep a text that is not saved yet, unless another page has kept one meanwhile.
+        """Keep a text that is not saved yet, unless another page has kept one since ``known``.
 
-        Parameters
-        ----------
-        known
-            What the caller has kept, or found.
-        text
-            None once it is saved.
-
-        Returns
-        -------
-        bool
-            False where the text of another page stays.
+        Returns False where the text of another page stays; ``text`` None: it is saved.
         """
         if self.draft(of) not in (None, known, text):
             return False
@@ -222,11 +204,6 @@ class State:
 
         At the limit, that of a page that was left ends for it: a browser that reloads leaves one
         page after another, and each may come back for some seconds.
-
-        Raises
-        ------
-        InputError
-            If too many pages are open.
         """
         if len(self._explorers) >= _MOST_EXPLORERS:
             left = next((one for one, is_left in self._explorers.items() if is_left), None)

@@ -32,13 +32,7 @@ _LONGEST_NAME = 100  # bytes
 
 
 def case_of_study(folder: OpenFolder, study: str, named: str) -> str:
-    """Path of the case that a study names, relative to its own file.
-
-    Raises
-    ------
-    InputError
-        For one that is not below the folder, or not there.
-    """
+    """Path of the case that a study names, relative to its own file."""
     parts: list[str] = list(PurePosixPath(study).parent.parts)
     asked = PurePosixPath(named)
     for part in asked.parts:
@@ -99,12 +93,7 @@ def result_of_study(command: str, study: str, case: str = "") -> str:
 def beside_case(folder: OpenFolder, job: Job | None, name: str, text: str) -> str:
     """Folder of the case of a study, for the files that it names: empty for the opened one.
 
-    Parameters
-    ----------
-    job
-        That made the study.
-    name, text
-        Of the case, as the study has it.
+    ``job`` made the study; ``name`` and ``text`` are those of the case, as the study has it.
     """
     if job is not None:
         return _parent(job.case)
@@ -165,13 +154,7 @@ class PointsSource:
 
 
 def points_source(state: State, out: str) -> PointsSource:
-    """Record of a study that runs, of its result, or of one that was stopped.
-
-    Raises
-    ------
-    InputError
-        For a path that leads out of the folder, one without a result, and a result that is gone.
-    """
+    """Record of a study that runs, of its result, or of one that was stopped."""
     job = state.jobs.of_result(out)
     places = [out]
     if job is not None:

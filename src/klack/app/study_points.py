@@ -81,13 +81,7 @@ class StudyPoints:
         self._known: tuple[object, StudyRecord] | None = None
 
     def record(self, folder: str) -> StudyRecord:
-        """Record of a folder.
-
-        Raises
-        ------
-        InputError
-            For one that is damaged, no study, or larger than is shown.
-        """
+        """Record of a folder, unless it is damaged, no study, or larger than is shown."""
         place = Path(folder)
         mark = (folder, _mark(place))
         if self._known is None or self._known[0] != mark or mark[1] is None:
@@ -322,17 +316,8 @@ class Listener:
     def listen(self, folder: str, near: str, point: int) -> Heard:
         """Click of a point and of the case as it is, to one full scale.
 
-        Parameters
-        ----------
-        folder
-            Of the result.
-        near
-            Folder of the case, for the files that it names.
-
-        Raises
-        ------
-        InputError
-            For a point that is not there, and where nothing radiates, with the reason.
+        ``folder`` is that of the result, ``near`` that of the case, for the files that it names.
+        InputError where nothing radiates, with the reason.
         """
         record = self._points.record(folder)
         if not 0 <= point < record.count:
@@ -395,7 +380,6 @@ def _variant(record: StudyRecord) -> str | None:
 
 
 def _silent(asked: AskedPoints, point: int) -> InputError:
-    """Why a point has no sound, in the words of its row."""
     with Builds() as builds:
         row = compute_alone(asked, builds)[0]
     words: Sequence[str] = [row.failure] if row.failure else row.notes

@@ -41,7 +41,6 @@ _FIRST = {
     "stroke": ("opening_time", "closing_time"),
     "impact": ("peak_force", "contact_time", "restitution"),
 }
-"""Measures that are ticked at first, where the case has them."""
 _NEXT = (".peak_force", "noise.sound_exposure_level_weighted", ".approach_speed")
 """Ends of the names of measures that follow."""
 _OF_THE_SOLVER = (
@@ -72,13 +71,7 @@ def is_study(data: Any) -> bool:
 
 
 def study_source(text: str, path: Path) -> tuple[StudyFile, StudySource, CaseTree]:
-    """Study of a text, and the text as a form changes it.
-
-    Raises
-    ------
-    InputError
-        With file, line and key.
-    """
+    """Study of a text, and the text as a form changes it."""
     data, lines = parse(text, path)
     file = validated(StudyFile, text, path, data, lines)
     source = StudySource(study=file.study, path=path, lines=lines, text=text)
@@ -124,13 +117,7 @@ def study_problem(text: str, path: str, case_text: str, case_path: str) -> Check
 
 
 def study_offer(text: str, path: str) -> StudyOffer:
-    """What can vary in a case, and what can be computed.
-
-    Raises
-    ------
-    InputError
-        For a case that is not valid.
-    """
+    """What can vary in a case, and what can be computed."""
     tree = tree_of(text, Path(path))
     case = tree.any_case()
     kind = "stroke" if "network" in tree.data else "impact"
@@ -171,13 +158,7 @@ def _can(case: Any, name: str) -> bool:
 
 
 def study_text(choice: StudyChoice, case_text: str, case_path: str) -> str:
-    """Commented text of a new study, checked with its case.
-
-    Raises
-    ------
-    InputError
-        For a choice that is no study of this case.
-    """
+    """Commented text of a new study, checked with its case."""
     tree = tree_of(case_text, Path(case_path))
     case = tree.any_case()
     today = {item.key: item for item in sliders_of(case, tree)}
@@ -297,10 +278,7 @@ def _checked_study(text: str, path: str) -> Checked:
 def exchanged_text(text: str, path: str, place: Key, written: str) -> str:
     """Text with another value at a key; everything else stays as its author wrote it.
 
-    Raises
-    ------
-    InputError
-        If the file cannot have the value there.
+    InputError if the file cannot have the value there.
     """
     tree = tree_of(text, Path(path))
     return with_values(tree, {place: _scalar(written, is_text=_takes_text(tree, place))})

@@ -124,13 +124,7 @@ class ValvePlan:
         return found
 
     def with_role(self, body: str, face: str, role: str) -> "ValvePlan":
-        """The same with another role of one face; a body has one contact face.
-
-        Parameters
-        ----------
-        role
-            ``"contact"``, ``"held"``, ``"radiating"``, or empty for none.
-        """
+        """The same with another role of one face, or none if empty; a body has one contact face."""
         plan = self
         if plan.of(body, "contact") == face:
             plan = plan.with_body(body, "contact", "")
@@ -181,13 +175,7 @@ class Plans:
         return _plan_of(self._folder.own_json(_FILE))
 
     def keep(self, plan: ValvePlan) -> None:
-        """Keep a plan.
-
-        Raises
-        ------
-        InputError
-            For a table that is too long.
-        """
+        """Keep a plan, unless a table is too long."""
         for body in BODIES:
             if len(plan.of(body, "table")) > _LONGEST:
                 raise InputError(

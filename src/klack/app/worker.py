@@ -24,10 +24,7 @@ __all__ = ["Worker", "serve"]
 class Worker:
     """A process with one object in it, whose methods are called from here.
 
-    Parameters
-    ----------
-    kind
-        Class of the object, ``package.module:Class``, made without arguments.
+    ``kind`` is its class, ``package.module:Class``, made without arguments.
     """
 
     def __init__(self, kind: str) -> None:
@@ -48,13 +45,7 @@ class Worker:
         )
 
     async def call(self, method: str, *arguments: Any) -> Any:
-        """Result of a method of the object.
-
-        Raises
-        ------
-        KlackError
-            Of the method, or where the process died or was ended.
-        """
+        """Result of a method of the object; KlackError also where the process died or was ended."""
         if self._is_closed:
             raise _closed()
         loop = asyncio.get_running_loop()

@@ -39,11 +39,11 @@ class PointValues:
 
     Attributes
     ----------
-    objectives : NDArray of float, shape (points, objectives)
+    objectives (points, objectives)
         Numbers to minimise.
-    violation : NDArray of float, shape (points,)
+    violation (points,)
         Sum of what exceeds zero in the constraints; infinite where the point failed.
-    failed : NDArray of bool, shape (points,)
+    failed (points,)
         Where an objective or a constraint is not finite.
     """
 
@@ -55,16 +55,7 @@ class PointValues:
 def values_of_points(objectives: ArrayLike, constraints: ArrayLike | None) -> PointValues:
     """Check the tables of objectives and constraints, and sum the violations.
 
-    Parameters
-    ----------
-    objectives : array_like, shape (points, objectives)
-    constraints : array_like, shape (points, constraints), optional
-        Zero or less where kept.
-
-    Raises
-    ------
-    InputError
-        If a table is not two-dimensional, holds no column of objectives, or the two differ in rows.
+    As :meth:`Batches.tell` takes them.
     """
     goals = table_of_numbers(objectives, "objectives")
     refuse_if(
@@ -95,13 +86,7 @@ def values_of_points(objectives: ArrayLike, constraints: ArrayLike | None) -> Po
 
 
 def table_of_numbers(numbers: ArrayLike, where: str) -> NDArray[np.float64]:
-    """Check for numbers in rows and columns.
-
-    Raises
-    ------
-    InputError
-        If ``numbers`` is anything else.
-    """
+    """Check for numbers in rows and columns."""
     try:
         table = np.asarray(numbers, dtype=float)
     except (TypeError, ValueError) as error:
@@ -133,10 +118,7 @@ class Batches(ABC):
     therefore resumed by a new one with the same settings that is told the stored values first: it
     asks for the same points, to the bit, with the same versions of NumPy and pymoo.
 
-    Parameters
-    ----------
-    objectives
-        Columns of objectives that will be told.
+    ``objectives`` is the number of columns that will be told.
     """
 
     def __init__(self, objectives: int) -> None:
@@ -150,7 +132,7 @@ class Batches(ABC):
         return self._told
 
     def ask(self) -> NDArray[np.float64] | None:
-        """Points of the next batch, shape (points, parameters), in the unit cube; None at the end.
+        """Points (points, parameters) of the next batch in the unit cube; None at the end.
 
         Until their values are told, the same points are asked for again.
         """
@@ -163,9 +145,9 @@ class Batches(ABC):
 
         Parameters
         ----------
-        objectives : array_like, shape (points, objectives)
+        objectives (points, objectives)
             Numbers to minimise; a row with a value that is not finite is a failed point.
-        constraints : array_like, shape (points, constraints), optional
+        constraints (points, constraints)
             Zero or less where kept.  Give them as ratios to their limits, because the violations
             are summed.
 
@@ -195,13 +177,7 @@ class Batches(ABC):
         self._told += 1
 
     def __iter__(self) -> Iterator[NDArray[np.float64]]:
-        """Batches until the end; each must be told before the next.
-
-        Raises
-        ------
-        InputError
-            If a batch was not told.
-        """
+        """Batches until the end; each must be told before the next."""
         while (points := self.ask()) is not None:
             told = self._told
             yield points
@@ -228,13 +204,7 @@ def highest(edge: float) -> float:
 
 
 def points_in_cube(points: ArrayLike, parameters: int, where: str) -> NDArray[np.float64]:
-    """Check points of the unit cube.
-
-    Raises
-    ------
-    InputError
-        If the shape does not fit or a coordinate is outside 0 to 1.
-    """
+    """Check points of the unit cube."""
     table = table_of_numbers(points, where)
     refuse_if(
         table.shape[1] != parameters,

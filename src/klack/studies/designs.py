@@ -3,6 +3,7 @@
 A point is a row, a parameter is a column.  A coordinate is the probability below a value of its
 parameter: 0 and 1 are the ends of a range, 0.5 is its middle or the median of its distribution.  A
 spread maps it to the value (inversion; Devroye 1986, chapter II.2), so that one design serves all.
+Drawn coordinates are above 0 and below 1; the same seed gives the same points.
 """
 
 from dataclasses import dataclass
@@ -41,28 +42,12 @@ _BITS = 30
 
 
 def even_levels(count: int, *, bounded: bool = True) -> Floats:
-    """Levels of one parameter at equal distances.
+    """Levels (count,) of one parameter at equal distances.
 
     A bounded parameter has levels at both ends, ``k / (count - 1)``.  A distribution without ends
     (normal) has none there: its levels are the middles of classes of equal probability,
     ``(k + 1/2) / count``.  One level is the centre.
 
-    Parameters
-    ----------
-    bounded
-        Whether the parameter has a value at 0 and at 1.
-
-    Returns
-    -------
-    array (count)
-
-    Raises
-    ------
-    InputError
-        If ``count`` is below 1.
-
-    Examples
-    --------
     >>> even_levels(3).tolist(), even_levels(2, bounded=False).tolist()
     ([0.0, 0.5, 1.0], [0.25, 0.75])
     """
@@ -76,21 +61,6 @@ def latin_hypercube(count: int, parameters: int, seed: int) -> Floats:
 
     Not extensible: another count is another design.  Source: M. D. McKay, R. J. Beckman and
     W. J. Conover (1979), Technometrics 21, 239-245.
-
-    Parameters
-    ----------
-    seed
-        The same seed gives the same points.
-
-    Returns
-    -------
-    array (count, parameters)
-        Above 0 and below 1.
-
-    Raises
-    ------
-    InputError
-        For a count, number of parameters or seed that cannot be used.
     """
     require_size(count, parameters)
     engine = scipy.stats.qmc.LatinHypercube(parameters, **_random(seed))
@@ -103,27 +73,11 @@ def sobol_sequence(count: int, parameters: int, seed: int) -> Floats:
 
     The error of a mean falls with nearly 1/n instead of 1/sqrt(n), best where the number of points
     is a power of two, see :func:`balanced`.  Extensible: the first n of 2n points are those of n.
-    The points stand in the middles of 2^30 classes.
+    The points stand in the middles of 2^30 classes; there are at most 2^30 points of 21201
+    parameters.
 
     Direction numbers: S. Joe and F. Y. Kuo (2008), SIAM J. Sci. Comput. 30, 2635-2654.  Scrambling:
     random linear matrix and digital shift, J. Matousek (1998), J. Complexity 14, 527-556.
-
-    Parameters
-    ----------
-    count, parameters
-        At most 2^30 points, 21201 parameters.
-    seed
-        The same seed gives the same points.
-
-    Returns
-    -------
-    array (count, parameters)
-        Above 0 and below 1.
-
-    Raises
-    ------
-    InputError
-        For a count, number of parameters or seed that cannot be used.
     """
     require_size(count, parameters)
     refuse_if(
@@ -141,10 +95,8 @@ def sobol_sequence(count: int, parameters: int, seed: int) -> Floats:
 def balanced(count: int) -> bool:
     """Whether a Sobol sequence of so many points is balanced: the count is a power of two.
 
-    Other counts are allowed; their means converge less evenly.
+    The means of others converge less evenly.
 
-    Examples
-    --------
     >>> balanced(4096), balanced(1000)
     (True, False)
     """
@@ -152,13 +104,7 @@ def balanced(count: int) -> bool:
 
 
 def random_of(seed: int, *stream: int) -> np.random.Generator:
-    """Random numbers of a seed and, with further numbers, of one of its independent streams.
-
-    Raises
-    ------
-    InputError
-        If the seed is no whole number of 0 or more.
-    """
+    """Random numbers of a seed (0 or more), or of one of its independent streams."""
     refuse_if(
         isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0,
         "seed",
@@ -180,7 +126,6 @@ def _random(seed: int) -> dict[str, Any]:
 
 @cache
 def _random_keyword() -> str:
-    """Name of the argument for random numbers: ``rng``, before SciPy 1.15 ``seed``."""
     return "rng" if "rng" in signature(scipy.stats.qmc.Sobol).parameters else "seed"
 
 
@@ -208,18 +153,13 @@ def require_size(count: int, parameters: int) -> None:
 
 
 def unevenness(points: ArrayLike) -> float:
-    """Squared centred discrepancy of points, divided by its mean for independent random points.
+    """Squared centred discrepancy of points of the unit cube, over its mean for random points.
 
     The discrepancy compares the share of the points in boxes with the volume of the boxes (F. J.
     Hickernell 1998, Math. Comput. 67, 299-322).  For n independent points of d parameters the mean
     of its square is ``((5/4)^d - (13/12)^d) / n``.  About 1 for random points (99 % of them below
     4 for one parameter, below 2.5 for three and more), below 0.2 for Sobol points; 4 to 40 where
     half of a range is empty or where one parameter at a time was moved.
-
-    Parameters
-    ----------
-    points : array (points, parameters)
-        0 to 1.
     """
     x = np.asarray(points, dtype=float)
     count, parameters = x.shape
@@ -240,7 +180,7 @@ class Range:
     is_log: bool = False
 
     def at(self, share: float) -> float:
-        """Value that is not exceeded with the probability ``share``, 0 <= share <= 1."""
+        """Value that is not exceeded with the probability ``share``."""
         if self.is_log:
             value = exp(log(self.low) + share * (log(self.high) - log(self.low)))
         else:
@@ -264,17 +204,13 @@ class Range:
 
 @dataclass(frozen=True, slots=True)
 class Normal:
-    """Gauss's distribution, cut off five standard deviations from its mean (6e-7 of it).
-
-    Each maps a share of probability to a value (inversion; Devroye 1986, chapter II.2), so that a
-    design of points in the unit cube serves them all.
-    """
+    """Gauss's distribution, cut off five standard deviations from its mean (6e-7 of it)."""
 
     mean: float
     deviation: float
 
     def at(self, share: float) -> float:
-        """Value that is not exceeded with the probability ``share``, 0 <= share <= 1."""
+        """Value that is not exceeded with the probability ``share``."""
         below = float(scipy.special.ndtr(-CUT))
         return self.mean + self.deviation * float(
             scipy.special.ndtri(below + share * (1.0 - 2.0 * below))
@@ -300,7 +236,7 @@ class Listed:
     values: tuple[str | float, ...]
 
     def at(self, share: float) -> str | float:
-        """Value in the order of the list, 0 <= share <= 1."""
+        """Value at a share of the length of the list."""
         return self.values[min(int(share * len(self.values)), len(self.values) - 1)]
 
     def share(self, value: str | float) -> float:

@@ -15,7 +15,7 @@ from klack.studies.batches import values_of_points
 __all__ = ["Front", "compromise", "find_front", "spread_over"]
 
 _PAIRS = 40_000
-"""Largest number of pairs of points that are compared directly, without another division."""
+"""Largest number of pairs of points that are compared without another division."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +24,7 @@ class Front:
 
     Attributes
     ----------
-    points : NDArray of int, shape (n,)
+    points (n,)
         Their rows, ascending; of equal points the first.
     feasible
         False if no point keeps all constraints; ``points`` are then those that violate them least.
@@ -35,29 +35,13 @@ class Front:
 
 
 def find_front(objectives: ArrayLike, constraints: ArrayLike | None = None) -> Front:
-    """Non-dominated points under constraints.
+    """Non-dominated points under constraints; none if all failed.
 
     Point *a* dominates *b* if ``a_i <= b_i`` in every objective and ``a_i < b_i`` in one.  Among
     points of which one violates constraints, the smaller sum of violations wins (Deb's rule).  The
     search divides the points at the median of one objective after the other (Kung, Luccio and
-    Preparata 1975): 100 000 points with 4 objectives take seconds.
-
-    Parameters
-    ----------
-    objectives : array_like, shape (points, objectives)
-        Numbers to minimise, any units.
-    constraints : array_like, shape (points, constraints), optional
-        Zero or less where kept.  Give them as ratios to their limits, because they are summed.
-
-    Returns
-    -------
-    Front
-        Without points if all failed.
-
-    Raises
-    ------
-    InputError
-        If the shapes do not fit.
+    Preparata 1975): 100 000 points with 4 objectives take seconds.  Arguments as for
+    :meth:`~klack.studies.batches.Batches.tell`.
 
     Notes
     -----
@@ -82,19 +66,9 @@ def compromise(objectives: ArrayLike) -> int:
 
     .. math:: \sum_i \left(\frac{f_i - f_i^{min}}{f_i^{max} - f_i^{min}}\right)^2
 
-    over the points given, so that each objective counts by its range on the front: the knee of a
-    convex front.  An objective that is equal in all points does not count; of equally near points
-    the first is taken.
-
-    Parameters
-    ----------
-    objectives : array_like, shape (points, objectives)
-        Those of the front only; points off the front would change the ranges.
-
-    Raises
-    ------
-    InputError
-        If there is no point, or a value is not finite.
+    over the points given, so that each objective counts by its range on the front (points off the
+    front would change it): the knee of a convex front.  An objective that is equal in all points
+    does not count; of equally near points the first is taken.  InputError if a value is not finite.
 
     Notes
     -----
@@ -125,14 +99,9 @@ def compromise(objectives: ArrayLike) -> int:
 
 
 def spread_over(points: NDArray[np.integer], most: int) -> NDArray[np.integer]:
-    """Some points of a front, evenly over its order, with both ends.
+    """At most so many points of a front, evenly over its order, with both ends.
 
-    Parameters
-    ----------
-    points : array of int, shape (n,)
-        In the order of the front.
-    most
-        Points at most; the first alone for one.
+    The first alone for one.
     """
     if points.size <= most:
         return points

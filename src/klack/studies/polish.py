@@ -45,14 +45,14 @@ def polish(
 
     Parameters
     ----------
-    start : array_like, shape (parameters,)
+    start (parameters,)
     values
-        Objectives to minimise, shape (objectives,), and constraints, zero or less where kept, shape
-        (constraints,), at a point.  Called once for each point.
+        Objectives to minimise (objectives,) and constraints (constraints,), zero or less where
+        kept, at a point.  Called once for each point.
     slopes
-        Their derivatives, shapes (objectives, parameters) and (constraints, parameters).  Called
-        once for the point of each step.
-    scales : array_like, shape (objectives,)
+        Their derivatives (objectives, parameters) and (constraints, parameters).  Called once for
+        the point of each step.
+    scales (objectives,)
         Above zero.
     steps
         Most steps.

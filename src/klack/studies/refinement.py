@@ -34,19 +34,14 @@ def achievement(
 
     Parameters
     ----------
-    objectives : array_like, shape (points, objectives)
+    objectives (points, objectives)
         Numbers to minimise; nan gives nan.
-    reference : array_like, shape (objectives,) or (points, objectives)
+    reference (objectives,) or (points, objectives)
         Wished-for value ``z`` of each objective, in its unit.
-    scales : array_like, shape (objectives,)
+    scales (objectives,)
         What counts as one in each objective ``w``, above zero, in its unit: its range on the front.
     sum_weight
         ``rho``, zero or more: which loss in one objective is traded for gains in the others.
-
-    Raises
-    ------
-    InputError
-        If the shapes do not fit, the reference is not finite or a scale is not above zero.
 
     Notes
     -----
@@ -113,15 +108,8 @@ class Secants:
     ) -> NDArray[np.float64]:
         """Move to the lowest point of the quadratic through what was seen.
 
-        Parameters
-        ----------
-        point, slope : NDArray of float, shape (parameters,)
-            Where the function has which derivatives.
-
-        Returns
-        -------
-        NDArray of float, shape (parameters,)
-            Zero until two points with positive curvature between them are known.
+        Zero until two points with positive curvature between them are known; ``slope`` are the
+        derivatives at the point.
         """
         if self._last is not None:
             self._update(point - self._last[0], slope - self._last[1])
@@ -161,11 +149,6 @@ class RefinementSettings:
         Of the rotated directions.
     edge
         As in the search.
-
-    Raises
-    ------
-    InputError
-        If one is out of range.
     """
 
     first_step: float = 0.05
@@ -208,19 +191,14 @@ class Refinement(Batches):
 
     Parameters
     ----------
-    points : array_like, shape (points, parameters)
+    points (points, parameters)
         Start points in the unit cube.
-    objectives, constraints : array_like, shape (points, ...)
+    objectives, constraints (points, ...)
         Their values, known before; none may have failed.
-    reference : array_like, shape (objectives,) or (points, objectives), optional
-        Wished-for objectives; those of the start points if absent.
-    scales : array_like, shape (objectives,)
+    reference
+        As of :func:`achievement`; the objectives of the start points if absent.
+    scales (objectives,)
         Ranges of the objectives on the front, above zero.
-
-    Raises
-    ------
-    InputError
-        If the shapes do not fit, or a start point failed.
 
     Notes
     -----
@@ -268,17 +246,17 @@ class Refinement(Batches):
 
     @property
     def points(self) -> NDArray[np.float64]:
-        """Best point so far from each start, shape (points, parameters)."""
+        """Best point (points, parameters) so far from each start."""
         return np.array([path.best.point for path in self._paths])
 
     @property
     def objectives(self) -> NDArray[np.float64]:
-        """Objectives of the best points so far, shape (points, objectives)."""
+        """Objectives of the best points so far."""
         return np.array([path.best.objectives for path in self._paths])
 
     @property
     def steps(self) -> NDArray[np.float64]:
-        """Present step of each path, shape (points,): below ``last_step`` it came to its end."""
+        """Present step of each path: below ``last_step`` it came to its end."""
         return np.array([path.step for path in self._paths])
 
     def _next_points(self) -> NDArray[np.float64] | None:

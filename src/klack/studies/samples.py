@@ -1,4 +1,8 @@
-"""One measure in many runs: margins, quantiles, how often it exceeds a limit; failures apart."""
+"""One measure in many runs: margins, quantiles, how often it exceeds a limit.
+
+Values that are not finite are failed runs; they are counted apart.  ``confidence`` is 0.5 to below
+1.  ``runs`` of a result are those with a value, ``failed`` those without.
+"""
 
 import math
 import re
@@ -26,13 +30,7 @@ __all__ = [
 
 
 def split_failed(values: ArrayLike) -> tuple[NDArray[np.float64], int]:
-    """Finite values in their order, and the number of others.
-
-    Raises
-    ------
-    InputError
-        If ``values`` is no list of numbers.
-    """
+    """Finite values in their order, and the number of others."""
     try:
         table = np.asarray(values, dtype=float)
     except (TypeError, ValueError) as error:
@@ -65,18 +63,16 @@ def require_level(where: str, confidence: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Margin:
-    """Mean, scatter and their sum, with standard errors.
+    """Mean, scatter and their sum, in the unit of the measure.
 
     Attributes
     ----------
-    mean, deviation
-        Of the runs with a value, in the unit of the measure; the standard deviation with ``n - 1``.
+    deviation
+        With ``n - 1``.
     value
         ``mean + k deviation``.
     mean_error, deviation_error, value_error
         Standard errors: standard deviations of the three over repetitions of all runs.
-    runs, failed
-        Runs with a value, and runs without one, which are not among ``runs``.
     """
 
     mean: float
@@ -106,15 +102,10 @@ def mean_and_margin(values: ArrayLike, multiple: float) -> Margin:
 
     Parameters
     ----------
-    values : array_like, shape (runs,)
-        In one unit; what is not finite is a failed run.
+    values (runs,)
+        At least two finite ones.
     multiple
         ``k``, of either sign.
-
-    Raises
-    ------
-    InputError
-        With fewer than two values, or if ``k`` is not finite.
 
     Notes
     -----
@@ -169,8 +160,6 @@ class SampleQuantile:
     ----------
     probability
         That part.
-    estimate
-        In the unit of the measure.
     low, high
         Two values of the sample that enclose the quantile; infinite where the sample is too small
         to bound it.
@@ -178,8 +167,6 @@ class SampleQuantile:
         Asked for.
     coverage
         Exact probability that the interval encloses the quantile, at least ``confidence``.
-    runs, failed
-        Runs with a value, and runs without one, which are not among ``runs``.
     low_if_low, high_if_high
         The ends if the values of all failed runs were below all others, or above all others.
     """
@@ -212,17 +199,9 @@ def sample_quantile(
 
     Parameters
     ----------
-    values : array_like, shape (runs,)
-        In one unit; what is not finite is a failed run.
+    values (runs,)
     probability
         ``q``, between 0 and 1: 0.99 for the value that 1 % exceed.
-    confidence
-        0.5 to below 1.
-
-    Raises
-    ------
-    InputError
-        If no run has a value, or a number is out of range.
 
     Notes
     -----
@@ -259,18 +238,10 @@ def sample_quantile(
 
 
 def runs_for_quantile(probability: float, *, confidence: float = 0.95) -> int:
-    r"""Fewest runs with which :func:`sample_quantile` bounds a quantile on both sides.
+    """Fewest runs with which :func:`sample_quantile` bounds a quantile on both sides.
 
-    The smallest ``n`` with ``q^n`` and ``(1 - q)^n`` at most ``(1 - confidence) / 2``.
-
-    Raises
-    ------
-    InputError
-        If a number is out of range.
-
-    Notes
-    -----
-    Wilks (1941), Annals of Mathematical Statistics 12, 91-96.
+    The smallest ``n`` with ``q^n`` and ``(1 - q)^n`` at most ``(1 - confidence) / 2`` (Wilks 1941,
+    Annals of Mathematical Statistics 12, 91-96).
     """
     require_level("confidence of a quantile", confidence)
     _require_probability(probability)
@@ -317,10 +288,8 @@ class Exceedance:
 
     Attributes
     ----------
-    exceeded, runs, failed
-        Runs above the limit, runs with a value, and runs without one, which are not among ``runs``.
-    confidence
-        Of the interval and of the bound.
+    exceeded
+        Runs above the limit.
     estimate
         ``exceeded / runs``.
     low, high
@@ -347,21 +316,9 @@ class Exceedance:
 
 
 def exceedance_of(values: ArrayLike, limit: float, *, confidence: float = 0.95) -> Exceedance:
-    """Probability that a measure is above a limit, from its values in independent runs.
+    """Probability that a measure is above a limit, from its values (runs,) in independent runs.
 
-    Parameters
-    ----------
-    values : array_like, shape (runs,)
-        In one unit; what is not finite is a failed run.
-    limit
-        In the unit of the values.  A value equal to it does not exceed it.
-    confidence
-        0.5 to below 1.
-
-    Raises
-    ------
-    InputError
-        If the limit is nan, or as in :func:`count_exceedance`.
+    A value equal to the limit does not exceed it.
     """
     refuse_if(
         np.isnan(limit),
@@ -389,11 +346,6 @@ def count_exceedance(
 
     and the one-sided bound the second with ``alpha``.  The interval holds the true probability at
     least as often as stated, whatever it is, and mostly more often.
-
-    Raises
-    ------
-    InputError
-        If there is no run with a value, more exceeded than ran, or the confidence is out of range.
 
     Notes
     -----
@@ -444,12 +396,11 @@ class RobustValue:
 
     Parameters
     ----------
-    kind : "margin" or "quantile"
-        Mean and a multiple of the standard deviation
-        (:func:`~klack.studies.samples.mean_and_margin`), or a quantile
-        (:func:`~klack.studies.samples.sample_quantile`).
+    kind
+        Mean and a multiple of the standard deviation (:func:`mean_and_margin`), or a quantile
+        (:func:`sample_quantile`).
     number
-        The multiple, or the probability, above one half.
+        The multiple, at most 10, or the probability, above one half.
 
     Examples
     --------
@@ -464,13 +415,7 @@ class RobustValue:
 
     @classmethod
     def parse(cls, text: str, where: str) -> Self:
-        """Read ``mean + 2 sd`` or ``quantile 95 %``.
-
-        Raises
-        ------
-        InputError
-            For another text, a multiple above 10, and a probability outside of 50 to 100 %.
-        """
+        """Read ``mean + 2 sd`` or ``quantile 95 %``."""
         margin, quantile = _MARGIN.fullmatch(text.strip()), _QUANTILE.fullmatch(text.strip())
         if margin is not None and float(margin["number"]) <= _MOST_MULTIPLE:
             return cls("margin", float(margin["number"]))

@@ -37,11 +37,6 @@ class SearchSettings:
     edge
         Distance that points keep from the faces of the cube, 0 to below 0.5; above zero for
         parameters whose distribution has no ends.
-
-    Raises
-    ------
-    InputError
-        If one is out of range.
     """
 
     parameters: int
@@ -86,16 +81,9 @@ class Search(Batches):
 
     Parameters
     ----------
-    start : array_like, shape (points, parameters), optional
+    start (points, parameters)
         Points that enter the first batch, before drawn ones: the design of today.  At most a
         population; equal ones count once, and those nearer to a face than ``edge`` are moved.
-
-    Raises
-    ------
-    InputError
-        If the start points do not fit.
-    MissingExtraError
-        Without pymoo.
 
     Notes
     -----
@@ -185,13 +173,7 @@ def _own_warnings() -> Iterator[None]:
 
 
 def require_pymoo() -> None:
-    """Refuse a search before anything is computed for it.
-
-    Raises
-    ------
-    MissingExtraError
-        Without pymoo.
-    """
+    """Refuse a search without pymoo before anything is computed for it."""
     try:
         import pymoo.config  # noqa: F401
     except ImportError as error:
@@ -250,8 +232,7 @@ def _less_violated(
 ) -> NDArray[np.intp]:
     """Winner of each pair: the less violated one, else one by chance.
 
-    As in NSGA-III of pymoo, which however draws from a generator without a seed where both are
-    equally violated.
+    That of pymoo draws from a generator without a seed where both are equally violated.
     """
     violation = pop.get("CV")[:, 0]
     first, second = P[:, 0], P[:, 1]

@@ -30,13 +30,7 @@ _BLOCK = 2**22
 
 @dataclass(frozen=True, slots=True)
 class Estimates:
-    """One estimate for each parameter, with its confidence interval.
-
-    Parameters
-    ----------
-    value, low, high : array (parameters)
-        Not a number where there is no estimate.
-    """
+    """One estimate for each parameter, with its confidence interval; nan without one."""
 
     value: Floats
     low: Floats
@@ -61,7 +55,7 @@ class SobolIndices:
     confidence
         Probability that an interval claims to hold the true index.
     reason
-        Why estimates or intervals are not a number; empty if all are there.
+        Why estimates or intervals are nan; empty if all are there.
     """
 
     first: Estimates
@@ -82,30 +76,12 @@ def saltelli_design(parameters: int, base: int, seed: int) -> Floats:
 
     A row of 2 d Sobol coordinates makes two independent points a and b of d parameters.  Its d + 2
     points are in this order: a; then a with one coordinate taken from b, for each parameter; then
-    b.  Extensible: the rows of ``base`` are the first of those of ``2 * base``.
+    b.  Extensible: the rows of ``base`` are the first of those of ``2 * base``;
+    :func:`~klack.studies.designs.balanced` says whether their number is a good one.
 
     Source: A. Saltelli, P. Annoni, I. Azzini, F. Campolongo, M. Ratto, S. Tarantola (2010),
     Computer Physics Communications 181, 259-270.
 
-    Parameters
-    ----------
-    parameters
-        d
-    base
-        Rows; :func:`~klack.studies.designs.balanced` says whether their number is a good one.
-
-    Returns
-    -------
-    array (base * (parameters + 2), parameters)
-        Above 0 and below 1.
-
-    Raises
-    ------
-    InputError
-        For numbers that cannot be used, or too many points.
-
-    Examples
-    --------
     >>> saltelli_design(3, 1024, seed=1).shape
     (5120, 3)
     """
@@ -145,21 +121,13 @@ def sobol_indices(
 
     Parameters
     ----------
-    values : array (base * (parameters + 2))
+    values (base * (parameters + 2),)
         One measure at the points of :func:`saltelli_design`, in their order; not finite where the
         point failed.  A base row with such a value is discarded as a whole.
-    confidence
-        Above 0 and below 1.
     resamples
         At least 100.
     seed
         For the drawing of rows.
-
-    Raises
-    ------
-    InputError
-        If the number of values is no multiple of ``parameters + 2``, or an argument is out of
-        range.
     """
     y = np.asarray(values, dtype=np.float64)
     refuse_if(
@@ -243,7 +211,7 @@ def _indices(means: Floats) -> Floats:
 
 
 def _means_again(terms: Floats, resamples: int, seed: int) -> Floats:
-    """Means of the terms over as many rows, drawn with replacement: (resamples, terms)."""
+    """Means (resamples, terms) of the terms over as many rows, drawn with replacement."""
     count = len(terms)
     random = random_of(seed)
     means = np.empty((resamples, terms.shape[1]))
@@ -263,29 +231,29 @@ _MOST_WORK = 2e10
 
 @dataclass(frozen=True, slots=True)
 class Screening:
-    """Elementary effects of each parameter on one measure, in units of the measure.
+    """Elementary effects of each parameter on one measure, in units of the measure, (parameters,).
 
     An effect is the change of the measure divided by the change of the coordinate: what the
     measure would change by from one end of the parameter to the other, if it were linear.
 
     Parameters
     ----------
-    mean : array (parameters)
+    mean
         mu: mean effect; effects of both signs cancel.
-    mean_size : array (parameters)
+    mean_size
         mu*: mean absolute effect, the measure of importance.
-    scatter : array (parameters)
+    scatter
         sigma: standard deviation of the effects; not 0 where the parameter interacts with others or
         acts nonlinearly.
-    mean_error, mean_size_error, scatter_error : array (parameters)
+    mean_error, mean_size_error, scatter_error
         Their standard errors.
-    effects : array (parameters) of int
+    effects
         Number of effects used.
-    discarded : array (parameters) of int
+    discarded
         Number of effects that a failed point took away.  If not 0, the numbers are those of
         the region where points succeed.
     reasons
-        For each parameter, why its numbers are not a number; empty if all are there.
+        Why the numbers of a parameter are nan; empty if all are there.
     """
 
     mean: Floats
@@ -310,44 +278,21 @@ def morris_design(
 ) -> Floats:
     """Trajectories through a grid: each changes every parameter once, one at a time.
 
-    A bounded parameter takes the levels ``0, 1 / (p - 1), ..., 1`` and jumps by ``p / (2 (p - 1))``
-    up or down, so that all levels are equally likely.  A distribution without ends takes the
-    middles of p classes, ``(k + 1/2) / p``, and jumps by one half.
+    A bounded parameter takes the levels ``0, 1 / (p - 1), ..., 1`` (p even) and jumps by
+    ``p / (2 (p - 1))`` up or down, so that all levels are equally likely.  A distribution without
+    ends takes the middles of p classes, ``(k + 1/2) / p``, and jumps by one half.  A trajectory is
+    ``parameters + 1`` rows.
 
     Without ``candidates`` the design is extensible: the first trajectories of more are those of
-    fewer.  With them, of so many drawn trajectories those are kept that lie far from each other:
-    the most distant pair, then in turn the trajectory with the largest sum of squared distances
-    to those kept.
+    fewer.  With them, of so many drawn trajectories (ten times as many are usual) those are kept
+    that lie far from each other: the most distant pair, then in turn the trajectory with the
+    largest sum of squared distances to those kept.
 
     Sources: M. D. Morris (1991), Technometrics 33, 161-174; distance of trajectories: F.
     Campolongo, J. Cariboni and A. Saltelli (2007), Environmental Modelling & Software 22,
     1509-1518; choice in turn: M. V. Ruano et al. (2012), Environmental Modelling & Software 37,
     103-109.
 
-    Parameters
-    ----------
-    parameters
-        d
-    levels
-        p, even.
-    candidates
-        More than ``trajectories``, so few that their distances can be computed; ten times as many
-        are usual.
-    bounded : bool or array (parameters) of bool
-        Whether a parameter has a value at 0 and at 1.
-
-    Returns
-    -------
-    array (trajectories * (parameters + 1), parameters)
-        A trajectory is ``parameters + 1`` rows.
-
-    Raises
-    ------
-    InputError
-        For numbers that cannot be used, or too many points.
-
-    Examples
-    --------
     >>> morris_design(5, 10, seed=1).shape
     (60, 5)
     """
@@ -400,16 +345,11 @@ def elementary_effects(points: ArrayLike, values: ArrayLike) -> Screening:
 
     Parameters
     ----------
-    points : array (trajectories * (parameters + 1), parameters)
+    points
         As from :func:`morris_design`.
-    values : array (trajectories * (parameters + 1))
+    values
         One measure at these points; not finite where the point failed.  The one or two effects
         next to such a point are discarded, all others are used.
-
-    Raises
-    ------
-    InputError
-        If points and values do not match, or the points are no trajectories.
     """
     x, y = np.asarray(points, dtype=np.float64), np.asarray(values, dtype=np.float64)
     fits = x.ndim == 2 and x.shape[1] and x.shape[0] and x.shape[0] % (x.shape[1] + 1) == 0

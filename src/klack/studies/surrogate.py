@@ -56,17 +56,13 @@ class Surrogate:
         Points that are the same as another one, left out.
     predictivity
         Q2 = 1 - sum of squared residuals / sum of squared deviations from the mean; 1 is perfect,
-        0 no better than the mean of all points.  Not a number if it was not fitted.
-    error
-        Root of the mean square of the residuals, in the unit of the measure.
-    largest
-        The largest residual, without sign.
-    residuals : array (points of the study)
-        Value minus its prediction from the other points; not a number where there is none.
+        0 no better than the mean of all points.  Nan if it was not fitted.
+    error, largest
+        Root of the mean square, and the largest, of the residuals, in the unit of the measure.
+    residuals (points of the study,)
+        Value minus its prediction from the other points; nan where there is none.
     reason
         Why nothing may be derived from it; empty if it may.
-    model
-        None with a reason.
     first, total
         Shares of the variance; intervals by :attr:`error`, see
         :func:`~klack.studies.surrogate_model.share_estimates`.
@@ -100,24 +96,17 @@ def fit_surrogate(
 ) -> Surrogate:
     """Fit a surrogate to points, and predict each of them from the others.
 
-    The residual of a point i is that of the fit to all other points.  Terms of a polynomial chaos
-    and covariances of a Gaussian process are chosen five times, each time without a fifth of the
-    points, and the residuals of that fifth are those with this choice; so that no choice has seen
-    the point that it predicts.  The surrogate itself is chosen from all points.
+    Terms of a polynomial chaos and covariances of a Gaussian process are chosen five times, each
+    time without a fifth of the points, and the residuals of that fifth are those with this choice;
+    so that no choice has seen the point that it predicts.  The surrogate itself is chosen from all
+    points.
 
     Parameters
     ----------
-    points : array (points, parameters)
+    points (points, parameters)
         Coordinates, see :meth:`SurrogateAxis.coordinate`.
-    values : array (points)
+    values (points,)
         One measure; not finite where the point failed.
-
-    Raises
-    ------
-    InputError
-        If points and values do not match the axes.
-    MissingExtraError
-        For a Gaussian process without scikit-learn.
     """
     t, y = np.asarray(points, dtype=float), np.asarray(values, dtype=float)
     refuse_if(

@@ -42,10 +42,10 @@ class ChaosModel:
 
     Parameters
     ----------
-    terms : int array (terms, parameters)
+    terms (terms, parameters)
         Number of the function of each parameter, see :meth:`SurrogateAxis.functions`; the first
         term is the constant.
-    coefficients : array (terms)
+    coefficients (terms,)
         In the unit of the measure.
     degree
         Highest number of a function.
@@ -61,7 +61,7 @@ class ChaosModel:
         return _matrix(_functions(self.axes, t, self.degree), self.terms) @ self.coefficients
 
     def main_effect(self, parameter: int, t: Floats) -> Floats:
-        """Mean over all other parameters where one has the coordinates t, shape of t."""
+        """Mean over all other parameters where one has the coordinates t."""
         alone = np.all(np.delete(self.terms, parameter, axis=1) == 0, axis=1)
         own = self.axes[parameter].functions(t, self.degree)[:, self.terms[alone, parameter]]
         return own @ self.coefficients[alone]
@@ -89,12 +89,7 @@ class ChaosFit:
     0.75.  Least angle regression (B. Efron, T. Hastie, I. Johnstone, R. Tibshirani 2004, Ann.
     Statist. 32, 407-499; by scikit-learn) sorts them, least squares fits the first k of them, and
     the smallest leave-one-out error chooses p and k, after a penalty for the number of terms
-    (Blatman and Sudret 2011).
-
-    Parameters
-    ----------
-    t : array (points, parameters)
-        Coordinates.
+    (Blatman and Sudret 2011).  ``t`` (points, parameters) are coordinates.
     """
 
     def __init__(self, axes: Sequence[SurrogateAxis], t: Floats) -> None:
@@ -102,12 +97,7 @@ class ChaosFit:
         self._functions = _functions(self._axes, t, _HIGHEST)
 
     def choose(self, y: Floats, rows: NDArray[np.int64]) -> tuple[int, Terms]:
-        """Degree and terms with the smallest error over these rows.
-
-        Raises
-        ------
-        MissingExtraError
-        """
+        """Degree and terms with the smallest error over these rows."""
         own, values = [functions[rows] for functions in self._functions], y[rows]
         none = np.zeros((1, len(self._axes)), dtype=np.int64)
         least, found = _penalised(_matrix(own, none), values)[0], (0, none)

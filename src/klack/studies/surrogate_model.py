@@ -32,12 +32,7 @@ class SurrogateAxis:
 
         mean f = sum over q of weights_q f(nodes_q)
 
-    Parameters
-    ----------
-    nodes, weights : array (nodes)
-        Weights have the sum 1.
-    words
-        Of a list of words; empty for numbers.
+    Weights have the sum 1; there are no words in a list of numbers.
     """
 
     nodes: Floats
@@ -70,13 +65,7 @@ class SurrogateAxis:
         return len(self.nodes) - 1 if isinstance(self.spread, Listed) else _HIGHEST
 
     def coordinate(self, values: "NDArray[np.float64] | list[float | str]") -> Floats:
-        """Coordinates t, shape (points,), of values [SI] or words.
-
-        Raises
-        ------
-        ValueError
-            For a word that the list does not have.
-        """
+        """Coordinates t (points,) of values [SI] or words."""
         spread = self.spread
         if self.words:
             return np.array([self.words.index(str(value)) for value in values], dtype=float)
@@ -111,16 +100,12 @@ class SurrogateAxis:
         return np.linspace(-end, end, count)
 
     def functions(self, t: Floats, degree: int) -> Floats:
-        """Functions of t that are orthonormal under the distribution; the first one is 1.
+        """Functions (points, functions) of t, orthonormal under the distribution; the first is 1.
 
         Of numbers polynomials of degree 0, 1, ..., at most :attr:`most`; of words the constant
         and, if ``degree`` is above 0, all differences between them.  They are Legendre polynomials,
         or indicators of words, made orthonormal by a QR decomposition over the nodes: on a range
         the Legendre polynomials themselves.
-
-        Returns
-        -------
-        array (points, functions)
         """
         degree = min(degree, self.most)
         root = np.sqrt(self.weights)[:, None]
@@ -135,7 +120,7 @@ class SurrogateAxis:
         return np.arange(min(degree, self.most) + 1)
 
     def columns(self, t: Floats) -> Floats:
-        """Coordinates in which distances are measured, shape (points, columns).
+        """Coordinates (points, columns) in which distances are measured.
 
         Numbers have one of the standard deviation 1; words have one each, 1 where it is the word.
         """
@@ -169,9 +154,9 @@ class Shares:
     ----------
     variance
         Of the surrogate over the distributions of its parameters.
-    first : array (parameters)
+    first (parameters,)
         Variance of the mean over all other parameters, V_i.
-    total : array (parameters)
+    total (parameters,)
         Mean of the variance over the parameter alone, T_i.
     """
 
@@ -187,7 +172,7 @@ class SurrogateModel(Protocol):
         """Values (points) at coordinates (points, parameters)."""
 
     def main_effect(self, parameter: int, t: Floats) -> Floats:
-        """Mean over all other parameters where one has the coordinates t, shape of t."""
+        """Mean over all other parameters where one has the coordinates t."""
 
     def shares(self) -> Shares:
         """Parts of its variance."""
@@ -198,7 +183,7 @@ class SurrogateModel(Protocol):
 
 
 def share_estimates(parts: Floats, variance: float, error: float) -> Estimates:
-    """Shares of parts in a variance, and how far an error can move them.
+    """Shares of parts (V_i or T_i) in a variance, and how far a root mean square error moves them.
 
     The function f is the surrogate m plus an error of mean square e^2.  The part of a function
     that a parameter makes is an orthogonal projection of it, in the scalar product "mean of the
@@ -209,15 +194,6 @@ def share_estimates(parts: Floats, variance: float, error: float) -> Estimates:
         sin(theta - delta)^2 ... sin(theta + delta)^2,    delta = asin(e / sd)
 
     That is the largest change that any error of this size can make; the usual one is smaller.
-
-    Parameters
-    ----------
-    parts : array (parameters)
-        V_i or T_i of :class:`Shares`.
-    variance
-        Of the surrogate, above 0.
-    error
-        Root of the mean square error, in the unit of the measure.
 
     Examples
     --------

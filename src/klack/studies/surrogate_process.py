@@ -37,12 +37,8 @@ class Covariance:
 
     ``exp(-sum over columns of (x - x')^2 / (2 length^2)) + (noise if both are the same point)``
 
-    Parameters
-    ----------
-    lengths : array (columns)
-        Of all parameters, see :meth:`SurrogateAxis.columns`.
-    noise
-        What no smooth function explains, such as that of late bounces.
+    Noise is what no smooth function explains, such as that of late bounces; ``lengths`` (columns,)
+    are those of all parameters, see :meth:`SurrogateAxis.columns`.
     """
 
     lengths: Floats
@@ -55,9 +51,9 @@ class ProcessModel:
 
     Parameters
     ----------
-    columns : tuple of array (points, columns)
+    columns (points, columns)
         Of the points that it was fitted to, for each parameter.
-    lengths : tuple of array (columns)
+    lengths (columns,)
         For each parameter.
     noise
         Variance of noise, of that of the process.
@@ -76,7 +72,7 @@ class ProcessModel:
         return self.mean + _product(factors) @ self.weights
 
     def main_effect(self, parameter: int, t: Floats) -> Floats:
-        """Mean over all other parameters where one has the coordinates t, shape of t."""
+        """Mean over all other parameters where one has the coordinates t."""
         means = np.array(
             [axis.weights @ self._factor(k, axis.nodes) for k, axis in enumerate(self.axes)]
         )
@@ -126,12 +122,7 @@ class ProcessModel:
 class ProcessFit:
     """Gaussian process of points: its lengths of correlation and noise by maximum likelihood.
 
-    The mean is constant and unknown (ordinary kriging).
-
-    Parameters
-    ----------
-    t : array (points, parameters)
-        Coordinates.
+    The mean is constant and unknown (ordinary kriging); ``t`` (points, parameters) are coordinates.
     """
 
     def __init__(self, axes: Sequence[SurrogateAxis], t: Floats) -> None:
@@ -139,12 +130,7 @@ class ProcessFit:
         self._columns = tuple(axis.columns(t[:, k]) for k, axis in enumerate(self._axes))
 
     def choose(self, y: Floats, rows: NDArray[np.int64]) -> Covariance:
-        """Covariance that makes the values of these rows most likely, by scikit-learn.
-
-        Raises
-        ------
-        MissingExtraError
-        """
+        """Covariance that makes the values of these rows most likely, by scikit-learn."""
         require_scikit_learn()
         from sklearn.exceptions import ConvergenceWarning
         from sklearn.gaussian_process import GaussianProcessRegressor

@@ -64,9 +64,9 @@ def _begins_a_study(text: str) -> bool:
 class _Editor:
     """Form and text of one case; the text is the truth, the form follows from it.
 
-    The browser counts what is typed there (``klackTyped``, ``klackChanged``).  Values of boxes are
-    written into the text one after another.  A text that was typed before the browser had one with
-    a value gets this value again, and an answer that is older than what was typed changes nothing.
+    The browser counts what is typed there (``klackTyped``, ``klackChanged``).  A text that was
+    typed before the browser had one with a value gets this value again, and an answer that is older
+    than what was typed changes nothing.
     """
 
     def __init__(self, state: State, case: str, saved: str) -> None:
@@ -84,7 +84,7 @@ class _Editor:
         self._open = {"case", "motion", "contact", "parameters", "objectives"}
 
     def build(self) -> None:
-        """Make the page, then check the text while it is shown already."""
+        """Make the page, then check the text."""
         self._panel = StudyPanel(self._state, self._case)
         with ui.element("div") as self._above:
             self._panel.build()
@@ -152,13 +152,13 @@ class _Editor:
         return self._count
 
     async def _settle(self) -> None:
-        """Write what waits, then check the text: a check waits for the one before it."""
+        """Write what waits, then check the text, after the check before it."""
         async with self._turn:
             await self._write()
             await self._check()
 
     async def _write(self) -> None:
-        """Write the values that wait into the text, each into the one that has come by then."""
+        """Write the values that wait, each into the text that has come by then."""
         if not self._waiting:
             return
         while self._waiting:
@@ -374,7 +374,6 @@ class _Editor:
             plain("A run takes the file, and the file does not have this text yet.", "p")
 
     async def _start(self, text: str) -> None:
-        """Start the run of a saved text that is a valid case, then show it in the overview."""
         try:
             found: Checked = await self._state.reader.call("check", text, self._path)
             if found.error:

@@ -1,7 +1,4 @@
-"""Charts of answers as the plain data that Plotly draws, and the page that compares two results.
-
-The page colours text and grid.
-"""
+"""Charts of answers as the plain data that Plotly draws, and the page that compares two results."""
 
 import asyncio
 from collections.abc import Mapping, Sequence
@@ -112,7 +109,7 @@ def _bands_figure(now: Answer, ghost: Answer, names: tuple[str, str]) -> dict[st
 
 
 def _short(label: str) -> str:
-    """As narrow as a telephone has room for: 500, 2k, 31.5k; the axis has the unit."""
+    """As narrow as a telephone has room for: 500, 2k, 31.5k."""
     return label.replace(" kHz", "k").replace(" Hz", "")
 
 
@@ -191,13 +188,7 @@ def _figure(data: list[dict[str, Any]], x: str, y: str) -> dict[str, Any]:
 
 
 class DescribedChart:
-    """Heading, chart, and a text that only screen readers have; it is an image to them.
-
-    Parameters
-    ----------
-    figure
-        What Plotly draws.
-    """
+    """Heading, chart, and a text that only screen readers have; it is an image to them."""
 
     def __init__(self, title: str, figure: dict[str, Any]) -> None:
         with ui.element("section").classes("k-sheet k-chart"):

@@ -105,7 +105,7 @@ def element(tag: str, classes: str = "", **props: object) -> ui.element:
 def button(
     text: str, handler: Handler | None = None, *, main: bool = False, of: str = ""
 ) -> TextElement:
-    """A button, as the browser has it; ``of`` names its object for those who do not see its row."""
+    """A button; ``of`` names its object for those who do not see its row."""
     found = plain(text, "button").classes("k-btn" + (" k-main-btn" if main else ""))
     if handler is not None:
         found.on("click", handler, args=[])
@@ -153,15 +153,7 @@ def read_first(
 ) -> ui.element:
     """Say that something is read while the page is seen already, then show it, or why not.
 
-    Parameters
-    ----------
-    said
-        What stays in place of the words.
-
-    Returns
-    -------
-    element
-        What is shown stands in it.
+    Returns the element that it stands in; ``said`` is what stays in place of the words.
     """
     waiting = plain(words, "p").props("role=status")
     body = ui.element("div")
@@ -296,12 +288,7 @@ def choice_box(
 ) -> ui.element:
     """A list to choose from; what is not in it is never handed on.
 
-    Parameters
-    ----------
-    words
-        What is shown for each value.
-    value
-        None chooses none: a browser then shows the first one.
+    ``words`` are what is shown for each value; None chooses none: a browser then shows the first.
     """
     box = element("select", "k-input", **props)
     with box:

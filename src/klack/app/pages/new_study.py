@@ -53,8 +53,6 @@ async def new_study_page(state: State, given: Mapping[str, str]) -> None:
 
 
 class _NewStudy:
-    """What is chosen, and the file that is made of it."""
-
     def __init__(self, state: State, case: str, text: str, offer: StudyOffer) -> None:
         self._state, self._case, self._text, self._offer = state, case, text, offer
         self._ranges: dict[str, tuple[str, str]] = {}

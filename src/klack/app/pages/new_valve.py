@@ -69,7 +69,7 @@ class _Guide:
         self._is_checking = False  # the step that is shown has not its answer yet
 
     def build(self) -> None:
-        """Make the page, then read the parts while it is shown already."""
+        """Make the page, then read the parts."""
         with ui.element("nav").classes("k-steps") as steps:
             steps.props["aria-label"] = "Steps of the guide"
             self._steps = [
@@ -103,7 +103,7 @@ class _Guide:
         return self._plan
 
     async def keep(self, plan: ValvePlan) -> None:
-        """Change the plan; what cannot be kept is told and not changed."""
+        """Change and keep the plan; what cannot be kept is told and not changed."""
         before, self._plan = self._plan, plan  # at once: another change may come meanwhile
         self._show_steps()
         async with self._writing:
@@ -136,7 +136,7 @@ class _Guide:
     # ----------------------------------------------------------------------- the parts
 
     def source(self, body: str) -> tuple[str, str] | None:
-        """Where a body comes from, for the process that reads it; None where nothing is given."""
+        """Where a body comes from, for the process that reads it."""
         value = self._plan.given(body)
         if not value.strip():
             return None
@@ -415,7 +415,6 @@ class _Guide:
         ui.timer(0.05, written, once=True)
 
     async def _write(self, then: str) -> None:
-        """Make the folder with all that belongs to the case, or nothing."""
         name = self._plan.name
         try:
             self._plan.require_name()

@@ -77,7 +77,7 @@ class _Overview:
         self._found, self._sought = _NONE, ""
 
     async def build(self) -> None:
-        """Make the page, then fill it while it is shown already."""
+        """Make the page, then fill it."""
         self._jobs = ui.element("section").classes("k-section")
         with ui.element("section").classes("k-section"):
             self._head = ui.element("div")
@@ -92,7 +92,6 @@ class _Overview:
         ui.timer(_EVERY, self._follow)
 
     async def _fill(self) -> None:
-        """Look for what the folder has, and show it."""
         self._found = await asyncio.to_thread(self._state.folder.look)
         if self._results.is_deleted:
             return
@@ -334,7 +333,6 @@ class _Overview:
         name: str,
         make: Callable[[str, str], None],
     ) -> None:
-        """Ask for a name, and where there is a choice for what is copied."""
         values = {"source": source, "name": name}
 
         async def done() -> None:
@@ -492,7 +490,6 @@ class _Overview:
 
 
 def _search_box(find: Callable[[Any], Awaitable[None]]) -> ui.element:
-    """Where a part of a name is typed."""
     with ui.element("label").classes("k-search") as label:
         plain("Find ").classes("k-soft")
         element(

@@ -53,8 +53,6 @@ class PartsStep:
 
     Parameters
     ----------
-    plan
-        The plan now.
     facts
         What was read in each body, or why it could not be; nothing of one that is being read.
     keep
@@ -259,13 +257,7 @@ _CLICKS = {
 class FacesStep:
     """Bodies beside the list of their faces; each shows what is chosen or pointed at in the other.
 
-    Parameters
-    ----------
-    faces : mapping of body to faces
-    plan
-        The plan now.
-    keep
-        Keeps another one.
+    ``keep`` keeps another plan.
     """
 
     def __init__(

@@ -22,7 +22,7 @@ Pick = Callable[[str, str], Any]
 class Scene(Element, component="scene_element.js"):  # type: ignore[call-arg]
     """Bodies that are drawn in the browser, from a payload that it fetches.
 
-    The drawing context is released when the element goes: a browser has sixteen of them or so.
+    The drawing context is released when the element goes: a browser has about sixteen.
 
     Parameters
     ----------

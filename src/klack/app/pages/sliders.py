@@ -57,8 +57,6 @@ async def sliders_page(state: State, given: Mapping[str, str]) -> None:
 
 
 class _Sliders:
-    """Sliders, the pinned design, and the answers as they come."""
-
     _worker: Worker
 
     def __init__(self, state: State, case: str) -> None:
@@ -69,7 +67,6 @@ class _Sliders:
         self._is_pinned, self._pins = True, False
 
     def build(self, text: str) -> None:
-        """Open the case while the page is shown already."""
         path = str(self._state.folder.path / self._case)
 
         async def opened() -> Opened:

@@ -42,13 +42,7 @@ _WORDS = {"done": "complete", "cancelled": "stopped", "failed": "failed"}
 
 
 class StudyPanel:
-    """Start, watch, stop and resume the study of a file.
-
-    Parameters
-    ----------
-    path
-        Of a study, or of a case with a study in it.
-    """
+    """Start, watch, stop and resume the study of a file, or of a case with a study in it."""
 
     def __init__(self, state: State, path: str) -> None:
         self._state, self._path = state, path
@@ -85,7 +79,6 @@ class StudyPanel:
             await self._check_with_case(found)
 
     async def _find_case(self, found: Checked) -> None:
-        """The case that the study names, or ran with, or one to choose."""
         if self._own:
             self._case = self._path
             return
@@ -389,7 +382,6 @@ class _Page:
             )
 
     async def _places(self) -> tuple[str, str]:
-        """Folder of the record, and that of the case."""
         source = await asyncio.to_thread(points_source, self._state, self._out)
         if source.folder is None:
             raise InputError(
