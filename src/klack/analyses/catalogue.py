@@ -38,7 +38,7 @@ class Entry:
 
     @property
     def commands(self) -> dict[Callable[..., int], str]:
-        """Functions behind its commands, with the example of each."""
+        """Functions of its commands, with an example each."""
         room = self.place.partition(".")[0]
         examples = [text for text in (self.example, *self.others) if text]
         return {named(f"{room}.command:{text.split()[1]}"): text for text in examples}
@@ -98,7 +98,7 @@ def analyses() -> tuple["Analysis[Any]", ...]:
 
 
 def commands() -> dict[Callable[..., int], str]:
-    """Commands of the analyses, with the example that the help of each shows."""
+    """Commands of the analyses, with an example each."""
     return {command: text for entry in ANALYSES for command, text in entry.commands.items()}
 
 

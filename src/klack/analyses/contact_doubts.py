@@ -1,4 +1,4 @@
-"""Mesh of a contact, and reasons to doubt its numbers: of an impact or of an end stop."""
+"""Mesh of a contact, and reasons to doubt its numbers."""
 
 from math import isfinite
 from typing import Protocol
@@ -29,7 +29,7 @@ class MeshedContact(Protocol):
 
     @property
     def points_across(self) -> int:
-        """Loaded contact points across the whole width; 0 if unknown."""
+        """Loaded contact points across the width; 0 if unknown."""
 
     @property
     def doubts(self) -> tuple[str, ...]:
@@ -37,7 +37,7 @@ class MeshedContact(Protocol):
 
     @property
     def needed_yield(self) -> float:
-        """Yield stress from which on both bodies stay elastic [Pa]; nan if unknown."""
+        """Yield stress [Pa] for elastic bodies; nan if unknown."""
 
 
 CONTACT = JsonForm(
@@ -74,7 +74,7 @@ def contact_doubt(contact: MeshedContact) -> str:
 
 
 def elastic_above(contact: MeshedContact) -> str:
-    """Yield stress that elastic faces need, and whether any has it; empty if it is not known."""
+    """Yield stress for elastic faces, and whether any has it; empty if unknown."""
     if not isfinite(contact.needed_yield):
         return ""
     if contact.needed_yield > _HARDEST:

@@ -30,7 +30,7 @@ _RESULT = "result.zarr"
 
 
 def is_result(path: Path) -> bool:
-    """Whether a path is a folder with a result or a store, rather than a case."""
+    """Whether a path is a result or a store, not a case."""
     return (completed(path) / _RESULT).is_dir() or (path / "zarr.json").is_file()
 
 
@@ -91,7 +91,7 @@ def add_report(page: "Callable[[], Content]", folder: Path, mark: Mark | None) -
 
 
 def beside_result(folder: Path) -> dict[str, Mark]:
-    """Result in a folder, to which its report may be added while it is unchanged."""
+    """Result in a folder; its report may be added while it is unchanged."""
     mark = mark_of(folder / _RESULT)
     return {} if mark is None else {_RESULT: mark}
 
@@ -121,12 +121,12 @@ class Ending(Shown):
     case: str = ""
 
     def __post_init__(self) -> None:
-        """Refuse a folder that cannot be written to; the rest was checked before."""
+        """Refuse a folder that cannot be written to."""
         require_folder(self.folder)
 
     @classmethod
     def of(cls, wanted: WantedResult, name: str, *, case: Path | str = "") -> Self:
-        """The ending that was asked for, in a folder of that name without another."""
+        """The requested ending; ``name`` is that of the folder by default."""
         folder = Path("klack-results") / name if wanted.out is None else wanted.out
         return cls(
             json=wanted.json,

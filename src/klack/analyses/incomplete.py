@@ -24,14 +24,14 @@ class IncompleteImpactError(ConvergenceError):
 
 
 class Attempts:
-    """Levels one after another: one that fails costs the others nothing."""
+    """Levels one after another; a failure costs the others nothing."""
 
     def __init__(self) -> None:
         self.errors: dict[str, Exception] = {}
 
     @contextmanager
     def at(self, name: str) -> Iterator[None]:
-        """Keep the error of a level and continue without it."""
+        """Keep the error of a level and continue."""
         try:
             yield
         except FAILURES as error:
@@ -46,7 +46,7 @@ class Attempts:
         }
 
     def require_one(self, levels: Mapping[str, object]) -> None:
-        """Raise the first error where no level has a result."""
+        """Raise the first error if no level has a result."""
         if not levels:
             raise next(iter(self.errors.values()))
 
@@ -60,7 +60,7 @@ def failure_notes(failures: Mapping[str, str]) -> tuple[str, ...]:
 
 
 def missing_in(study: object) -> tuple[str, ...]:
-    """What is missing in a stored result, for commands that use it."""
+    """What is missing in a stored result."""
     if isinstance(study, ImpactStudy):
         return failure_notes(study.failures)
     if isinstance(study, StrokeStudy):

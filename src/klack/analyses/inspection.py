@@ -1,4 +1,4 @@
-"""Content of a file of another program, before a case is written for it."""
+"""Content of a file of another program."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -166,7 +166,7 @@ def inspect_case(case: CaseFile) -> Iterator[tuple[str, tuple[Row, ...]]]:
 
 
 def _drawn_rows(case: CaseFile, name: str, drawn: ProfileGeometry) -> Iterator[Row]:
-    """Solids and edges of a drawing; volume and mass are those of the body of revolution."""
+    """Solids and edges of a drawing; volume and mass of the body of revolution."""
     profiles = drawn.profiles()
     yield "geometry", "", "drawn; meshed by klack when the case runs"
     for solid, profile in profiles.items():

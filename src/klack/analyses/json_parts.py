@@ -1,4 +1,4 @@
-"""Objects of JSON, each described once: its keys with their types and meanings, and its values."""
+"""Objects of JSON, each described once: keys, types, meanings and values."""
 
 from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
@@ -35,7 +35,7 @@ OwnComponents = Annotated[
 Version = Annotated[str, Field(description="Version.")]
 
 Read = str | Callable[[Any], Any]
-"""Attribute of a record, further ones behind dots, or a function of it."""
+"""Attribute of a record, with dots for inner ones, or a function of it."""
 
 
 class Key(NamedTuple):
@@ -106,7 +106,7 @@ class JsonForm:
 
 
 def inherited(form: JsonForm, of: Read) -> tuple[Key, ...]:
-    """Keys of another form, of a part of the record."""
+    """Keys of another form, read from a part of the record."""
 
     def within(key: Key) -> Key:
         return key._replace(
@@ -119,7 +119,7 @@ def inherited(form: JsonForm, of: Read) -> tuple[Key, ...]:
 def measured_keys(
     measures: Iterable[Measure[Any]], of: Read = lambda item: item
 ) -> tuple[Key, ...]:
-    """Keys of measures, of the record or of a part of it."""
+    """Keys of measures, read from the record or a part of it."""
 
     def key(item: Measure[Any]) -> Key:
         return Key(
@@ -143,7 +143,6 @@ def _read(of: Read, record: Any) -> Any:
 
 
 def _json(value: Any, shape: Any) -> Any:
-    """Value of a record as an entry of such a shape."""
     if isinstance(shape, JsonForm):
         return shape.json(value)
     if isinstance(shape, list):
@@ -156,7 +155,7 @@ def _json(value: Any, shape: Any) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    """Numbers and words alone; None for numbers that do not exist."""
+    """Numbers and words; None for numbers that do not exist."""
     if isinstance(value, np.ndarray | np.generic):
         if value.dtype.kind in "biu" or np.isfinite(value).all():
             return value.tolist()

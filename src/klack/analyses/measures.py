@@ -93,7 +93,7 @@ def _unread(_: Any) -> Value:
 
 
 def _under(key: str, of: Any) -> Value:
-    """What stands under a key of a mapping, or is called so in a record."""
+    """Value of a key or attribute."""
     value: Value = of[key] if isinstance(of, Mapping) else getattr(of, key)
     return value
 
@@ -193,14 +193,14 @@ class Measure(Generic[Of]):
         return f"{name} [{unit}]" if unit not in ("", "1") else name
 
     def json(self, of: Of) -> Value:
-        """Value as plain JSON, which knows no nan and no infinity."""
+        """Value as JSON, without nan and infinity."""
         value = self.read(of) if self.given(of) else None
         if value is None or not isfinite(value):
             return None
         return {"number": float, "whole": int, "truth": bool}[self.kind](value)
 
     def cell(self, of: Of) -> str:
-        """Value in its column on a terminal; a dash where it does not exist."""
+        """Value in its column; a dash without one."""
         value = self.read(of)
         if value is not None and isfinite(value) and self.unit_of is not None:
             return format_si(value, self.unit_of(of), self.settled(of).digits)
@@ -211,7 +211,7 @@ class Measure(Generic[Of]):
         return f"{scaled:{self.column.form}}{self._short_remark(of)}"
 
     def told(self, of: Of) -> str:
-        """Value with its unit, for a sentence on a terminal."""
+        """Value with unit, for a sentence."""
         value = self.read(of)
         if self.column is None or value is None or not isfinite(value):
             return self.absent
@@ -229,14 +229,14 @@ class Measure(Generic[Of]):
         return self.settled(of).printed(value) + self.remark(of)
 
     def settled(self, of: Of) -> "Measure[Of]":
-        """The same in the unit of one thing, and in its digits."""
+        """The same in the unit and digits of one thing."""
         if self.unit_of is None:
             return self
         digits = self.digits if self.digits_of is None else self.digits_of(of)
         return replace(self, unit=self.unit_of(of) or "1", digits=digits, unit_of=None)
 
     def printed(self, value: float) -> str:
-        """A value of this kind as a report prints it."""
+        """A value as a report prints it."""
         unit = {"1": "", "um": "µm"}.get(self.unit, self.unit)
         if self.form == "count":
             return count(int(value))
@@ -271,12 +271,12 @@ class Measure(Generic[Of]):
 
 
 def described_in(source: str, *measures: Measure[Of]) -> tuple[Measure[Of], ...]:
-    """A catalogue: measures whose equations stand on one page of the documentation."""
+    """Measures whose equations are on one page of the documentation."""
     return tuple(replace(item, source=item.source or source) for item in measures)
 
 
 def heads(measures: Iterable[Measure[Of]]) -> tuple[str, ...]:
-    """Heads of the columns of a terminal; measures without a column are left out."""
+    """Heads of the columns, for measures that have one."""
     return tuple(measure.head for measure in measures if measure.column is not None)
 
 
@@ -288,7 +288,7 @@ def cells(measures: Iterable[Measure[Of]], of: Of) -> tuple[str, ...]:
 def text_table(
     title: str, first: str, measures: Sequence[Measure[Of]], named: Iterable[tuple[str, Of]]
 ) -> TextTable:
-    """Table for a terminal: things down, below their names, and their measures across."""
+    """Table with things down and their measures across."""
     rows = tuple((name, *cells(measures, of)) for name, of in named)
     return TextTable(title=title, columns=(first, *heads(measures)), rows=rows)
 
@@ -299,7 +299,7 @@ def page_heads(measures: Iterable[Measure[Of]]) -> tuple[str, ...]:
 
 
 def page_cells(measures: Iterable[Measure[Of]], of: Of) -> tuple[str, ...]:
-    """Key numbers of a report in the order of :func:`page_heads`."""
+    """Key numbers in the order of :func:`page_heads`."""
     return tuple(measure.on_page(of) for measure in measures if measure.page)
 
 
@@ -314,7 +314,7 @@ def number_or_none(value: float) -> float | None:
 
 
 def with_measures(measures: Iterable[Measure[Any]]) -> Callable[[Kind], Kind]:
-    """Add what :func:`json_of` returns to a typed dictionary, for the schema of results."""
+    """Add the keys of :func:`json_of` to a typed dictionary, for the schema."""
     keys: dict[str, Any] = {
         item.json_key: Annotated[JSON_TYPES[item.kind], Field(description=item.definition)]
         for item in measures
@@ -345,7 +345,7 @@ def described(measures: Iterable[Measure[Any]]) -> list[dict[str, str]]:
 
 
 def glossary(measures: Iterable[Measure[Any]]) -> tuple[tuple[str, str], ...]:
-    """Names and definitions of the key numbers of a report, for its end."""
+    """Names and definitions of the key numbers of a report."""
     return tuple(
         (item.title or item.name, f"{item.definition} {item.note}".strip())
         for item in measures

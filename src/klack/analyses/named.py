@@ -1,4 +1,4 @@
-"""Analyses, their pages and commands by text, so that each is loaded when asked for."""
+"""Analyses, pages and commands by text, loaded when asked for."""
 
 from importlib import import_module
 from typing import Any

@@ -1,4 +1,4 @@
-"""Common parts of the report of every record, and of tables beside it."""
+"""Common parts of reports and of tables beside them."""
 
 import csv
 from collections.abc import Iterable, Mapping, Sequence
@@ -70,7 +70,7 @@ def page_of(
 
 
 def stage_table(stage_times: Mapping[str, float], wall_time: float) -> Table:
-    """Wall time of every stage of a record, and of the whole."""
+    """Wall time of every stage and of the whole."""
     rows = [(name, quantity(value, "s", 3)) for name, value in stage_times.items()]
     rows.append(("whole study", quantity(wall_time, "s", 3)))
     return Table(columns=("stage", "time"), rows=tuple(rows))
@@ -85,7 +85,7 @@ def write_table(file: Path, rows: Iterable[Sequence[str]]) -> None:
 
 
 def _date_text(created: str) -> str:
-    """``2025-01-31T12:00:00+00:00`` as ``2025-01-31 12:00 UTC``; other text as it came."""
+    """``2025-01-31T12:00:00+00:00`` as ``2025-01-31 12:00 UTC``; other text unchanged."""
     try:
         moment = datetime.fromisoformat(created)
     except ValueError:
@@ -102,7 +102,7 @@ _TITLE = "Schematic"
 
 
 def schematic_section(picture: str) -> Section:
-    """Show a stored schematic; empty for a result of an earlier klack, which has none."""
+    """Stored schematic; empty for results of an earlier klack."""
     if not picture:
         return Section(title=_TITLE)
     try:

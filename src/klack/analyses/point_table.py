@@ -79,7 +79,7 @@ class PointTable:
 
     @property
     def columns(self) -> tuple[PointColumn, ...]:
-        """Points, then measures, then what the check of their steps has found."""
+        """Points, measures, then the check of steps."""
         return (*self.points, *self.measures, *self.steps)
 
     def __getitem__(self, name: str) -> NDArray[Any]:
@@ -101,13 +101,12 @@ class PointTable:
         return np.array([bool(text) for text in self.failures], dtype=bool)
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """Columns by name, then ``"failure"`` and ``"doubts"``, texts of each point."""
+        """Columns by name, then texts ``"failure"`` and ``"doubts"`` of each point."""
         found = {column.name: column.values for column in self.columns}
         return found | {name: np.array(texts, dtype=object) for name, texts in self._texts}
 
     @property
     def _texts(self) -> tuple[tuple[str, tuple[str, ...]], ...]:
-        """What is said about each point, by the name of a column."""
         return (("failure", self.failures), ("doubts", tuple(map("\n".join, self.warnings))))
 
     def to_pandas(self) -> Any:
@@ -137,7 +136,7 @@ class PointTable:
         return path
 
     def to_parquet(self, file: str | Path) -> Path:
-        """Write a Parquet file: columns by name, the unit of each in the metadata of its field."""
+        """Write a Parquet file; units are in the metadata of fields."""
         try:
             import pyarrow
             from pyarrow import parquet
@@ -208,7 +207,7 @@ class RunsInterrupted(KeyboardInterrupt):
 def column_of(
     name: str, unit: str, values: list[Any], measure: Measure[Any] | None = None
 ) -> PointColumn:
-    """A column: floats if it has a unit, nan for None; else objects."""
+    """Column of floats with a unit, nan for None; else of objects."""
     if not unit:
         kept = np.empty(len(values), dtype=object)
         kept[:] = values

@@ -87,17 +87,17 @@ class CaseRecord(Record):
     case_notes: InitVar[tuple[str, ...]] = ()
 
     def __post_init__(self, case_notes: tuple[str, ...]) -> None:
-        """Add the notes of the case to the warnings."""
+        """Add notes of the case to the warnings."""
         new = tuple(note for note in case_notes if note not in self.warnings)
         object.__setattr__(self, "warnings", (*self.warnings, *new))
 
 
 _version = cache(version)
-"""Version of an installed library; reading its description takes milliseconds."""
+"""Version of an installed library, cached: reading it takes milliseconds."""
 
 
 def run_fields(begin: float, clock: StageClock, *libraries: str) -> dict[str, Any]:
-    """Fields that a run gives, which began at ``begin`` of ``perf_counter`` [s]."""
+    """Fields of a run that began at ``begin`` of ``perf_counter`` [s]."""
     return {
         "version": __version__,
         "versions": {name: _version(name) for name in (*_LIBRARIES, *libraries)},
@@ -108,7 +108,7 @@ def run_fields(begin: float, clock: StageClock, *libraries: str) -> dict[str, An
 
 
 def case_fields(case: "AnyCase | CaseRecord", case_text: str | None = None) -> dict[str, Any]:
-    """Fields that a case gives, or the record that an analysis starts from."""
+    """Fields of a case, or of a record that an analysis starts from."""
     notes: tuple[str, ...]
     if isinstance(case, CaseRecord):
         name, text, notes = case.case, case.case_text, ()

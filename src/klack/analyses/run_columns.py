@@ -28,7 +28,7 @@ class Columns:
         def __getattr__(self, key: str) -> Column: ...
 
     def __post_init__(self) -> None:
-        """Fill in the columns that earlier versions of klack have not stored."""
+        """Fill in columns that earlier versions have not stored."""
         for name in self.keys():
             if not len(getattr(self, name)):
                 object.__setattr__(self, name, np.full(self.count, self.filled))
@@ -49,7 +49,7 @@ class Columns:
         return len(getattr(self, self.keys()[0]))
 
     def row(self, index: int) -> dict[str, float]:
-        """All numbers of one run by the name of their column."""
+        """Numbers of one run by column."""
         return {name: float(getattr(self, name)[index]) for name in self.keys()}
 
 
@@ -85,7 +85,7 @@ def with_columns(
 
 
 def told_value(value: float, unit: str, digits: int = 4) -> str:
-    """A value for a terminal; a dash where there is none."""
+    """Value for a terminal; a dash without one."""
     if not np.isfinite(value):
         return "–"
     return format_si(value, unit, digits) if unit != "1" else f"{value:.4f}"

@@ -1,4 +1,4 @@
-"""What a sample of numbers is told by: mean, standard deviation, quantiles."""
+"""What describes a sample: mean, standard deviation, quantiles."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -91,13 +91,13 @@ STATISTICS = (
     quantile(0.95),
     quantile(1.0, "highest", "highest"),
 )
-"""All that a sample is told by, in their order."""
+"""All statistics, in their order."""
 
 
 def moments(
     values: NDArray[np.float64], statistics: Iterable[Statistic] = STATISTICS
 ) -> dict[str, float | None]:
-    """Statistics of the values (n,) that are known, as JSON has them; None where there is none."""
+    """Statistics of the known values (n,), for JSON."""
     known = values[np.isfinite(values)]
     found = {item.json_key: item.of(known) if known.size else np.nan for item in statistics}
     return {key: value if np.isfinite(value) else None for key, value in found.items()}

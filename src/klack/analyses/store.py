@@ -81,7 +81,7 @@ def load_record(folder: Path, form: RecordFormat, *, largest: int = _LARGEST) ->
 
 
 def _steadily(folder: Path, read: Callable[[Path], Found]) -> Found:
-    """Content of the store of a folder; read again if it was replaced meanwhile."""
+    """Content of a store; read again if it was replaced meanwhile."""
     for _ in range(_TRIES):
         place = _find(folder)
         try:
@@ -140,7 +140,7 @@ def _open(path: Path) -> dict[str, Any]:
 
 
 def _require_plain_files(path: Path) -> None:
-    """Reject links, which lead out of the store, and pipes, which block."""
+    """Reject links, which lead out, and pipes, which block."""
     for place, folders, files in os.walk(path):
         for name in (*folders, *files):
             try:
@@ -191,7 +191,6 @@ def _damaged(path: Path, got: str) -> InputError:
 
 
 def _describe(place: Path, kind: str, attributes: Mapping[str, Any], **more: Any) -> None:
-    """Make a node, a group or an array, of its description."""
     place.mkdir()
     words = {"attributes": attributes, "zarr_format": 3, "node_type": kind, **more}
     (place / "zarr.json").write_text(json.dumps(words, indent=2), encoding="utf-8")
@@ -262,7 +261,7 @@ def _write(place: Path, name: str, value: Any, form: RecordFormat) -> None:
 
 
 def _columns(records: Sequence[Any]) -> dict[str, Any]:
-    """Fields of records of one kind: numbers as an array, words as a tuple."""
+    """Fields of like records: numbers as an array, words as a tuple."""
     columns: dict[str, Any] = {}
     for field in fields(records[0]):
         values = [getattr(record, field.name) for record in records]
@@ -279,7 +278,7 @@ def _has_arrays(value: Any) -> bool:
 
 
 def _plain(value: Any) -> Any:
-    """JSON has no infinity: such numbers are stored as text."""
+    """JSON has no infinity: such numbers become text."""
     if isinstance(value, Mapping):
         return {str(key): _plain(member) for key, member in value.items()}
     if isinstance(value, tuple | list):
@@ -296,7 +295,7 @@ def _checksum(array: np.ndarray) -> int:
 
 
 def _kind(array: np.ndarray) -> str:
-    """Type and shape: the same bytes mean other numbers in another one."""
+    """Type and shape, without which bytes mean nothing."""
     return f"{array.dtype.str} {'x'.join(map(str, array.shape))}"
 
 
@@ -318,7 +317,7 @@ def _described(file: Path) -> dict[str, Any]:
 
 
 def _nodes(path: Path, largest: int) -> dict[Path, dict[str, Any]]:
-    """Descriptions by place, once all sizes are checked: nothing was allocated until then."""
+    """Descriptions by place, after all sizes are checked."""
     found = {
         Path(place): _described(Path(place, "zarr.json"))
         for place, _, files in os.walk(path)
@@ -331,7 +330,7 @@ def _nodes(path: Path, largest: int) -> dict[Path, dict[str, Any]]:
 
 
 def _dtype(about: Mapping[str, Any]) -> np.dtype[Any]:
-    """Type of the numbers of an array as they are stored; raises for all but numbers."""
+    """Type of the stored numbers; raises for all but numbers."""
     found = np.dtype(about["data_type"])
     if found.kind not in "biufc" or found.name != about["data_type"] or min(about["shape"]) < 0:
         raise _incomplete("an array of other than numbers")
@@ -458,7 +457,7 @@ def _is_mapping(hint: Any) -> bool:
 
 
 def _element(hint: Any, index: int) -> Any:
-    """Kind declared for the member ``index`` of a tuple or of a value of a mapping."""
+    """Declared kind of member ``index`` of a tuple or of a value of a mapping."""
     arguments = get_args(hint)
     if not arguments:
         return Any

@@ -72,7 +72,7 @@ class LogForm(Generic[Key, Part]):
             return max(sum(line.endswith(b"\n") for line in file) - 1, 0)
 
     def remove(self, folder: Path) -> None:
-        """Remove the file: the work is complete and stored elsewhere."""
+        """Remove the file: the work is stored elsewhere."""
         path = folder / self.file
         try:
             handle = open_own_file(path, os.O_RDONLY)
@@ -168,7 +168,7 @@ class UnfinishedLog(Closing, Generic[Key, Part]):
             os.close(handle)
 
     def _take_over(self, file: FileIO) -> None:
-        """Read what an earlier run left; a damaged line costs no other one."""
+        """Read what an earlier run left; a damaged line costs no other."""
         start, damaged = file.tell(), list[int]()
         *lines, rest = file.read().split(b"\n")
         for number, line in enumerate(lines, 2):  # after the header
@@ -199,7 +199,7 @@ class UnfinishedLog(Closing, Generic[Key, Part]):
 
 
 def _append(file: FileIO, data: bytes) -> None:
-    """Write all of it, and have it on the disk."""
+    """Write all of it to the disk."""
     rest = memoryview(data)
     while rest:
         rest = rest[file.write(rest) :]
@@ -207,7 +207,7 @@ def _append(file: FileIO, data: bytes) -> None:
 
 
 def _opened(path: Path) -> int:
-    """Handle of the file, for the caller alone: who can read a file can lock it."""
+    """Handle for the caller alone: who can read a file can lock it."""
     flags = os.O_RDWR | os.O_APPEND
     try:
         return open_own_file(path, flags | os.O_CREAT | os.O_EXCL)

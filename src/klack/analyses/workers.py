@@ -1,4 +1,4 @@
-"""Processes that share one thing and answer with results or with errors, which a log may keep."""
+"""Processes that share one thing and answer with results or errors."""
 
 import multiprocessing
 import os
@@ -45,14 +45,14 @@ _shared: list[Any] = []
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """Error in a form for other processes: where, got, expected, hint; or its text."""
+    """Error for other processes: where, got, expected, hint; or its text."""
 
     kind: str
     parts: tuple[str, ...]
 
 
 class WorkerDied(Exception):
-    """A worker process ended without an answer; says how."""
+    """A worker process ended without an answer; the text says how."""
 
 
 @dataclass(eq=False)
@@ -87,7 +87,7 @@ class WorkerPool(Closing):
         self._is_busy = False
 
     def close(self) -> None:
-        """End the processes; what they compute at this moment is lost."""
+        """End the processes; work in progress is lost."""
         for connection, process in self._processes.items():
             connection.close()
             process.terminate()
@@ -188,7 +188,7 @@ class WorkerPool(Closing):
         self._is_busy = False
 
     def finished(self) -> Iterator[tuple[Any, Any]]:
-        """Answers that have come to who gave up asking, each with its item."""
+        """Late answers to who gave up asking, each with its item."""
         whole = {key: task for key, task in self._tasks.items() if key is not self._read_from}
         for connection, task in whole.items():
             with suppress(EOFError, OSError):
@@ -203,7 +203,7 @@ class WorkerPool(Closing):
     def _employ(
         self, compute: Callable[[Item], Any], next_task: "Callable[[object], _Task[Item] | None]"
     ) -> None:
-        """Give work to all processes without any; start further ones while there is some."""
+        """Give work to idle processes; start further ones while there is some."""
         for connection in [one for one in self._processes if one not in self._tasks]:
             task = next_task(connection)
             if task is not None:
@@ -221,7 +221,7 @@ class WorkerPool(Closing):
             self._send(connection, (compute, self._tasks[connection].item))
 
     def _started(self) -> Connection:
-        """Connection to a new process, to which what is shared has not been sent yet."""
+        """Connection to a new process, before what is shared is sent."""
         # a fork would inherit the threads and locks of the libraries
         context = multiprocessing.get_context("spawn")
         with deaf_to_interrupts():
@@ -244,7 +244,7 @@ class WorkerPool(Closing):
         return found
 
     def _buried(self, connection: Connection) -> WorkerDied:
-        """Forget a process that has gone, and its item; return how it ended."""
+        """Forget a dead process and its item; return how it ended."""
         died = self._died(connection)
         process = self._processes.pop(connection)
         process.kill()  # where it only closed its connection
@@ -280,7 +280,7 @@ def answer(compute: Callable[[], Result]) -> Result | Failure:
 
 
 def unwrapped(name: str, found: Result | Failure) -> Result:
-    """Result of an answer; its error, under the name of the work, is raised."""
+    """Result of an answer, or its error raised under the name of the work."""
     if not isinstance(found, Failure):
         return found
     if found.kind == "input":

@@ -1,4 +1,4 @@
-"""What ``klack advise`` finds: settings, what each costs in accuracy, and what is advised."""
+"""What ``klack advise`` finds: settings, their cost in accuracy, and advice."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -168,7 +168,7 @@ class Advice:
 
     @property
     def finest(self) -> dict[Key, float]:
-        """Values [SI] at least as fine as every run and as the advice."""
+        """Values [SI] at least as fine as every run and the advice."""
         return {
             item.key: item.finer(counsel.measured.setting.at(min(factors))[item.key], advised)
             for counsel in self.counsels

@@ -1,4 +1,4 @@
-"""Advice for a case of either kind, and as YAML: lines to paste, and the whole case with them."""
+"""Advice for a case of either kind, also as YAML."""
 
 from dataclasses import replace
 from io import StringIO

@@ -24,7 +24,7 @@ _TIME = {2: 1.2, 3: 1.5}
 
 
 def larger(dofs: int, factor: float, dimension: int) -> int:
-    """Most degrees of freedom that refining one region by a factor below 1 can make."""
+    """Most degrees of freedom from refining one region by a factor below 1."""
     return round(dofs * factor**-dimension)
 
 
@@ -59,12 +59,12 @@ def memory_of(dofs: int, dimension: int) -> float:
 
 
 def time_of(dofs: int, dimension: int) -> float:
-    """Time in a unit of its own: for ratios."""
+    """Time in its own unit, for ratios."""
     return float(dofs ** _TIME[dimension])
 
 
 def fits(dofs: int, dimension: int) -> bool:
-    """Whether a run of this size needs no more than half of the memory left to this process."""
+    """Whether a run of this size needs at most half of the free memory."""
     return memory_of(dofs, dimension) <= _SHARE * available_memory().size
 
 

@@ -61,7 +61,6 @@ def _told(advised: AdvisedCase) -> Iterator[TextTable | str]:
 
 
 def _rows(advice: Advice) -> tuple[tuple[str, ...], ...]:
-    """Rows: settings, what no setting changes, sums, target, check."""
     measures = advice.measures
     rows = [_row(item, measures) for item in advice.counsels]
     for fixed in advice.fixed:
@@ -98,7 +97,6 @@ def _row(item: Counsel, measures: Sequence[Measure]) -> tuple[str, ...]:
 
 
 def _different(item: Counsel) -> list[SettingValue]:
-    """Values of a setting, one of those that are alike in name, now and then."""
     found = {(v.key[-1], v.value, item.values[v.key]): v for v in item.measured.setting.values}
     return list(found.values())
 
@@ -118,7 +116,6 @@ def _order(item: Counsel) -> str:
 
 
 def _errors(errors: NDArray[np.float64], measures: Sequence[Measure]) -> str:
-    """Worst of the judged relative errors, and the levels."""
     pairs = [(e, m) for e, m in zip(errors, measures, strict=True) if np.isfinite(m.limit)]
     parts = [_number(100.0 * max(e for e, m in pairs if not m.decibel), "%")]
     parts += [_number(e, "dB") for e, m in pairs if m.decibel]

@@ -1,4 +1,4 @@
-"""``klack advise`` for one impact: mesh, modes and step, each from runs that differ in it alone."""
+"""``klack advise`` for one impact: runs that differ in mesh, modes or step alone."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -71,8 +71,6 @@ _CONTACT_ORDER, _REST_ORDER, _LAYER_ORDER = 1.4, 1.0, 2.0
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Base:
-    """The case as it is, ready for many runs."""
-
     case: Case
     level: AdviceLevel
     problem: ContactProblem
@@ -95,7 +93,7 @@ class _Base:
 
     @cached_property
     def now(self) -> ImpactHistory:
-        """Impact of the case as it is; wanted again when the factorisations are gone."""
+        """Impact of the case, needed again when the factorisations are gone."""
         return self.history(1.0)
 
     def history(self, factor: float) -> ImpactHistory:
@@ -437,7 +435,7 @@ def _mesh_ladders(
     progress: Progress,
     threads: int | None,
 ) -> tuple[list[Measured], dict[str, tuple[float, int]]]:
-    """Ladders of every region; and a factor and the degrees of freedom of one run of each."""
+    """Ladders of every region; factor and degrees of freedom of one run of each."""
     case = family.case
     surfaces = (case.contact.moving, case.contact.stop)
     wanted = {surface.body for surface in surfaces}
@@ -508,7 +506,7 @@ def _no_run(setting: Setting, factor: float, error: KlackError) -> str:
 
 
 def _run(case: Case, level: AdviceLevel, threads: int | None) -> tuple[ImpactHistory, int]:
-    """One impact from its meshes on, and the degrees of freedom of both bodies."""
+    """Impact with new meshes, and the degrees of freedom of both bodies."""
     problem = build_problem(case, silent, threads=threads)
     try:
         pools = mode_pools(problem, at_least=1, progress=silent)
@@ -567,7 +565,7 @@ def _confirmed(
     progress: Progress,
     threads: int | None,
 ) -> Advice:
-    """Compare the case and the advised one with one at least as fine as all runs and as both."""
+    """Compare both cases with one at least as fine as all runs and as both."""
     case = family.case
     finest = {k: v for k, v in advice.finest.items() if k[0] == "bodies" and k[-1] != "layers"}
     if meshes and not family.fine:
@@ -602,7 +600,7 @@ def _confirmed(
 
 
 def _richest(case: Case, advised: Case, step: float, threads: int | None) -> ImpactHistory:
-    """Interface level with twice the modes, or those of the advised case if they are more."""
+    """Interface level with twice the modes, or more if the advice has more."""
     problem = build_problem(case, silent, threads=threads)
     try:
         pools = mode_pools(problem, at_least=1, progress=silent)
@@ -621,7 +619,7 @@ def _richest(case: Case, advised: Case, step: float, threads: int | None) -> Imp
 
 
 def _advised(base: _Base, case: Case, changes: Mapping[Key, float]) -> Case:
-    """Apply the advice to the case, or to its twin as far as that knows it."""
+    """Case, or what its twin knows of it, with the advice."""
     if case is base.case:
         return applied(case, changes)
     known: dict[Key, float] = {}

@@ -84,13 +84,13 @@ class Ladder:
 
     @property
     def order(self) -> float:
-        """Order used: measured and held within 0.5 to 4, or the assumed one."""
+        """Measured order, held within 0.5 to 4, or the assumed one."""
         raw = self.raw_order
         return self.assumed_order if np.isnan(raw) else float(np.clip(raw, *_ORDERS))
 
     @property
     def scattered(self) -> bool:
-        """Whether three runs do not converge: refining changes more than it improves."""
+        """Whether refining changes three runs more than it improves them."""
         return self.raw_order < _ORDERS[0]
 
     @property

@@ -1,4 +1,4 @@
-"""Kept modes of each body as settings: by number, by frequency, or by participation."""
+"""Kept modes of each body as settings."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -45,7 +45,7 @@ __all__ = [
 
 
 HISTORY = 2
-"""Place of the force history, the norm that orders are measured on, among the measures."""
+"""Place of the force history, on which orders are measured."""
 
 _RANGE = 40.0  # [dB] below the highest band
 
@@ -129,7 +129,7 @@ _FEWEST = 2
 
 
 def explicit_modes(case: AnyCase) -> AnyCase:
-    """The case with the choice of modes written out for every body."""
+    """Case with the choice of modes written out for every body."""
     choices = {name: case.reduction.choice(name) for name in case.bodies}
     return _with_choices(case, choices)
 
@@ -148,7 +148,7 @@ def counted(choice: ModeChoice, pool: Modes) -> int:
 
 
 def expected_count(choice: ModeChoice, pool: Modes) -> int:
-    """Modes that a choice would keep of a larger pool, their frequencies evenly spaced above."""
+    """Modes kept of a larger pool, with evenly spaced frequencies above."""
     asked = choice.count or choice.participation
     if asked is not None:
         return asked
@@ -181,7 +181,7 @@ def interface_history(
     *,
     step: float,
 ) -> ImpactHistory:
-    """Impact at the interface level with so many modes of each body, as far as its pool goes."""
+    """Impact at the interface level with so many modes of each body, if the pool has them."""
     choices = {
         name: _choice(problem.case.reduction.choice(name), min(count, len(pools[name].omega)))
         for name, count in counts.items()
@@ -256,7 +256,7 @@ def mode_ladder(
 def history_ladder(
     factors: list[float], runs: list[ImpactHistory], up_to: float, order: float
 ) -> Ladder:
-    """Compare histories with the finest, and neighbours with each other."""
+    """Histories compared with the finest, and neighbours with each other."""
     return Ladder(
         factors=tuple(factors),
         differences=np.array([impact_errors(runs[-1], run, up_to) for run in runs[:-1]]),

@@ -1,4 +1,4 @@
-"""Regions of a case's meshes, and the axisymmetric twin of bodies that are swept."""
+"""Regions of meshes, and the axisymmetric twin of swept bodies."""
 
 from collections.abc import Mapping, Sequence
 from math import isnan, nan
@@ -59,7 +59,7 @@ def mesh_settings(
 
 
 def layer_setting(bodies: Mapping[str, CaseBody]) -> Setting | None:
-    """Layers round the circle of all swept bodies together."""
+    """Layers round the circle, of all swept bodies together."""
     values = tuple(
         SettingValue(
             key=("bodies", name, "geometry", "layers"),

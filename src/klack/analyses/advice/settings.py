@@ -1,4 +1,4 @@
-"""Settings of a case that are made finer or coarser together: sizes, layers, modes, steps."""
+"""Settings that are made finer or coarser together: sizes, layers, modes, steps."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -42,7 +42,7 @@ class SettingValue:
     table: tuple[float, ...] = ()
 
     def at(self, factor: float) -> float:
-        """Value [SI] at a factor, without rounding but for counts."""
+        """Value [SI] at a factor; only counts are rounded."""
         if self.kind == "size":
             return min(self.value * factor, self.most)
         if self.kind == "frequency":
@@ -50,7 +50,7 @@ class SettingValue:
         return max(float(round(self.value / factor)), self.least)
 
     def advised(self, factor: float) -> float:
-        """Value [SI] at a factor, in few digits, never coarser than asked for."""
+        """Value [SI] in few digits, never coarser than the factor."""
         if factor == 1.0:
             return self.value
         if self.kind == "size":
@@ -103,7 +103,7 @@ class Setting:
         return all(item.kind != "size" or item.value * factor <= item.most for item in self.values)
 
     def advised(self, factor: float) -> dict[Key, float]:
-        """Values [SI] that are advised for a factor; those of the case if they are good enough."""
+        """Values [SI] for a factor; those of the case if they are good enough."""
         kept = 1.0 if 1.0 <= factor < _KEEP else factor
         return {item.key: item.advised(kept) for item in self.values}
 
@@ -134,7 +134,7 @@ def rounded_up(count: float) -> int:
 
 
 def applied(node: Any, values: Mapping[Key, float]) -> Any:
-    """Copy of a case with other numbers, whole ones where it has some, at keys that it has."""
+    """Case with other numbers at existing keys, whole ones where it has them."""
     for key, value in values.items():
         node = _with(node, key, value)
     return node

@@ -77,7 +77,7 @@ def _variant(case: ValveCase) -> Variant:
 def _deviation(
     reference: Mapping[str, NDArray[np.float64]], run: Mapping[str, NDArray[np.float64]]
 ) -> NDArray[np.float64]:
-    """Worst deviation over the stops, shape (4,); a stop that is not reached is no agreement."""
+    """Worst deviation (4,) over the stops; 1 where a stop is not reached."""
     worst = np.zeros(4)
     for stop, numbers in reference.items():
         if stop not in run:
@@ -183,7 +183,6 @@ def advise_stroke(
 
 
 def _shortened(case: ValveCase, now: Mapping[str, NDArray[np.float64]]) -> ValveCase:
-    """The case until a while after the first impacts."""
     end = max(_SPARE * (numbers[0] + np.nan_to_num(numbers[3])) for numbers in now.values())
     run = case.run.model_copy(update={"duration": min(case.run.duration, float(end))})
     return case.model_copy(update={"run": run})
@@ -236,7 +235,7 @@ def step_ladder(
 
 
 def _may_double(valve: Valve) -> bool:
-    """Whether waves in lines of cells take at least two of the macro steps of the case."""
+    """Whether waves in lines of cells take two macro steps or more."""
     rows, run = variant_network(valve, _variant(valve.case)).rows(), valve.case.run
     sizes = step_sizes(rows, run.accuracy, step=run.step, coarse=run.coarse)
     crossing = min((wave.crossing for wave in rows.waves), default=inf)
@@ -284,7 +283,7 @@ def _confirmed(
     now: Mapping[str, NDArray[np.float64]],
     threads: int | None,
 ) -> Advice:
-    """Compare the valve and the advised one with one at least as fine as all runs and as both."""
+    """Compare both valves with one at least as fine as all runs and as both."""
     reference = _impacts(applied(case, advice.finest), threads)
     advised = _impacts(applied(case, advice.changes), threads)
     return replace(

@@ -116,7 +116,7 @@ def calibration_measured(study: CalibrationStudy) -> Iterator[Measured]:
 
 
 def calibration_told(study: CalibrationStudy) -> Iterator[TextTable | str]:
-    """The parameters, and how far the mean stroke is off."""
+    """The parameters, and the residual of the mean stroke."""
     title = f"{study.title}: {len(study.strokes)} strokes, {study.variant}"
     yield TextTable(title=title, columns=PARAMETER_COLUMNS, rows=parameter_rows(study))
     yield (

@@ -86,11 +86,11 @@ Floats = NDArray[np.float64]
 
 _MARGIN = 0.05
 _HEADROOM = 1.25
-"""Range of the residual over its largest value, so that the legend covers no curve."""
+"""Range over the largest residual, so that the legend covers no curve."""
 
 
 def stroke_chart(study: CalibrationStudy, channel: FittedChannel) -> Chart:
-    """The whole stroke of one channel, measured and computed, and their difference."""
+    """Whole stroke of one channel, measured and computed, and the difference."""
     return _overlay(
         study,
         channel,
@@ -105,7 +105,7 @@ def stroke_chart(study: CalibrationStudy, channel: FittedChannel) -> Chart:
 
 
 def window_chart(study: CalibrationStudy, channel: FittedChannel, window: FitWindow) -> Chart:
-    """One fitted window, from where the channel begins to move."""
+    """One fitted window, from the first motion of the channel."""
     inside = (study.time >= window.first) & (study.time <= window.last)
     moved = np.abs(channel.mean - channel.mean[inside][0]) > 0.04 * np.ptp(channel.mean[inside])
     times = study.time[inside & moved]
@@ -181,7 +181,7 @@ def _overlay(
 
 
 def profile_chart(profile: ProfileCurve, parameter: CalibratedParameter) -> Chart:
-    """How much worse the fit becomes when one parameter is held aside."""
+    """Misfit when one parameter is held off its best value."""
     unit, factor = printed_unit(profile.values, parameter.unit)
     x = factor * profile.values
     line = np.linspace(x[0], x[-1], 121)
@@ -327,7 +327,7 @@ def _parameter_table(study: CalibrationStudy) -> Table:
 
 
 def _profile_span(item: CalibratedParameter, profile: ProfileCurve) -> str:
-    """Ends of an interval that the profile may leave open towards a bound."""
+    """Ends of an interval that may be open towards a bound."""
     ends = (profile.lower, profile.upper)
     return _span(
         quantity(end, item.unit, item.digits) if isfinite(end) else "bound" for end in ends

@@ -45,8 +45,9 @@ __all__ = [
 
 
 _FINER, _MOST_COARSE = 2, 256
-"""The instant of a touch falls between two fine steps; as parameters move, that makes the lift
-jump by some nm.  Half the step makes it a third, and the derivatives that much better."""
+"""As parameters move, a touch moves between two fine steps, and the lift jumps by some nm: by a
+third with half the step.
+"""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -100,7 +101,7 @@ class MotionModel:
     record: float
 
     def changes(self, values: Sequence[float]) -> dict[Key, str | float]:
-        """What stands in the case instead, for parameter values [SI]."""
+        """Texts for the case at parameter values [SI]."""
         return {
             place.key: place.written(value)
             for parameter, value in zip(self.parameters, values, strict=True)
@@ -229,7 +230,7 @@ trial_log = TRIAL_LOG.open
 
 
 class TrialPool(LoggedWork[TrialKey, Motion]):
-    """Computes trials that the log does not hold yet, and keeps them there."""
+    """Computes trials that the log does not hold, and keeps them there."""
 
     def __init__(self, model: MotionModel, workers: int, log: TrialLog) -> None:
         super().__init__(_run, model, workers, log, self._name_of)
@@ -297,7 +298,7 @@ class StrokeModel:
     duration: float
 
     def __call__(self, vectors: Sequence[Vector]) -> list[Vector]:
-        """Samples that are fitted, all channels behind each other, for scaled parameters."""
+        """Fitted samples of all channels, one after the other, for scaled parameters."""
         values = [self.unscaled(z) for z in vectors]
         motions = self.pool.motions([self._of_motion(v) for v in values], self.duration)
         return [

@@ -1,4 +1,4 @@
-"""Record of ``klack calibrate``: parameters with their uncertainty, and what shows it."""
+"""Record of ``klack calibrate``: parameters with their uncertainty."""
 
 from dataclasses import dataclass
 from operator import attrgetter
@@ -71,7 +71,7 @@ class CalibratedParameter:
 
     @property
     def digits(self) -> int:
-        """Significant digits of the value that its standard error leaves, and one more; 4 to 8."""
+        """Significant digits that the standard error leaves, and one more; 4 to 8."""
         if not (0.0 < self.standard_error < float("inf")) or self.value == 0.0:
             return 4
         share = abs(self.value) / self.standard_error
@@ -200,7 +200,7 @@ _THEORY = "theory/calibration"
 def _of_parameter(
     key: str, name: str, symbol: str, definition: str, digits: int = 0, note: str = ""
 ) -> Measure[CalibratedParameter]:
-    """In the unit of the parameter; without digits, in as many as its standard error leaves."""
+    """In the unit of the parameter; ``digits`` 0: as its standard error leaves."""
     return Measure(
         key=key,
         name=name,

@@ -71,7 +71,7 @@ Impacts = Mapping[str, Sequence[float]]
 _POOR = 3.0
 """Misfit above which the model does not explain the strokes."""
 _HOPELESS = 10.0
-"""Misfit above which the search begins once more, from the middle of the bounds."""
+"""Misfit above which the search begins again from the middle of the bounds."""
 _LATER = 0.3e-3  # [s] that a computed stroke may trigger later than at the start
 _FINER, _FINEST = 8.0, 0.1e-6  # records per sample, and their least spacing [s]
 _REST = 0.3e-3  # [s] of rest on the opening stop after which a closing is repeatable
@@ -175,7 +175,7 @@ def run_calibration(
 
 
 def _require_written(tree: CaseTree, parameters: Sequence[FreeParameter]) -> None:
-    """Only what stands in the file can get its calibrated value there."""
+    """Only keys in the file can get a calibrated value there."""
     for parameter in parameters:
         for place in parameter.places:
             if written_at(tree.data, place.key) is None:
@@ -354,7 +354,7 @@ def _search(
     taper: Vector,
     clock: StageClock,
 ) -> Fit:
-    """Search from the values of the case; from the middle of the bounds if that leads nowhere."""
+    """Search from the case; from the middle of the bounds if that leads nowhere."""
 
     def told(iteration: int) -> None:
         clock("fit", min(iteration / _USUAL_ITERATIONS, 0.95))
@@ -408,13 +408,13 @@ def _curve(parameter: FreeParameter, profile: Profile) -> ProfileCurve:
 
 
 def _impacts_of(time: Vector, lift: Vector, sensor: LiftSensor) -> Impacts:
-    """Impact times on both stops [s], as they are read off a lift, measured or computed."""
+    """Impact times on both stops [s], read off a lift."""
     found = measure_stroke(time, lift, sensor=sensor).impacts
     return {stop: [i.time for i in found if i.stop == stop] for stop in _STOPS}
 
 
 def _computed_impacts(model: StrokeModel, motion: Motion, values: Vector) -> Impacts:
-    """Impact times as the solver knows them, from the trigger [s]."""
+    """Impact times of the solver, from the trigger [s]."""
     begin = _begin(model, motion, values)
     return {stop: [t - begin for t in times] for stop, times in motion.impacts.items()}
 
@@ -433,7 +433,7 @@ def _begin(model: StrokeModel, motion: Motion, values: Vector) -> float:
 def _impacts(
     strokes: StrokeSet, measured: Impacts, before: Impacts, after: Impacts
 ) -> tuple[FittedImpact, ...]:
-    """First impact on both stops, measured and computed, all read in the same way."""
+    """First impact on both stops, measured and computed, read alike."""
     runs = [measured, before, after]
     lifts = strokes.matrix("lift")
     openings = [_first(run, "opening", -np.inf) for run in runs]
@@ -455,7 +455,6 @@ def _impacts(
 
 
 def _first(impacts: Impacts, stop: str, since: float) -> float:
-    """First impact on a stop after a time; nan if there is none."""
     return float(next((t for t in impacts.get(stop, ()) if t > since), np.nan))
 
 

@@ -72,7 +72,7 @@ class Comparison:
 
     @property
     def runs(self) -> tuple[LevelResult, LevelResult]:
-        """The other program, as if it were a level of klack, and klack."""
+        """The other program as if it were a level, and klack."""
         other, history = self.other, self.other.history
         guest = LevelResult(
             level=other.program.lower(),
@@ -97,7 +97,7 @@ class Comparison:
 
     @property
     def wall_time_ratio(self) -> float | None:
-        """Wall-clock time of the other program over that of klack [-]."""
+        """Wall time of the other program over that of klack [-]."""
         other = self.other.wall_time
         return None if other is None or self.wall_time == 0.0 else other / self.wall_time
 
@@ -121,7 +121,7 @@ PROGRAM_MEASURES: tuple[Measure[LevelResult], ...] = (
     _OF_LEVELS["step"],
     replace(_OF_LEVELS["wall_time"], absent=""),
 )
-"""Of an impact as one program computed it; the wall time of klack has its set-up in it."""
+"""Of an impact by one program; the wall time of klack includes its set-up."""
 
 COMPARISON_COLUMNS = ("", *heads(PROGRAM_MEASURES))
 
@@ -185,7 +185,7 @@ def compare_with(study: ImpactStudy, level: str, other: OtherRun) -> Comparison:
 
 
 def with_other(study: ImpactStudy, comparison: Comparison) -> ImpactStudy:
-    """Study that holds the compared level and the other program as one more level, for charts."""
+    """Study with the compared level and the other program as one more level."""
     guest, _ = comparison.runs
     return replace(
         study,
@@ -196,7 +196,7 @@ def with_other(study: ImpactStudy, comparison: Comparison) -> ImpactStudy:
 
 
 def comparison_rows(comparison: Comparison) -> tuple[tuple[str, ...], ...]:
-    """Rows of :data:`COMPARISON_COLUMNS`: the other program, klack, the deviation."""
+    """Rows of :data:`COMPARISON_COLUMNS`: other program, klack, deviation."""
     deviation, ratio = comparison.deviation, comparison.wall_time_ratio
     return (
         *((run.label, *cells(PROGRAM_MEASURES, run)) for run in comparison.runs),
@@ -214,7 +214,6 @@ def comparison_rows(comparison: Comparison) -> tuple[tuple[str, ...], ...]:
 
 
 def _told(comparison: Comparison) -> Iterator[TextTable | str]:
-    """Both programs, and how far their histories are apart."""
     yield TextTable(
         title=comparison.title, columns=COMPARISON_COLUMNS, rows=comparison_rows(comparison)
     )

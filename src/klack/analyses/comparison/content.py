@@ -57,7 +57,7 @@ _MOST_IMPACTS = 6
 
 
 def measured_strokes_content(study: MeasuredStrokeStudy) -> Content:
-    """Put strokes beside their measurement into words, tables and figures."""
+    """Report of strokes beside their measurement."""
     variants = tuple(study.variants.values())
     sections = []
     if len(variants) > 1:
@@ -78,7 +78,7 @@ def measured_strokes_content(study: MeasuredStrokeStudy) -> Content:
 
 
 def measured_shots_content(study: MeasuredShotsStudy) -> Content:
-    """Put shots beside measured drops into words, tables and figures."""
+    """Report of shots beside measured drops."""
     facts = [
         ("files", study.source),
         ("drops", f"{len(study.names)} used, {len(study.rejected)} discarded"),
@@ -117,7 +117,6 @@ def measured_shots_content(study: MeasuredShotsStudy) -> Content:
 
 
 def _number_table(variants: tuple[ComparedVariant, ...]) -> Table:
-    """First impacts and whole curves, one block per variant."""
     rows: list[tuple[str, ...]] = []
     for variant in variants:
         head = f"{variant.variant}: " if len(variants) > 1 else ""
@@ -160,7 +159,6 @@ def _variant_sections(variant: ComparedVariant) -> list[Section]:
 
 
 def _one_column(variant: ComparedVariant, *, most: int) -> list[tuple[str, ...]]:
-    """Rows of impacts with number and stop in one cell."""
     return [(f"{kind}\n{stop}", *cells) for stop, kind, *cells in impact_rows(variant, most)]
 
 
@@ -282,7 +280,7 @@ _MOST = 40  # single recordings that are drawn
 
 
 def measured_impact_content(study: MeasuredImpactStudy) -> Content:
-    """Put an impact beside measured pulses into words, tables and figures."""
+    """Report of an impact beside measured pulses."""
     facts = [
         ("output", study.label),
         ("level", study.level),

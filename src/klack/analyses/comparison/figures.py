@@ -1,4 +1,4 @@
-"""Figures of a report beside a measurement: computed black, measured blue, in all of them."""
+"""Figures of a report beside a measurement: computed black, measured blue."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -32,13 +32,11 @@ Floats = NDArray[np.float64]
 _COMPUTED, _MEDIAN, _BAND, _ALL = "computed", "measured, median", "5 to 95 %", "all strokes"
 _ZERO = Mark(value=0.0, axis="y")
 _MOST = 40
-"""Thin lines of strokes; more would only cover each other and cost bytes."""
 _COLUMNS = 350
-"""Pixel columns of the thin lines and of the band."""
 
 
 def lift_chart(variant: ComparedVariant) -> Chart:
-    """Lift and velocity of a whole stroke, computed and measured, and their difference."""
+    """Lift and velocity of a stroke, computed and measured, and the difference."""
     left = 1e6 * (variant.computed_lift - variant.lift_median)
     low, high = (1e6 * (x - variant.lift_median) for x in (variant.lift_low, variant.lift_high))
     window = _moving(variant)
@@ -71,7 +69,7 @@ def lift_chart(variant: ComparedVariant) -> Chart:
 
 
 def first_touch_chart(variant: ComparedVariant, stop: str) -> Chart | None:
-    """Lift and velocity about the first impact on a stop, if there is one to compare."""
+    """Lift and velocity about the first impact on a stop."""
     impact = variant.first(stop)
     if impact is None or not isfinite(impact.time.measured):
         return None
@@ -94,14 +92,14 @@ def first_touch_chart(variant: ComparedVariant, stop: str) -> Chart | None:
 
 
 def _with_room(panel: Panel) -> tuple[float, float]:
-    """Range of y with room above the curves for the labels of the marks."""
+    """Range of y with room for the labels of the marks."""
     low = min(float(curve.y.min()) for curve in panel.curves)
     high = max(float(curve.y.max()) for curve in panel.curves)
     return low - 0.05 * (high - low), high + 0.45 * (high - low)
 
 
 def side_by_side_chart(variants: Sequence[ComparedVariant]) -> Chart:
-    """Lift of several variants, each beside its measured median."""
+    """Lift of several variants, each with its measured median."""
     windows = [_moving(variant) for variant in variants]
     panels = tuple(
         _panel(v, "lift", AxisSpec(label=f"lift, {v.variant}", unit="µm"), 1e6, window, 0.8)
@@ -135,7 +133,6 @@ def _panel(
     window: tuple[float, float],
     share: float,
 ) -> Panel:
-    """Computed over measured lift or velocity, with the band of the strokes."""
     low, median, high, computed = (
         factor * getattr(variant, name)
         for name in (f"{what}_low", f"{what}_median", f"{what}_high", f"computed_{what}")
@@ -150,7 +147,7 @@ def _panel(
 
 
 def _thin(variant: ComparedVariant, rows: Floats, window: tuple[float, float]) -> list[Curve]:
-    """All strokes; the first of them has the name of all."""
+    """All strokes; the first has the legend entry."""
     if len(rows) < 2:
         return []
     curves = []
@@ -191,7 +188,7 @@ def _line(
 
 
 def _moving(variant: ComparedVariant) -> tuple[float, float]:
-    """From the start of the record until the needle rests again [ms]."""
+    """From the start until the needle rests again [ms]."""
     lift = variant.lift_median
     span = float(np.ptp(lift))
     far = np.abs(lift - lift[-1]) > max(0.03 * span, 3.0 * float(np.std(lift[-20:])))
@@ -201,7 +198,7 @@ def _moving(variant: ComparedVariant) -> tuple[float, float]:
 
 
 def _around(variant: ComparedVariant, impact: ComparedImpact) -> tuple[float, float]:
-    """From a little before the first impact to after the second on that stop [ms]."""
+    """From before the first impact to after the second on that stop [ms]."""
     begin, second = impact.time.measured, None
     for other in variant.impacts:
         if other.stop == impact.stop and other.number == 2:
@@ -215,7 +212,7 @@ def _around(variant: ComparedVariant, impact: ComparedImpact) -> tuple[float, fl
 
 
 def measured_distribution_chart(of: MeasuredDistribution) -> Chart:
-    """Cumulative distributions of one measure, computed and measured, with the highest of each."""
+    """Cumulative distributions of one measure, with the highest of each."""
     unit, factor = length_unit(of.measured) if of.unit == "m" else (of.unit, 1.0)
     both = [_known(factor * of.computed), _known(factor * of.measured)]
     low, high = min(x[0] for x in both), max(x[-1] for x in both)
@@ -279,7 +276,7 @@ def measured_distribution_chart(of: MeasuredDistribution) -> Chart:
 
 
 def drops_chart(study: MeasuredShotsStudy) -> Chart:
-    """Height of all computed shots and of all measured drops since first touch."""
+    """Heights of computed shots and measured drops since first touch."""
     begin, end = float(study.time[0]), min(float(study.time[-1]), float(study.computed_time[-1]))
     seen = study.computed_time <= end
     curves = []

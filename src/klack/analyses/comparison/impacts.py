@@ -1,4 +1,4 @@
-"""A computed output of an impact beside recordings of the same sensor."""
+"""An output of an impact beside recordings of the same sensor."""
 
 import warnings
 from collections.abc import Sequence
@@ -169,7 +169,6 @@ def _axis(computed: Pulse) -> Floats:
 
 
 def _on_axis(record: _Record, pulse: ComparedPulse, time: Floats) -> Floats:
-    """A recording on the clock and at the speed of the computed pulse."""
     values = np.interp(time - pulse.shift, record.time, record.values)
     return np.asarray(record.pulse.sign * (values - record.pulse.rest) / pulse.factor)
 
@@ -227,7 +226,7 @@ def _channel(recording: Recording, name: str | None) -> ChannelInfo:
 
 
 def _factor(path: Path, info: ChannelInfo, kind: GaugeKind) -> float:
-    """From the unit of the file to SI; numbers without a unit are taken for SI."""
+    """From the unit of the file to SI; no unit counts as SI."""
     if no_unit(info.unit):
         return 1.0
     where = f"{path.name}: {info.name}"

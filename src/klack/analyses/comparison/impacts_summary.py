@@ -45,7 +45,6 @@ _STUDY = JsonForm(
 
 
 def _told(study: MeasuredImpactStudy) -> Iterator[TextTable | Notes | str]:
-    """A line for each recording, and what follows from them."""
     title = f"{study.title}, level '{study.level}': {study.label}"
     yield text_table(
         title, "recording", PULSE_MEASURES, ((pulse.name, pulse) for pulse in study.pulses)
@@ -75,7 +74,7 @@ def pulse_verdict(study: MeasuredImpactStudy) -> str:
 
 
 _LIKELY = 10.0
-"""Speed over the computed one above which a recording is taken for scaled."""
+"""Speed ratio above which a recording is taken for scaled."""
 
 
 def _side(difference: float) -> str:

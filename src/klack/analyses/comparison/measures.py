@@ -1,4 +1,4 @@
-"""Measures of a comparison with a measurement: computed, measured, and how far apart."""
+"""Measures of a comparison with a measurement."""
 
 from collections.abc import Callable
 from operator import attrgetter
@@ -38,7 +38,6 @@ def _compared(
     definition: str,
     read: Callable[[Of], Compared],
 ) -> tuple[Measure[Of], ...]:
-    """One number computed, measured, its scatter, reading error and strokes, and the difference."""
 
     def measure(
         part: str, head: str, words: str, of: Callable[[Compared], float], sign: str = ""
@@ -128,16 +127,15 @@ COMPARED: tuple[tuple[str, tuple[Measure[ComparedImpact], ...]], ...] = (
         ),
     ),
 )  # fmt: skip
-"""What is compared of every impact: title of its row, and its measures, column by column."""
+"""Row titles and measures, column by column, of every impact."""
 
 IMPACT_MEASURES = tuple(measure for _, measures in COMPARED for measure in measures)
-"""Of one impact that the model and at least half of the strokes have."""
+"""Of an impact that the model and at least half of the strokes have."""
 
 
 def _curve(
     key: str, symbol: str, unit: str, column: Column, rms: str, scatter: str
 ) -> tuple[Measure[ComparedVariant], ...]:
-    """How far a computed curve is from the measured ones over the whole record."""
     of_all, of_one = attrgetter(rms), attrgetter(scatter)
     return described_in(
         _THEORY,
@@ -282,7 +280,7 @@ HIGHEST_MEASURES: tuple[Measure[HighestShot], ...] = described_in(
         column=Column("", 1.0, "g"),
     ),
 )
-"""Of the stroke that rebounds highest from a stop, the usual stand-in for a centred impact."""
+"""Of the stroke that rebounds highest, the usual stand-in for a centred impact."""
 
 DROPS_MEASURES: tuple[Measure[MeasuredShotsStudy], ...] = described_in(
     _THEORY,
@@ -356,4 +354,4 @@ DISTRIBUTION_MEASURES: tuple[Measure[MeasuredDistribution], ...] = described_in(
         page=True,
     ),
 )
-"""Of one number of many drops, computed and measured."""
+"""Of one number of many drops."""

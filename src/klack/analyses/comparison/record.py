@@ -68,7 +68,7 @@ class Compared:
 
 
 IMPACT_NUMBERS = ("time", "approach_speed", "restitution", "rebound_height")
-"""What is compared of every impact: fields of :class:`ComparedImpact`."""
+"""Fields of :class:`ComparedImpact`."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -192,11 +192,11 @@ class ComparedVariant:
     highest: tuple[HighestShot, ...] = ()
 
     def first(self, stop: str) -> ComparedImpact | None:
-        """First impact on a stop; None if it was not compared."""
+        """First impact on a stop, if it was compared."""
         return next((hit for hit in self.impacts if hit.stop == stop and hit.number == 1), None)
 
     def judged(self) -> Iterator[tuple[str, float]]:
-        """Numbers that the verdict rests on, in words, and their difference over the scatter."""
+        """Numbers that the verdict rests on, in words, over the scatter."""
         for stop in ("opening", "seat"):
             impact = self.first(stop)
             if impact is not None:
@@ -208,7 +208,7 @@ class ComparedVariant:
         yield "velocity over time", self.velocity_rms / self.velocity_scatter
 
     def worst(self) -> tuple[str, float]:
-        """Judged number that is farthest off; nan if nothing can be judged."""
+        """Judged number that is farthest off; nan without any."""
         known = [(words, value) for words, value in self.judged() if isfinite(value)]
         return max(known, key=lambda item: item[1], default=("nothing", float("nan")))
 

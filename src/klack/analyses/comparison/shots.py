@@ -157,7 +157,6 @@ def _first_impacts(
 def _since_touch(
     drops: StrokeSet, names: Sequence[str], impacts: Sequence[MeasuredImpact]
 ) -> tuple[Floats, NDArray[np.float32]]:
-    """Lift of the drops over the time since their own first touch."""
     used = {drop.name: drop.values["lift"] for drop in drops.strokes}
     first = max(drops.time[0] - hit.time for hit in impacts)
     last = min(drops.time[-1] - hit.time for hit in impacts)
@@ -172,7 +171,7 @@ def _since_touch(
 def _computed_impacts(
     study: ShotsStudy, shots: ShotColumns, traces: ShotTraces
 ) -> tuple[MeasuredImpact | None, ...]:
-    """First impact of each computed shot, read off its height as that of a measured drop."""
+    """First impact of each computed shot, read off its height like a drop."""
     return tuple(
         _computed_impact(
             traces.time,

@@ -105,7 +105,7 @@ def drop_rule(study: MeasuredShotsStudy) -> str:
 
 
 def bias_sentence(study: MeasuredShotsStudy) -> str:
-    """What taking the highest rebound for the centred impact gets wrong."""
+    """Error of taking the highest rebound for the centred impact."""
     count = len(study.names)
     found = []
     for d in study.distributions:
@@ -118,7 +118,7 @@ def bias_sentence(study: MeasuredShotsStudy) -> str:
 
 
 def drop_rows(study: MeasuredShotsStudy) -> tuple[tuple[str, ...], ...]:
-    """Rows of :data:`DROP_COLUMNS`: each measure computed, measured, and centred."""
+    """Rows of :data:`DROP_COLUMNS`: computed, measured, and centred."""
     rows: list[tuple[str, ...]] = []
     for d in study.distributions:
         for name, values, highest in (

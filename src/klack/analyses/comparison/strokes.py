@@ -42,17 +42,17 @@ __all__ = ["EXCELLENT", "FAIR", "compare_numbers", "compare_strokes", "sensor_wo
 Floats = NDArray[np.float64]
 
 EXCELLENT, FAIR = 2.0, 5.0
-"""Differences over the scatter up to which an agreement is called so."""
+"""Differences over the scatter up to which an agreement has these names."""
 _NOTICED = 0.05
-"""Share of the fastest approach of a stroke below which an impact does not count."""
+"""Share of the fastest approach below which an impact does not count."""
 _REACHED = 0.1
-"""Share of the way that may be missing where the needle has met the opening stop."""
+"""Share of the way that may be missing at the opening stop."""
 _BY_DRAWING = (
     "The needle never rests on the opening stop in some strokes; there its level is that of the "
     "seat plus the lift of the drawing."
 )
 _REPLICAS, _SEED = 5, 1
-"""Readings of the computed lift, each with noise of its own."""
+"""Noisy copies of the computed lift."""
 _FEWEST_SHOTS = 3
 _STOPS: tuple[Stop, ...] = ("opening", "seat")
 _AGAINST = -0.5  # correlation
@@ -189,14 +189,14 @@ def require_same_way(source: str, computed: Floats, measured: Floats) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class _Reading:
-    """Numbers of one stroke; ``by_drawing`` if the opening stop was put where the drawing says."""
+    """Numbers of one stroke; ``by_drawing``: the opening stop is put by the drawing."""
 
     measures: StrokeMeasures
     moves: float
     by_drawing: bool
 
     def on(self, stop: Stop) -> tuple[MeasuredImpact, ...]:
-        """Impacts on a stop once the needle has moved, without trembling at rest."""
+        """Impacts on a stop after the first motion, without trembling at rest."""
         hits = [hit for hit in self.measures.on(stop) if hit.time > self.moves]
         known = (hit.approach_speed for hit in self.measures.impacts)
         fastest = max((speed for speed in known if isfinite(speed)), default=0.0)
@@ -307,7 +307,7 @@ def _impacts(
 
 
 def _highest(names: Sequence[str], readings: Sequence[_Reading]) -> tuple[HighestShot, ...]:
-    """Measured stroke with the highest first rebound from each stop; of three strokes or more."""
+    """Stroke with the highest first rebound from each stop, of three or more."""
     found = []
     for stop in _STOPS:
         hits = [reading.on(stop) for reading in readings]
@@ -343,7 +343,7 @@ def _impact(
     theirs: Sequence[MeasuredImpact],
     step: float,
 ) -> ComparedImpact:
-    """Numbers of one impact; times are not better known than the sampled trigger."""
+    """Numbers of one impact; times are no better than the sampled trigger."""
     sampled = {"time": step / sqrt(12.0)}
     numbers = {
         field: compare_numbers(
@@ -367,7 +367,7 @@ _ERRORS = {
 def compare_numbers(
     readings: Sequence[float], values: Iterable[float], errors: Iterable[float]
 ) -> Compared:
-    """Readings of one computed number beside those of several strokes; nan are left out."""
+    """One computed number beside that of several strokes; nan are left out."""
     ours = [value for value in readings if isfinite(value)]
     computed = float(np.median(ours)) if ours else float("nan")
     both = np.array([(v, e) for v, e in zip(values, errors, strict=True) if isfinite(v)])

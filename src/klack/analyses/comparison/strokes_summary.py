@@ -111,7 +111,6 @@ _STUDY = JsonForm(
 
 
 def _told(study: MeasuredStrokeStudy) -> Iterator[TextTable | Notes | str]:
-    """Curves and impacts of each variant, and the verdicts."""
     for variant in study.variants.values():
         aside = f", {len(variant.rejected)} discarded" if variant.rejected else ""
         title = f"{study.title}, {variant.variant}: {variant.count} strokes{aside}"
@@ -140,7 +139,7 @@ def agreement(study: MeasuredStrokeStudy, variant: ComparedVariant) -> str:
 
 
 def verdict(study: MeasuredStrokeStudy, variant: ComparedVariant) -> str:
-    """In one sentence, whether a variant agrees with its measurement, and what is worst."""
+    """Whether a variant agrees with its measurement, and what is worst."""
     words, worst = variant.worst()
     found = agreement(study, variant)
     strokes = f"{variant.count} measured stroke{'s' if variant.count != 1 else ''}"
@@ -172,7 +171,7 @@ def curve_rows(variant: ComparedVariant) -> tuple[tuple[str, ...], ...]:
 
 
 def impact_rows(variant: ComparedVariant, most: int = 3) -> tuple[tuple[str, ...], ...]:
-    """Rows of :data:`IMPACT_COLUMNS`: the first ``most`` impacts on each stop."""
+    """Rows of :data:`IMPACT_COLUMNS`: the first impacts on each stop."""
     rows = [
         (f"{stop_words(impact.stop)} #{impact.number}", title, *cells(measures, impact))
         for stop in ("opening", "seat")
@@ -186,7 +185,7 @@ def impact_rows(variant: ComparedVariant, most: int = 3) -> tuple[tuple[str, ...
 
 
 def highest_rows(variant: ComparedVariant) -> tuple[tuple[str, ...], ...]:
-    """Rows of :data:`HIGHEST_COLUMNS`: the measured stroke that rebounds highest, per stop."""
+    """Rows of :data:`HIGHEST_COLUMNS`: the highest rebound from each stop."""
     return tuple(
         (stop_words(shot.stop), shot.stroke, *cells(HIGHEST_MEASURES, shot))
         for shot in variant.highest

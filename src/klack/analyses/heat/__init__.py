@@ -1,1 +1,1 @@
-"""``klack heat``: how a valve warms up stroke by stroke, and what that does to its strokes."""
+"""``klack heat``: warm-up of a valve stroke by stroke, and its effects."""

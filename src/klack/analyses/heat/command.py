@@ -1,4 +1,4 @@
-"""``klack heat``: how a valve warms up stroke by stroke."""
+"""``klack heat``: warm-up of a valve stroke by stroke."""
 
 from pathlib import Path
 from typing import Annotated

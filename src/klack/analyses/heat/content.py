@@ -1,4 +1,4 @@
-"""Files beside a warm-up, its charts, and the content of its report."""
+"""Files beside a warm-up, charts, and report."""
 
 from math import isfinite
 from pathlib import Path
@@ -22,7 +22,7 @@ CSV_NAME, CAUSES_NAME = "heat.csv", "heat-causes.csv"
 
 
 def write_csv(record: HeatStudy, file: Path) -> None:
-    """Write time, temperatures, heat flows, and the numbers of the stroke at each point."""
+    """Write time, temperatures, heat flows, and the numbers of the strokes."""
     groups = (
         ("temperature", record.temperature),
         ("heat", record.heat),
@@ -60,7 +60,7 @@ _SHOWN = ("closing delay", "first peak at the seat", "rebound")
 
 
 def heat_charts(record: HeatStudy) -> tuple[Chart, ...]:
-    """Temperatures with their strokes below them; nothing of less than two points."""
+    """Temperatures with their strokes below, for two points or more."""
     moments = np.isfinite(record.time)
     if int(moments.sum()) < 2:
         return ()

@@ -141,14 +141,14 @@ def warm_valve(valve: Valve, at: Mapping[Aspect, Temperatures]) -> WarmValve:
 
 
 def winding_of(parts: Mapping[str, Component], coil: str) -> Section:
-    """Section that holds resistance and temperature of a coil, ``magnet`` or ``magnet.circuit``."""
+    """Section with resistance and temperature of a coil, ``magnet`` or ``magnet.circuit``."""
     name, _, circuit = coil.partition(".")
     part = parts[name]
     return getattr(part, "circuits", {})[circuit] if circuit else part
 
 
 def hot_windings(case: ValveCase, highest: Temperatures) -> tuple[str, ...]:
-    """Doubts about copper that gets warmer [K] than its insulation bears."""
+    """Doubts about copper warmer [K] than its insulation bears."""
     found = []
     for coil, node in _thermal(case).windings.items():
         stated = getattr(winding_of(case.network.components, coil), "insulation_class", None)
@@ -178,7 +178,7 @@ def _thermal(case: ValveCase) -> CaseThermal:
 
 
 def _with(part: Any, changes: Mapping[str, object], where: str) -> Any:
-    """A section with other values, checked as if they had been given."""
+    """A section with other values, checked like given ones."""
     kept = {name: getattr(part, name) for name in part.model_fields_set}
     try:
         return type(part)(**{**kept, **changes})
@@ -194,7 +194,7 @@ def _with(part: Any, changes: Mapping[str, object], where: str) -> Any:
 
 
 def _within_range(case: ValveCase, temperature: float) -> tuple[float, tuple[str, ...]]:
-    """Temperature at which the fluid is known, nearest to a given one, and doubts about that."""
+    """Nearest temperature at which the fluid is known, and doubts."""
     definition = case.network.fluid.definition()
     if isinstance(definition.properties, FixedProperties):
         return temperature, (
@@ -306,7 +306,7 @@ def heated_stroke(
 
 
 def _since(time: float | None, commands: Sequence[float]) -> float:
-    """Time after the last command before it; after the start of the stroke without commands."""
+    """Time since the last command before it, or since the start."""
     if time is None:
         return float("nan")
     before = [command for command in commands if command <= time]
@@ -345,7 +345,7 @@ def _still_driven(result: NetworkResult) -> tuple[str, ...]:
 
 
 def _gas(result: NetworkResult) -> tuple[str, ...]:
-    """Doubt about gas, which stands apart from the heat network."""
+    """Doubt about gas, which the heat network leaves out."""
     if "gas heat" not in result.books.supplies:
         return ()
     return (

@@ -1,4 +1,4 @@
-"""Record of a warm-up, or of strokes of a valve soaked at temperatures."""
+"""Record of a warm-up, or of strokes at soak temperatures."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -91,8 +91,6 @@ _ZERO_CELSIUS = 273.15
 
 @dataclass(slots=True)
 class _Strokes:
-    """Strokes of one valve by their temperatures, each computed once."""
-
     valve: Valve
     roles: ValveRoles
     variant: Variant
@@ -106,7 +104,7 @@ class _Strokes:
     def at(
         self, temperature: Temperatures, base: Temperatures | None = None, *only: Aspect
     ) -> HeatedStroke:
-        """Stroke with all aspects at some temperatures; or ``only`` these, the rest at the base."""
+        """Stroke with all aspects, or ``only`` some, at temperatures; the rest at the base."""
         nodes = {
             aspect: dict(temperature if base is None or aspect in only else base)
             for aspect in self.aspects
@@ -278,7 +276,7 @@ def _warmed(strokes: _Strokes, network: HeatNetwork, thermal: CaseThermal) -> _F
 def _causes(
     strokes: _Strokes, named: str, base: Temperatures, states: Mapping[str, Temperatures]
 ) -> tuple[CauseRow, ...]:
-    """Every aspect alone at the temperatures of each state, the others at the base."""
+    """Every aspect alone at the temperatures of each state."""
     rows = [CauseRow(state=named, cause="base", numbers=dict(strokes.at(base).numbers))]
     for name, state in states.items():
         for aspect in strokes.aspects:
@@ -335,7 +333,7 @@ def _unsent(thermal: CaseThermal, losses: Mapping[str, float]) -> dict[str, floa
 def _ripple(
     network: HeatNetwork, thermal: CaseThermal, points: Sequence[WarmPoint]
 ) -> tuple[str, ...]:
-    """Nodes that one stroke warms by more than the tolerance: there the mean is not enough."""
+    """Nodes that one stroke warms by more than the tolerance: the mean is not enough."""
     found = []
     most = np.max([np.abs(point.heat) for point in points], axis=0) * thermal.period
     for i, name in enumerate(network.names):
@@ -348,7 +346,7 @@ def _ripple(
 
 
 def _lost(strokes: Sequence[HeatedStroke]) -> tuple[str, ...]:
-    """Delays that some strokes have and others do not: there the valve does not open or close."""
+    """Delays that only some strokes have: else the valve does not open or close."""
     found = []
     for name in ("opening delay", "closing delay"):
         missing = sum(not isfinite(stroke.numbers[name]) for stroke in strokes)

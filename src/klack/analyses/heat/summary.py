@@ -143,7 +143,7 @@ def time_cell(value: float) -> str:
 
 
 def rows_of_causes(record: HeatStudy, *, page: bool = False) -> list[tuple[str, ...]]:
-    """Base in full, then what each cause alone changes, all together, and what the sum misses."""
+    """Base, changes by each cause and by all together, and what the sum misses."""
     units = {x.name: x.unit for x in record.numbers}
     base = record.causes[0].numbers
     first = (cell(x, units[name], page=page) for name, x in base.items())

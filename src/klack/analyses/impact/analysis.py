@@ -46,8 +46,6 @@ DEVIATION = JsonForm(
 
 
 class _Ends(NamedTuple):
-    """Lowest and highest value of an output, and when [s]."""
-
     record: GaugeRecord
     lowest: float
     lowest_at: float
@@ -135,7 +133,7 @@ STUDY = JsonForm(
 
 
 def study_told(study: ImpactStudy) -> Iterator[TextTable | str]:
-    """The levels side by side, the answer, the error of the others."""
+    """Levels side by side, the answer, the error of the others."""
     yield text_table(study.title, "level", LEVEL_MEASURES, study.levels.items())
     yield answer_line(study)
     if doubt := contact_doubt(study.contact):
@@ -189,7 +187,7 @@ def study_measured(study: ImpactStudy) -> Iterator[Measured]:
 
 
 def answer_line(study: ImpactStudy) -> str:
-    """Line with the level of the answer and its numbers."""
+    """Level and numbers of the answer."""
     level = study.levels[study.reference]
     m = level.measures
     begin = f"Answer (level '{study.reference}'): "
@@ -208,14 +206,14 @@ def answer_line(study: ImpactStudy) -> str:
 
 
 def answer_so_far(study: ImpactStudy) -> tuple[str, ...]:
-    """Lines on a study to which further levels and comparisons are still to come."""
+    """Lines on a study that is not complete yet."""
     line = answer_line(study).replace("Answer", "Answer so far", 1)
     doubts = (*study.levels[study.reference].doubts, contact_doubt(study.contact))
     return (line, *filter(None, doubts), *estimate_lines(study))
 
 
 def no_estimate(study: ImpactStudy) -> str:
-    """Why the error of reduced levels was not estimated; empty where it was, or not requested."""
+    """Why a requested estimate of the error is missing; else empty."""
     if study.estimate_doubt:
         return f"No error estimate: {study.estimate_doubt}"
     if study.estimates and not study.estimates_settled:
@@ -229,7 +227,7 @@ def no_estimate(study: ImpactStudy) -> str:
 
 
 def estimate_lines(study: ImpactStudy) -> tuple[str, ...]:
-    """Error of every reduced level and of the steps of the full order, one line each."""
+    """Error of every reduced level and of the steps of the full order."""
     if reason := no_estimate(study):
         return (reason,)
     return tuple(_estimate_line(study, name) for name in study.estimates)
@@ -249,7 +247,7 @@ def _estimate_line(study: ImpactStudy, name: str) -> str:
 
 
 def _percent(value: float, within: float | None) -> str:
-    """Two significant digits, but nothing below a hundredth of a per cent."""
+    """Two significant digits, but nothing below 0.01 %."""
     size = abs(100.0 * value)
     digits = 2 if size < 1.0 else 1 if size < 10.0 else 0
     text = _signed(100.0 * value, None if within is None else 100.0 * within, digits)

@@ -99,7 +99,7 @@ def body_pictures(
 def with_peak_stress(
     picture: BodyPicture, case: Case, body: ElasticBody, displacement: Floats
 ) -> BodyPicture:
-    """The picture with the stress of a displacement field [m]; as it is for a body of matrices."""
+    """Picture with the stress of a displacement [m]; unchanged for a body of matrices."""
     if case.bodies[body.name].material is None:
         return picture
     field = StressField(body.mesh, case.materials_of(body.name, body.mesh.solids))
@@ -109,7 +109,7 @@ def with_peak_stress(
 
 
 def section_lines(mesh: Mesh, name: str) -> Floats:
-    """Sides of elements in the plane y = 0, shape (s, 2, 3) [m]; none where it misses the body."""
+    """Sides of elements in the plane y = 0, shape (s, 2, 3) [m]."""
     sides = [np.empty((0, 2, 3))]
     for sign in (1.0, -1.0):
         turned = (
@@ -133,7 +133,7 @@ def _touch(problem: ContactProblem) -> Floats:
 
 
 def _still(body: ElasticBody, face: str) -> BodyPicture:
-    """Picture of a body at rest; what belongs to several surfaces belongs to ``face`` first."""
+    """Body at rest; what belongs to several surfaces belongs to ``face`` first."""
     surfaces = {
         name: body.mesh.surfaces[name] for name in dict.fromkeys((face, *body.mesh.surfaces))
     }
@@ -168,7 +168,7 @@ def _with_shapes(
 def _frames(
     case: Case, pair: ReducedPair, ran: LevelResult
 ) -> tuple[Floats, Floats, Sequence[Floats]]:
-    """Instants, contact force at each, and modal coordinates of both bodies, (frames, m) each."""
+    """Instants, contact force, and modal coordinates (frames, m) of both bodies."""
     step = case.run.reduced_step
     last = max(1, round(case.run.duration / step))
     most = int(_WORK / (0.5 * last * (pair.upper.mode_count + pair.lower.mode_count)))

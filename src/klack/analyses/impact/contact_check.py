@@ -54,7 +54,7 @@ __all__ = [
 
 
 _LINE = 1.79
-"""Highest pressure over the yield stress at first yield, of a line contact (nu = 0.3)."""
+"""Highest pressure over the yield stress at first yield of a line contact (nu = 0.3)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,7 +150,7 @@ def check_yield(
 
 
 def _pressure(static: StaticContact, force: float) -> tuple[float, bool]:
-    """Highest Hertzian pressure [Pa] of a contact of this width, and whether it is a line."""
+    """Highest Hertzian pressure [Pa] for this width, and whether it is a line."""
     lam = static.pattern_at(force) * force
     width, radius = static.half_width_at(force), ring_radius(static.space, lam)
     if radius is not None:
@@ -159,14 +159,14 @@ def _pressure(static: StaticContact, force: float) -> tuple[float, bool]:
 
 
 def _speed(static: StaticContact, force: float, highest: float) -> float:
-    """Speed of an impact that reaches a force over that of one that reaches the highest."""
+    """Speed for a force over that for the highest."""
     approach, load = np.append(0.0, static.approach), np.append(0.0, static.force)
     stored = np.append(0.0, np.cumsum(np.diff(approach) * (load[1:] + load[:-1]) / 2.0))
     return sqrt(np.interp(force, load, stored) / np.interp(highest, load, stored))
 
 
 def _first_yield(static: StaticContact, force: float, limit: float) -> float:
-    """Lowest force [N] up to ``force`` whose highest pressure reaches the limit [Pa]; else inf."""
+    """Lowest force [N] up to ``force`` that reaches the limit [Pa]; else inf."""
     loads = force * (np.arange(1, 41) / 40.0) ** 2
     pressures = np.maximum.accumulate([_pressure(static, float(load))[0] for load in loads])
     if pressures[-1] < limit:
@@ -175,7 +175,7 @@ def _first_yield(static: StaticContact, force: float, limit: float) -> float:
 
 
 FEWEST_POINTS = 5
-"""Contact points across a contact below which no error of a model is judged."""
+"""Contact points across a contact below which no error is judged."""
 
 _SIZE = 0.5
 """Advised element size over the expected half width: nine contact points across.
@@ -187,10 +187,10 @@ _EXTENT = 3.0
 """Half widths around the first touch that deserve small elements."""
 
 _MARGIN = 0.3
-"""Distance from an edge, over the element size, within which a contact point lies at it."""
+"""Distance from an edge, over the element size, that counts as at it."""
 
 _HALF = 0.6
-"""The same of an edge between two faces of a surface, which lies between two contact points."""
+"""The same for an edge within a surface, which lies between two contact points."""
 
 _CARRIES = 1e-6
 """Share of the largest contact force above which a point carries."""
@@ -198,7 +198,7 @@ _CARRIES = 1e-6
 _OVER_THE_END = "it reaches the edge of a named surface"
 
 _BEYOND = 0.98
-"""Of the force: worn by less, the faces yield again."""
+"""Share of the force: worn by less, the faces yield again."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -323,7 +323,7 @@ def ends_reached(
 
 
 def _as_drawn(points: NDArray[np.float64], dimension: int) -> NDArray[np.float64]:
-    """Points on rings of axisymmetric bodies as (r, z) in their half section."""
+    """Points on rings as (r, z) in the half section."""
     if points.shape[1] == dimension:
         return points
     return np.column_stack([np.hypot(points[:, 0], points[:, 1]), points[:, 2]])
@@ -381,7 +381,7 @@ def expected_half_width(
 
 
 def _within(pair: BodyPair, width: float) -> float:
-    """Not a number for a width as large as the surfaces themselves: they fit each other closely."""
+    """Not a number for a width as large as the surfaces: they fit closely."""
     room = min(
         float(np.max(np.ptp(mesh.points[surface.nodes], axis=0)))
         for mesh, surface in (
@@ -393,7 +393,7 @@ def _within(pair: BodyPair, width: float) -> float:
 
 
 def _modulus(case: CaseFile, pair: BodyPair) -> float:
-    """E* of the two materials that touch [Pa]; nan where a body has none of its own."""
+    """E* of the two materials [Pa]; nan where a body has none."""
     inverse = 0.0
     for body, solid in zip((pair.upper, pair.lower), pair.solids, strict=True):
         if case.bodies[body.name].material is None:
@@ -417,7 +417,7 @@ def _edges(pair: BodyPair) -> tuple[_Side, _Side]:
 def _corner(
     pair: BodyPair, sides: tuple[_Side, _Side], space: ContactSpace, lam: NDArray[np.float64]
 ) -> str | None:
-    """Text for a corner that carries more than half of the force on one row of elements."""
+    """Text for a corner that carries most of the force on one row of elements."""
     for (body, surface, edges), facing in zip(sides, pair.sharp_edges, strict=True):
         sharp = np.flatnonzero(facing)
         if not len(sharp):
@@ -439,7 +439,7 @@ def _corner(
 
 
 def _blunt(sides: tuple[_Side, _Side], space: ContactSpace, lam: NDArray[np.float64]) -> str | None:
-    """Text for an edge between two faces of one surface that is pressed, but not all that is."""
+    """Text for an edge between two faces that is pressed, but does not carry alone."""
     carries = lam > _CARRIES * float(np.max(lam))
     for body, surface, edges in sides:
         inner = np.array([name is None for name in edges.neighbour], dtype=bool)
@@ -527,7 +527,7 @@ def _coarse(
 
 
 def _extent(case: CaseFile, pair: BodyPair, expected: float) -> str:
-    """How far small elements should go, where that is set and too little."""
+    """Advised extent of small elements, where it is set and too little."""
     extents = [
         mesh.contact.extent
         for name in (pair.upper.name, pair.lower.name)

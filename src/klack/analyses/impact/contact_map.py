@@ -36,13 +36,13 @@ __all__ = [
 Floats = NDArray[np.float64]
 
 _RING = 0.25
-"""Spread of the force over the mean radius below which a contact is a ring, as in the statics."""
+"""Spread of the force over the mean radius below which a contact is a ring."""
 _WIDEST_GAP = 180.0
-"""Candidates that leave a wider gap round the axis than this are no ring [deg]."""
+"""Widest gap round the axis in a ring [deg]."""
 _EARLY = 0.1
-"""The first touch is where the contact is until the force reaches this share of its peak."""
+"""Share of the peak force until which the contact is still the first touch."""
 _FAR = 2.0
-"""A cell reaches no further than so many distances to the nearest other point."""
+"""Reach of a cell, in distances to the nearest other point."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -89,7 +89,7 @@ class Cells:
 
 
 def contact_map(record: PressureRecord) -> ContactMap:
-    """Lay out the contact points of a record in which some point carries a force."""
+    """Lay out the contact points of a record with some force."""
     weight = np.asarray(record.point_force, dtype=float).sum(axis=0)
     axes = [np.zeros(1)]
     if record.points.shape[1] == 3:
@@ -124,7 +124,7 @@ def _map(
 def _about_axis(
     record: PressureRecord, weight: Floats, axis: Floats
 ) -> tuple[float, float, Floats]:
-    """Spread of the force in the meridian plane [m], its mean radius [m], and the axis."""
+    """Spread of the force in the meridian plane [m], mean radius [m], and axis."""
     radius = np.linalg.norm(record.points[:, :-1] - axis, axis=1)
     place = np.column_stack([radius, record.points[:, -1]])
     mean = np.average(place, axis=0, weights=weight)
@@ -160,7 +160,7 @@ def map_cells(
     across: tuple[float, float],
     shape: tuple[int, int],
 ) -> Cells:
-    """Cut a window of a ring or a spot, in units of the map, into (nx, ny) equal rectangles."""
+    """Cut a window of a ring or a spot, in units of the map, into (nx, ny) rectangles."""
     x = np.linspace(*along, shape[0] + 1)
     y = np.linspace(*across, shape[1] + 1)
     points = np.column_stack([found.along, found.across])
@@ -240,7 +240,6 @@ def closed(carries: NDArray[np.bool_], cells: Cells) -> NDArray[np.bool_]:
 
 
 def _cell_size(cells: Cells) -> tuple[int, int]:
-    """Usual number of rectangles of one cell across and along."""
     rows, columns = np.nonzero(cells.owner >= 0)
     owner = cells.owner[rows, columns]
     return _usual_run(owner, columns), _usual_run(owner, rows)

@@ -122,7 +122,7 @@ def _next_steps(study: ImpactStudy) -> list[NextStep]:
 
 
 def _bodies_in_space(study: ImpactStudy) -> Section:
-    """Picture of solids; without what it shows, why there is none; empty for others."""
+    """Picture of solids, or why there is none; empty for others."""
     title = "The bodies in space"
     if not any(body.model == "3-D" and body.elements for body in study.bodies):
         return Section(title=title)
@@ -138,7 +138,7 @@ def _bodies_in_space(study: ImpactStudy) -> Section:
 
 
 def _bodies_at_peak(study: ImpactStudy) -> Section:
-    """Picture of the full order; without it, why there is none."""
+    """Picture of the full order, or why there is none."""
     title = "The bodies at peak force"
     if study.sections:
         from klack.analyses.impact.section_figure import section_figure
@@ -161,7 +161,7 @@ def _bodies_at_peak(study: ImpactStudy) -> Section:
 
 
 def _number_table(study: ImpactStudy) -> Table:
-    """Quantities down, levels across; the deviation from the reference is below the value."""
+    """Quantities down, levels across; deviations below the values."""
     results = study.ordered
     names = [result.level for result in results]
     rows = [
@@ -198,7 +198,6 @@ def _number(study: ImpactStudy, measure: Measure[LevelResult], result: LevelResu
 
 
 def _apart(study: ImpactStudy, measure: Measure[Deviation], name: str) -> str:
-    """Rows that do not belong to one level alone."""
     found = study.deviations.get(name)
     return "–" if found is None else measure.on_page(found)
 
@@ -302,7 +301,6 @@ def _outputs(study: ImpactStudy) -> tuple[Table, ...]:
 
 
 def _running_in(study: ImpactStudy) -> Section:
-    """Impacts on the same faces side by side; empty where there was one."""
     title, found = "Running in", study.running_in
     if found is None:
         return Section(title=title)
@@ -416,7 +414,6 @@ def _definitions(study: ImpactStudy) -> tuple[tuple[str, str], ...]:
 
 
 def _definitions_point_by_point(study: ImpactStudy) -> tuple[tuple[str, str], ...]:
-    """Of words that only stand in reports with contact points of their own."""
     found = []
     if "interface" in study.levels or study.estimates:
         found.append(

@@ -98,7 +98,7 @@ def _since_touch(result: LevelResult, time: Floats) -> Floats:
 
 
 def force_chart(study: ImpactStudy) -> Chart:
-    """Contact force of all levels; below, the difference of those that are compared."""
+    """Contact force of all levels, and differences of the compared ones."""
     results = study.ordered
     longest = max(result.measures.total_contact_time for result in results)
     limits = (-0.08e6 * longest, 1.25e6 * longest)
@@ -147,7 +147,7 @@ def _chatters(result: LevelResult, reference: LevelResult) -> bool:
 
 
 def _span(curves: list[Curve], least: float, most: float) -> tuple[float, float]:
-    """Symmetric range that shows all curves that stay within ``most``, others as far as it goes."""
+    """Symmetric range for all curves that stay within ``most``."""
     tops = [float(np.max(np.abs(curve.y), initial=0.0)) for curve in curves]
     limit = max([least, *(1.15 * top for top in tops if top <= most)])
     if min(tops) > most:
@@ -197,7 +197,7 @@ def _way(history: ImpactHistory, time: Floats) -> Floats:
 
 
 def output_charts(study: ImpactStudy) -> tuple[Chart, ...]:
-    """What the sensor of each output of the case shows at every level."""
+    """Outputs of the sensors at every level."""
     names = dict.fromkeys(record.name for level in study.ordered for record in level.gauges)
     found = []
     for name in names:
@@ -235,7 +235,7 @@ def output_charts(study: ImpactStudy) -> tuple[Chart, ...]:
 
 
 def spectrum_chart(study: ImpactStudy) -> Chart:
-    """Spectrum of the force of the first impact: narrow band, third octaves, their difference."""
+    """Force spectrum of the first impact: narrow band, third octaves, difference."""
     results = study.ordered
     reference = results[0]
     top = min(_TOP_FREQUENCY, *(0.1 / result.history.step for result in results))
@@ -289,7 +289,7 @@ def spectrum_chart(study: ImpactStudy) -> Chart:
 
 
 def _level_panel(label: str, unit: str, curves: list[Curve], depth: float) -> Panel:
-    """Panel that reaches ``depth`` below the highest level; notches go deeper without meaning."""
+    """Panel down to ``depth`` below the highest level; deeper notches mean nothing."""
     highest = max(float(np.max(curve.y)) for curve in curves)
     limits = (5 * floor((highest - depth) / 5), 5 * ceil((highest + 3) / 5))
     return Panel(y=AxisSpec(label=label, unit=unit, range=limits), curves=tuple(curves), share=0.8)
@@ -303,7 +303,7 @@ def _steps(octaves: ThirdOctaves, values: Floats, result: LevelResult) -> Curve:
 
 
 def _kept_up_to(study: ImpactStudy) -> float:
-    """Lower one of the highest kept frequencies of the bodies [Hz]."""
+    """Lower of the highest kept frequencies of the bodies [Hz]."""
     tops = [float(body.frequencies[-1]) for body in study.bodies if body.frequencies.size]
     return min(tops) if tops else 0.0
 
@@ -312,7 +312,7 @@ def _kept_up_to(study: ImpactStudy) -> float:
 
 
 def transfer_chart(comparison: TransferComparison) -> Chart:
-    """Receptance of the full and the reduced bodies, and their difference below."""
+    """Receptance of full and reduced bodies, and the difference."""
     frequency = 1e-3 * comparison.frequencies
     curves, differences, marks = [], [], []
     for i, label in enumerate(comparison.labels):
@@ -359,7 +359,7 @@ def transfer_chart(comparison: TransferComparison) -> Chart:
 
 
 def law_chart(study: ImpactStudy) -> Chart:
-    """Local contact law with its straight line and the classical stiffness."""
+    """Local contact law, its straight line and the classical stiffness."""
     law = study.law
     indentation, load = 1e6 * np.append(0.0, law.indentation), np.append(0.0, law.force)
     curves = [
@@ -420,7 +420,7 @@ def law_chart(study: ImpactStudy) -> Chart:
 
 
 def approach_chart(study: ImpactStudy) -> Chart:
-    """Approach of the bodies under a static force, split into law and kept modes."""
+    """Approach under a static force, split into law and kept modes."""
     contact, law = study.contact, study.law
     force = np.append(0.0, contact.force)
     total = 1e6 * np.append(0.0, contact.approach)
@@ -471,7 +471,7 @@ def approach_chart(study: ImpactStudy) -> Chart:
 
 
 def energy_bars(study: ImpactStudy) -> BarChart:
-    """Shares of the initial kinetic energy after separation, one bar per level."""
+    """Shares of the initial kinetic energy after separation, by level."""
     results = study.ordered
     initial = [next(iter(result.energies.values())) for result in results]
     names = dict.fromkeys(name for result in results for name in list(result.energies)[1:])
@@ -495,7 +495,7 @@ def energy_bars(study: ImpactStudy) -> BarChart:
 
 
 def modal_energy_chart(study: ImpactStudy) -> Chart:
-    """Energy left in each mode: one panel per body, the reference and the reduced level."""
+    """Energy left in each mode, of the reference and the reduced level."""
     results = [result for result in study.ordered if result.modal_energy]
     results = [r for r in results if r.level in (results[0].level, "reduced")]
     initial = next(iter(results[0].energies.values()))

@@ -169,7 +169,7 @@ def _friction(case: Case, result: FullOrderResult) -> FrictionRecord | None:
 
 
 def _known(problem: ContactProblem, kept: Mapping[str, Modes]) -> list[KnownBody]:
-    """Modes of both bodies, and their compliance at the points of the static contact."""
+    """Modes of both bodies, and compliance at the points of the static contact."""
     pair, condensed = problem.pair, problem.condensed
     return [
         KnownBody(modes=kept[body.name], compliance=compliance.diagonal())
@@ -199,7 +199,7 @@ def _longest_period(pool: Modes) -> float:
 def _with_modes(
     energy: BodyEnergy, body: ElasticBody, pool: Modes, result: FullOrderResult
 ) -> BodyEnergy:
-    """Add the energy of every mode of the pool, from the fields at the end of the run."""
+    """Add the energy of every mode from the fields at the end."""
     fields = next(item for item in result.fields if item.name == body.name)
     weighted = body.M @ pool.shapes
     q, v = weighted.T @ fields.end_displacement, weighted.T @ fields.end_velocity

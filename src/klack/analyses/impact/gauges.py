@@ -43,7 +43,7 @@ Floats = NDArray[np.float64]
 
 
 class FullGauges:
-    """Reads the gauges of two bodies while every degree of freedom moves."""
+    """Reads gauges while every degree of freedom moves."""
 
     def __init__(self, pair: BodyPair) -> None:
         self._gauges = pair.gauges

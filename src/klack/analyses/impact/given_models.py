@@ -91,7 +91,7 @@ def run_given_impact(
 
 
 def require_given_levels(case: Case, levels: Sequence[str]) -> tuple[str, ...]:
-    """Check that bodies without surfaces can run the levels; return them without repetition."""
+    """Check levels for bodies without surfaces; return them without repetition."""
     wanted = case.require_levels(levels)
     for level in wanted:
         if level not in GIVEN_LEVELS:
@@ -147,7 +147,6 @@ def _contact(case: Case, pair: GivenPair, peak: float) -> ContactSummary:
 
 
 def _law(pair: GivenPair, peak: float) -> LawSummary:
-    """Law and residual compliance together, as the time integration uses them."""
     force = np.linspace(0.0, 1.2 * peak, _POINTS)
     local = _indentation(pair.law, force)
     indentation = local + pair.series_compliance * force

@@ -1,4 +1,4 @@
-"""The interface level of a case: both bodies as modes, the contact point by point."""
+"""Interface level of a case: both bodies as modes, the contact point by point."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
@@ -62,7 +62,7 @@ __all__ = [
 _Result = TypeVar("_Result")
 
 CONTACT, OPPOSITE = "contact", "opposite"
-"""Names of the contact of a case and of that with the upper stop."""
+"""Contact of a case and that with the upper stop."""
 
 _FEWEST = 30
 _REACH_GROWTH = 2.0
@@ -288,7 +288,7 @@ def _kept(
 def _ratios(
     problem: ContactProblem, body: ElasticBody, kept: Modes, modes: Modes
 ) -> NDArray[np.float64]:
-    """Damping ratios; that of a case acts on the modes that it keeps, as at the full order."""
+    """Damping ratios; that of a case acts on its kept modes, as at the full order."""
     damping = damping_of(problem.case.bodies[body.name].damping)
     ratios = damping.ratios(modes.omega)
     if isinstance(damping, RayleighDamping):
@@ -299,7 +299,7 @@ def _ratios(
 def _load(
     problem: ContactProblem, body: ElasticBody, ports: tuple[Port, Port] | None
 ) -> NDArray[np.float64]:
-    """Load patterns of the contact on a body, shape (n_dof, m): pressure, then friction."""
+    """Contact load patterns (n_dof, m) on a body: pressure, then friction."""
     if problem.opposite is not None and body.name == problem.opposite.body.name:
         static = problem.opposite.static
         return static.load_patterns(0.7 * static.max_force)[0][:, None]
@@ -376,7 +376,7 @@ def simulate_case(
     duration: float | None = None,
     worn: NDArray[np.float64] | None = None,
 ) -> InterfaceResult:
-    """Run the motion of a case once, without jumps, on faces as made or worn."""
+    """Run a case once, without jumps, on faces as made or worn."""
     duration = case.run.duration if duration is None else duration
     spring = case.motion.spring
     gap = case.contact.gap or 0.0
@@ -487,7 +487,6 @@ def run_interface(
 
 
 def _angle_doubts(case: Case, model: InterfaceModel, result: InterfaceResult) -> Iterator[str]:
-    """Doubt a contact on a few of the angles round its ring."""
     force = result.impacts[0].point_force
     if not case.leaves_axis or not len(force):
         return
@@ -508,7 +507,7 @@ def _angle_doubts(case: Case, model: InterfaceModel, result: InterfaceResult) ->
 
 
 def set_doubts(model: InterfaceModel, result: InterfaceResult) -> Iterator[str]:
-    """Doubt about a set beyond those that the pressure limit was fitted to."""
+    """Doubt about a set beyond the fit of the pressure limit."""
     if model.limit is None:
         return
     deepest, known = float(result.worn.max()), model.limit.deepest

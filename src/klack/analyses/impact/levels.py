@@ -44,7 +44,7 @@ _FITTED = 50  # points of a straight line
 def run_reduced(
     case: Case, pair: ReducedPair, *, level: str, label: str, setup_time: float
 ) -> LevelResult:
-    """Impact of two reduced bodies, with a doubt where their law leaves out friction."""
+    """Impact of two reduced bodies; a law without friction is doubted."""
     bodies = pair.upper, pair.lower, pair.law
     simulate_bodies(case, *bodies)  # compiles, so that the time below is that of the run
     begin = perf_counter()
@@ -64,14 +64,14 @@ def run_reduced(
 
 
 def run_lumped(problem: ContactProblem) -> LevelResult:
-    """Impact of rigid masses on one spring, with or without loss: the baseline."""
+    """Rigid masses on one spring, with or without loss: the baseline."""
     bodies = (problem.pair.upper, problem.pair.lower)
     masses = {body.name: None if body.is_fixed else body.mass for body in bodies}
     return lumped_level(problem.case, masses)
 
 
 def lumped_level(case: Case, masses: Mapping[str, float | None]) -> LevelResult:
-    """Impact of rigid masses: upper body, then lower body; None for one that is held."""
+    """Impact of rigid masses, upper body first; None for a held one."""
     if case.lumped is None:  # refused by require_levels already
         raise InputError(
             "lumped", got="no stiffness", expected="lumped.stiffness", hint="add it to the case."
@@ -143,7 +143,7 @@ def law_summary(
     peak: float,
     classical: LocalStiffness | None = None,
 ) -> LawSummary:
-    """A local law, and its straight line between half the peak force [N] and all of it."""
+    """Local law, and its straight line from half the peak force [N] to all of it."""
     load = np.linspace(0.5 * peak, peak, _FITTED)
     slope = np.polyfit(np.interp(load, force, indentation), load, 1)[0]
     return LawSummary(
@@ -164,7 +164,7 @@ def law_words(law: object) -> str:
 
 
 def deviations(results: Mapping[str, LevelResult], reference: str) -> dict[str, Deviation]:
-    """Compare every level with the reference: none where that has doubts, none that is cut off."""
+    """Every level against the reference, without doubts and cut-off ones."""
     if results[reference].doubts:
         return {}
     return {

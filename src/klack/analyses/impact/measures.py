@@ -1,4 +1,4 @@
-"""Measures of one impact at one level, and of the difference of two levels."""
+"""Measures of a level of an impact, and of the difference of two levels."""
 
 from math import isfinite
 from operator import attrgetter
@@ -224,7 +224,6 @@ LEVEL_MEASURES: tuple[Measure[LevelResult], ...] = described_in(
 
 
 def _of_level(measure: Measure[LevelResult]) -> Measure[Deviation]:
-    """Deviation of two levels in one of their measures."""
     relative = measure.deviation == "relative"
     return Measure(
         key=measure.key,

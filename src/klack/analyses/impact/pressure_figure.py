@@ -43,9 +43,9 @@ Floats = NDArray[np.float64]
 _MAP = "viridis"
 _INK = "#22262b"
 _TITLE_LETTERS = 84
-"""Letters that stand side by side above all columns together."""
+"""Letters side by side above all columns together."""
 _NOTHING = 1e-9
-"""Share of the highest value below which nothing is carried (round-off)."""
+"""Share of the highest value that counts as nothing (round-off)."""
 
 
 def pressure_figure(views: Sequence[PressureView]) -> Picture:
@@ -54,7 +54,7 @@ def pressure_figure(views: Sequence[PressureView]) -> Picture:
 
 
 def draw_pressure(views: Sequence[PressureView]) -> bytes:
-    """Draw one or more runs of one shape side by side, as SVG."""
+    """The same as SVG."""
     shape = views[0].places.shape
     is_flat, is_spot = shape in ("meridian", "disc"), shape == "spot"
     with rc_context(STYLE | {"axes.grid": False}):
@@ -94,7 +94,6 @@ def _draw_profiles(figure: Figure, row: Any, views: Sequence[PressureView]) -> N
 
 
 def _draw_unrolled(figure: Figure, grid: Any, views: Sequence[PressureView]) -> None:
-    """Line load over time above, pressure at peak force below."""
     is_ring = views[0].places.shape == "ring"
     cells = common_cells(views)
     loads = [1e-3 * line_load(view, cut) for view, cut in zip(views, cells, strict=True)]
@@ -124,14 +123,13 @@ def _common_scale(fields: Sequence[Floats]) -> Normalize:
 
 
 def _paint(axes: Any, x: Floats, y: Floats, values: Floats, norm: Normalize) -> Any:
-    """Cells in colour, as pixels; white where nothing is carried."""
     carried = np.ma.masked_less_equal(values, _NOTHING * float(norm.vmax or 0.0))
     return axes.pcolorfast(x, y, carried, norm=norm, cmap=_MAP, rasterized=True)
 
 
 _SHARES = "RdYlBu_r"
 _LITTLE = 1e-3
-"""Of the highest force of a point or column: below it nothing is shown."""
+"""Share of the highest force below which nothing is shown."""
 _NOTE = (
     "Friction on the moving body over the most that the pressed points can hold. Dark red: they "
     "slip and friction pushes it {first}; dark blue: {second}; pale: they stick. White: no contact."
@@ -193,7 +191,7 @@ def _across(axes: Any, view: FrictionView, window: tuple[float, float]) -> Any:
 
 
 def _share(view: FrictionView, way: int, weights: Any) -> Floats:
-    """Friction in a direction over its limit, of columns of points; nan where nothing presses."""
+    """Friction over its limit of columns of points; nan without pressure."""
     pressed = view.pressure.force @ weights
     rubbed = view.friction.force[:, way].astype(float) @ weights
     limit = view.friction.coefficient * pressed

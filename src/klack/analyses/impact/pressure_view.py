@@ -1,4 +1,4 @@
-"""Forces of the contact points of one run as fields over a picture."""
+"""Contact forces of one run as fields over a picture."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -37,9 +37,9 @@ __all__ = [
 Floats = NDArray[np.float64]
 
 _COLUMNS, _ROWS = 1080, 180
-"""Rectangles of the picture: so narrow that a cell of a spot is about 30 wide."""
+"""Rectangles of the picture; a cell of a spot is about 30 wide."""
 _MARGIN = 0.18
-"""Of the carrying zone, added to the picture on either side."""
+"""Margin of the carrying zone on either side."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -69,7 +69,7 @@ class PressureView:
 def pressure_view(
     title: str, record: PressureRecord | None, first_touch: float
 ) -> PressureView | None:
-    """Lay out what a run has recorded; None where nothing is carried."""
+    """Lay out a record, if anything is carried."""
     if record is None or len(record.time) < 2 or not record.point_force.max(initial=0.0) > 0:
         return None
     return PressureView(
@@ -82,7 +82,7 @@ def pressure_view(
 
 
 def study_views(study: ImpactStudy) -> tuple[PressureView, ...]:
-    """All levels that resolve the contact point by point, as far as they look alike."""
+    """Levels with contact points that look alike."""
     found = [
         pressure_view(result.label, result.pressure, result.measures.first_touch)
         for result in study.ordered
@@ -92,7 +92,7 @@ def study_views(study: ImpactStudy) -> tuple[PressureView, ...]:
 
 
 def record_edges(view: PressureView) -> Floats:
-    """Limits of the records in time, in the middle between two, shape (n + 1,) [s]."""
+    """Limits (n + 1,) of the records in time [s]."""
     middles = 0.5 * (view.time[1:] + view.time[:-1])
     first, last = 2 * view.time[0] - middles[0], 2 * view.time[-1] - middles[-1]
     return np.concatenate([[max(first, 0.0)], middles, [last]])
@@ -102,7 +102,7 @@ def record_edges(view: PressureView) -> Floats:
 
 
 def across_window(views: Sequence[PressureView]) -> tuple[float, float]:
-    """Range across the contact that carries at some time, with a margin, where points are [m]."""
+    """Range [m] across the contact that carries at some time, with a margin."""
     return _window(views, [view.places.across for view in views])
 
 
@@ -130,7 +130,7 @@ def common_cells(views: Sequence[PressureView]) -> tuple[Cells, ...]:
 
 
 def _columns(places: ContactMap) -> int:
-    """Columns of the picture: of a regular ring as many for every angle, half on either side."""
+    """Columns of the picture: as many for every angle of a regular ring, half on either side."""
     angles = np.unique(np.round(places.along, 6) % 360.0)
     if places.shape != "ring" or len(angles) > _COLUMNS // 2 or len(angles) < 2:
         return _COLUMNS
@@ -167,7 +167,7 @@ class FrictionView:
 
 
 def friction_views(study: ImpactStudy) -> tuple[FrictionView, ...]:
-    """All levels that resolve friction point by point, as far as they look alike."""
+    """Levels with friction at contact points that look alike."""
     found = []
     for result in study.ordered:
         view = pressure_view(result.label, result.pressure, result.measures.first_touch)
@@ -177,9 +177,9 @@ def friction_views(study: ImpactStudy) -> tuple[FrictionView, ...]:
 
 
 _AT_ONCE = 0.01
-"""A ring that is closed all round within this share of the contact closes at once."""
+"""Share of the contact within which a ring that closes at once is closed."""
 _EVEN = 0.02
-"""Relative spread of the line load below which a ring carries evenly."""
+"""Relative spread of the line load of an even ring."""
 
 
 def pressure_note(views: Sequence[PressureView]) -> str:
@@ -244,7 +244,7 @@ def _degrees(cells: Cells) -> Floats:
 
 
 def _around(view: PressureView, load: Floats) -> str:
-    """Mean line load at the peak force, and its range round the ring."""
+    """Mean line load at the peak force, and its range."""
     around = load[view.peak]
     mean, low, high = (float(value) for value in (around.mean(), around.min(), around.max()))
     text = f"{1e-3 * mean:.1f} N/mm on average"
@@ -254,7 +254,7 @@ def _around(view: PressureView, load: Floats) -> str:
 
 
 def _first(view: PressureView, load: Floats, angle: Floats) -> str:
-    """Where the ring begins to carry: the middle of what carries in the first record."""
+    """Where the ring begins to carry: middle of the first record."""
     if _closes_at_once(view, load):
         return "all round at once"
     begins = int(np.argmax(load.any(axis=1)))

@@ -1,4 +1,4 @@
-"""Record of an impact study: everything that a report or a comparison needs, without the solver."""
+"""Record of an impact study, without the solver."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -32,7 +32,7 @@ __all__ = [
 
 
 SETTLED = 0.02
-"""Largest spread of the force history [-] of a run that others may be measured by."""
+"""Largest spread of the force history [-] of a reference."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -204,7 +204,7 @@ class LevelResult:
     gauges: tuple[GaugeRecord, ...] = ()
 
     def doubted(self, *doubts: str) -> Self:
-        """The same with further doubts; empty ones are none."""
+        """The same with further doubts, if not empty."""
         return replace(self, doubts=(*self.doubts, *filter(None, doubts)))
 
 
@@ -391,7 +391,7 @@ class ImpactStudy(CaseRecord):
 
     @property
     def ordered(self) -> tuple[LevelResult, ...]:
-        """Results in the order of tables: the reference, interface, reduced, the others as run."""
+        """Results in the order of tables: reference, interface, reduced, others."""
         best = (self.reference, "interface", "reduced")
         first = dict.fromkeys(name for name in best if name in self.levels)
         return tuple(self.levels[name] for name in first | dict.fromkeys(self.levels))

@@ -29,7 +29,7 @@ from klack.transient.result import MotionOfBody
 __all__ = ["Recovered", "recovered_bodies", "recovered_motion"]
 
 _LEAST = 1e-3
-"""Smallest share of the largest static force whose pressure pattern is asked for."""
+"""Smallest share of the largest static force with a pattern of its own."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -46,7 +46,7 @@ class Recovered:
     missing: NDArray[np.float64] | None
 
     def rest(self, load: NDArray[np.float64]) -> NDArray[np.float64] | None:
-        """Static displacement (n_dof,) per force that the modes lack [m/N]."""
+        """Static displacement (n_dof,) that the modes lack [m/N]."""
         if self.missing is None:
             return None
         return np.asarray(self.flexibility.deflections(load[:, None])[:, 0] + self.missing)
@@ -58,7 +58,7 @@ class Recovered:
         force: float,
         load: NDArray[np.float64],
     ) -> MotionOfBody:
-        """Fields (n_dof,) under a contact force [N] with its load pattern."""
+        """Fields (n_dof,) under a contact force [N] with its pattern."""
         u = self.shapes @ q
         rest = self.rest(load) if force > 0.0 else None
         if rest is not None:
@@ -97,7 +97,7 @@ def _recovered(
 def recovered_bodies(
     problem: ContactProblem, pools: Mapping[str, Modes], pair: ReducedPair
 ) -> tuple[Recovered, Recovered]:
-    """Recovery of all nodes of both bodies, the upper one first."""
+    """Recovery for both bodies, the upper one first."""
     upper, lower = problem.pair.upper, problem.pair.lower
     # the force pushes the upper body up and the lower one down
     return (

@@ -250,7 +250,7 @@ def impact_of_bodies(
 
 
 def _modes_needed(case: Case, levels: Sequence[str]) -> int:
-    """Elastic modes of each body that these levels and what they are compared with take."""
+    """Elastic modes of each body for these levels and their comparisons."""
     needed = [1]
     if case.run.transfer is not None:
         needed.append(TRANSFER_MODES)
@@ -271,7 +271,7 @@ def _study(
     is_last: bool,
     near: Mapping[str, NearLoads] | None = None,
 ) -> ImpactStudy:
-    """One impact of these bodies; the last one frees them, and compares its model with others."""
+    """One impact of these bodies; the last one frees them, and is compared with others."""
     blas = bodies.placed.threads
     with collected_warnings() as notes, threadpool_limits(blas, user_api="blas"):
         work = _Work(contact_problem(case, bodies.placed, clock), bodies)
@@ -299,7 +299,7 @@ def _study(
 
 
 class _Work:
-    """One impact on its way, the answer first and what only adds to it last."""
+    """Impact in progress: the answer first, additions last."""
 
     def __init__(self, problem: ContactProblem, bodies: ImpactBodies) -> None:
         self.problem, self.bodies = problem, bodies
@@ -419,7 +419,7 @@ class _Work:
         clock("radiating surfaces", 1.0)
 
     def compare(self, clock: StageClock) -> None:
-        """What the levels are only compared with, and pictures; failures cost nothing else."""
+        """Comparisons and pictures; failures cost nothing else."""
         problem, pools, own = self.problem, self.pools, self.own
         if self.classical is None:
             clock("classical stiffness", 0.0)
@@ -440,7 +440,7 @@ class _Work:
         clock("picture", 1.0)
 
     def run_full(self, threads: int | None, clock: StageClock) -> None:
-        """Every degree of freedom; the static solutions are gone by then."""
+        """Full order, after the static solutions are freed."""
         problem = self.problem
         with self.attempts.at("full"), warnings_of("level 'full'"):
             self.results["full"], run = run_full(
@@ -456,7 +456,7 @@ class _Work:
         )
 
     def study(self, notes: Sequence[str], begin: float, clock: StageClock) -> ImpactStudy:
-        """What is there so far, with the best of its levels as the answer."""
+        """Results so far, the best level as the answer."""
         case, certificate = self.case, self.certificate
         results = doubt_modal_levels(self.results, **self.flat)
         if not self.twins:
@@ -532,7 +532,7 @@ def _run_interface(
     *,
     is_first: bool,
 ) -> tuple[LevelResult, RunningIn | None]:
-    """Interface level; the first one whose faces yield tells what that does, and runs them in."""
+    """Interface level; the first with yielding faces reports them and runs them in."""
     clock("interface", 0.0)
 
     def run(model: InterfaceModel) -> tuple[LevelResult, RunningIn | None]:
@@ -555,8 +555,6 @@ def _run_interface(
 
 @dataclass(frozen=True, kw_only=True)
 class _Certificate:
-    """Estimated errors, their reference run, and its own convergence."""
-
     estimates: Mapping[str, Deviation] = field(default_factory=dict)
     basis: str = ""
     margins: Mapping[str, Deviation] = field(default_factory=dict)
@@ -653,7 +651,7 @@ def _margin(
 
 
 def _take_better(results: dict[str, LevelResult], certificate: _Certificate) -> None:
-    """Take the run behind the estimates among the levels, where it puts the best of them right."""
+    """Add the run behind the estimates to the levels, where it is better."""
     level, best = certificate.level, best_level(results)
     if level is None or certificate.doubt or certificate.spread > SETTLED:
         return

@@ -45,7 +45,7 @@ __all__ = [
 
 
 _RUN_IN = 1e-4
-"""Share of the energy [-] that a run-in contact may still lose in yield."""
+"""Share of the energy [-] that a run-in contact may still lose."""
 
 _MOST = 1000
 
@@ -152,8 +152,6 @@ def asks_for_more(case: Case) -> bool:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Impact:
-    """Loss to yield [J], set [m] and width of the land [m] after it."""
-
     history: ImpactHistory
     lost: float
     set: float
@@ -189,14 +187,14 @@ def _repeated(case: Case, hit: Callable[[int], _Impact | None]) -> tuple[NDArray
 
 
 def running_in_columns(found: RunningIn) -> tuple[str, ...]:
-    """Heads of the impacts side by side: the first, the last asked for, the last of all."""
+    """Heads: first impact, last asked for, last of all."""
     return ("", *(_name(found, i) for i in _shown(found)))
 
 
 def running_in_rows(
     found: RunningIn, told: Callable[[float, str, int], str]
 ) -> tuple[tuple[str, ...], ...]:
-    """A row for each of their quantities; ``told`` writes a value, its unit and its digits."""
+    """A row for each quantity; ``told`` writes value, unit and digits."""
     shown = _shown(found)
 
     def row(title: str, values: np.ndarray, unit: str, digits: int) -> tuple[str, ...]:

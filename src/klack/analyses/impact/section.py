@@ -23,12 +23,12 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _PLANE_SHIFT = 1e-8
-"""Shift of the cutting plane over the size of the body: swept meshes have element sides exactly in
-y = 0, where a cut would be undefined.
+"""Shift of the cutting plane over the size of the body: swept meshes have sides exactly in
+y = 0, where a cut is undefined.
 """
 
 _MERGED = 1e-6
-"""Points of the picture closer than this (over its size) become one."""
+"""Distance over the size below which points become one."""
 
 _TRIANGLES_OF = {
     "tri3": ((0, 1, 2),),
@@ -97,7 +97,7 @@ def section_picture(mesh: Mesh, displacement: Floats, time: float, body: str) ->
 
 
 def _mean_axial(points: Floats, axial: Floats, triangles: Ints) -> float:
-    """Mean axial displacement [m] of the body of revolution under the section."""
+    """Mean axial displacement [m] of the body of revolution."""
     corner = points[triangles]
     (ax, ay), (bx, by) = (corner[:, 1] - corner[:, 0]).T, (corner[:, 2] - corner[:, 0]).T
     area = 0.5 * np.abs(ax * by - ay * bx)
@@ -123,7 +123,7 @@ def _flat_section(mesh: Mesh, values: Floats, body: str) -> tuple[Floats, Floats
 
 
 def _outline(family: ElementFamily) -> Ints:
-    """Segments of the element's edges, through the mid nodes, shape (s, 2)."""
+    """Segments (s, 2) of element edges, through the mid nodes."""
     if not family.quadratic:
         return np.asarray(family.edges)
     middle = range(family.corners, family.nodes)
@@ -186,7 +186,7 @@ def _divide(
 
 
 def _face_triangles(table: Floats, family: str, nodes: Ints) -> tuple[Floats, list[Ints]]:
-    """Triangles (f, 3) of a side, the same ones seen from both elements that share it."""
+    """Triangles (f, 3) of a side, the same from both elements."""
     if family in ("tri3", "tri6"):
         return table, [nodes[:, list(triangle)] for triangle in _TRIANGLES_OF[family]]
     centre, table = _append(table, nodes, _middle_weights(FAMILIES[family]))
@@ -205,13 +205,13 @@ def _middle_weights(family: ElementFamily) -> Floats:
 
 
 def _append(table: Floats, nodes: Ints, weights: Floats) -> tuple[Ints, Floats]:
-    """Add one interpolated row per element; equal rows of neighbours are merged later."""
+    """Add one interpolated row per element; neighbours' equal rows merge later."""
     new = np.arange(len(table), len(table) + len(nodes))
     return new, np.concatenate([table, np.einsum("enk,n->ek", table[nodes], weights)])
 
 
 def _sides_on(tets: Ints, faces: list[frozenset[int]]) -> NDArray[np.bool_]:
-    """Which sides (opposite corner i) of local tetrahedra lie on one of the element faces."""
+    """Sides (opposite corner i) of local tetrahedra on an element face."""
     return np.array(
         [[any(set(np.delete(tet, i)) <= face for face in faces) for i in range(4)] for tet in tets]
     )
@@ -252,7 +252,7 @@ def _cut(table: Floats, tets: Ints, outer: NDArray[np.bool_]) -> tuple[Floats, I
 
 
 def _loop(code: int) -> list[tuple[int, int]]:
-    """Tetrahedron edges, in order, that a plane crosses; bit i of ``code`` = corner i above."""
+    """Ordered tetrahedron edges that a plane crosses; bit i of ``code`` = corner i above."""
     up = [i for i in range(4) if code >> i & 1]
     down = [i for i in range(4) if not code >> i & 1]
     if len(up) == 2:
@@ -296,7 +296,7 @@ def _clip(points: Floats, triangles: Ints, edges: Ints) -> tuple[Floats, Ints, I
 def _compact(
     points: Floats, moved: Floats, triangles: Ints, edges: Ints
 ) -> tuple[Floats, Floats, Ints, Ints]:
-    """Drop unused points, merge those that coincide, drop what vanishes by that."""
+    """Drop unused points, merge coincident ones, drop what vanishes by that."""
     used = np.unique(triangles)
     scale = np.ptp(points[used], axis=0).max()
     pairs = scipy.spatial.cKDTree(points[used]).query_pairs(_MERGED * scale, output_type="ndarray")

@@ -33,11 +33,11 @@ _MAP = "viridis"
 _SHOWN = 0.03
 """Largest magnified displacement over the size of the picture."""
 _CRUSHED = 0.2
-"""Triangles that magnification leaves less than this share of their area are not drawn."""
+"""Smallest share of its area of a magnified triangle that is drawn."""
 
 
 def section_figure(study: ImpactStudy) -> Picture:
-    """Draw all bodies of ``study.sections`` in one picture with equal scales."""
+    """Draw ``study.sections`` in one picture with equal scales."""
     pictures = study.sections
     low, high = _bounds(pictures)
     width, height = high[0], high[1] - low[1]
@@ -176,7 +176,7 @@ def _draw_zoom(
 
 
 def _near(picture: SectionPicture, spot: Floats, reach: float) -> SectionPicture:
-    """Keep the triangles around the contact (the others only cost bytes)."""
+    """Triangles around the contact; others only cost bytes."""
     corners = picture.points[picture.triangles]
     low, high = corners.min(axis=1), corners.max(axis=1)
     seen = np.all((low < spot + reach) & (high > spot - reach), axis=1)
@@ -206,7 +206,7 @@ def _name(axes: Any, picture: SectionPicture, spot: Floats, reach: float) -> Non
 
 
 def _rim(picture: SectionPicture) -> NDArray[np.int64]:
-    """Sides (s, 2) of triangles without a neighbour, the axis left out."""
+    """Sides (s, 2) of triangles without a neighbour, except on the axis."""
     triangles = picture.triangles
     sides = np.sort(
         np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
@@ -218,7 +218,7 @@ def _rim(picture: SectionPicture) -> NDArray[np.int64]:
 
 
 def _contact_spot(pictures: tuple[SectionPicture, ...], half_width: float) -> Floats:
-    """Middle of the place where the deformed bodies are closest, (r, z) [m]."""
+    """Closest place (r, z) [m] of the deformed bodies."""
     first = pictures[0]
     if len(pictures) < 2:
         low, high = _bounds(pictures)

@@ -41,24 +41,24 @@ _INK = "#22262b"
 _DASHES = (0, (3.0, 1.5))
 _TOUCHING = "contact faces"
 _LONGEST = 32
-"""Characters of a name; of both names if all of the legend is to stand in one row."""
+"""Characters of a name; of both names for a legend in one row."""
 _WIDTH = 720
 _BELOW = 0.1
 """Room below the bodies, of their height, for the scale and the axes."""
 _TALLEST = 1.5
 """Height over width of the windows, at most."""
 _LAMP = np.array([-0.45, 0.65, -0.61])
-"""Where the light comes from: right, up, away from the viewer."""
+"""Direction of the light: right, up, away from the viewer."""
 _STEEPEST = 0.05
-"""Share of a normal towards the viewer from which a surface passes for seen from its edge."""
+"""Share of a normal towards the viewer below which a surface is seen from its edge."""
 _LEVELS = 40
-"""Shades of a colour: with fewer different ones a picture takes less room."""
+"""Shades of a colour; fewer shades, smaller pictures."""
 _STRIPES = 14
-"""Pixels from one stripe of a held surface to the next."""
+"""Pixels between stripes of a held surface."""
 
 
 def solid_figure(study: ImpactStudy) -> Picture:
-    """Draw ``study.pictures``: the whole on the left, the contact enlarged on the right."""
+    """Draw ``study.pictures``: the whole, and the contact enlarged."""
     pictures = study.pictures
     touching = _contact_triangles(study)
     touch = pictures[1].touch
@@ -88,7 +88,7 @@ def solid_figure(study: ImpactStudy) -> Picture:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Painted:
-    """A body with what its triangles show: ``part`` numbers smooth surfaces."""
+    """A body; ``part`` numbers the smooth surface of each triangle."""
 
     skin: Skin
     part: Ints
@@ -225,7 +225,7 @@ def _coloured(scene: list[_Painted], seen: Seen, window: Window) -> NDArray[np.u
 
 
 def _light(skin: Skin) -> tuple[Floats, Floats]:
-    """Brightness of each triangle from the mean of its normals, and its depth per pixel."""
+    """Brightness by the mean normal, and depth per pixel, of each triangle."""
     normal = skin.normals[skin.triangles].sum(axis=1) @ _CAMERA.axes.T
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
     bright = np.clip(normal @ (_LAMP / np.linalg.norm(_LAMP)), 0.0, 1.0)
@@ -239,7 +239,7 @@ def _rgb(colour: str) -> Floats:
 
 
 def _trace(one: _Painted, quarter: Quarter) -> Floats:
-    """Where the contact face meets the two cut faces, shape (s, 2, 3) [m]."""
+    """Contact face on the two cut faces, (s, 2, 3) [m]."""
     corners = one.skin.points[one.skin.triangles[one.touching]]
     found = [np.empty((0, 2, 3))]
     for normal, other in (quarter.normals, quarter.normals[::-1]):

@@ -1,4 +1,4 @@
-"""Transfer functions of both bodies at the contact: full order against reduced."""
+"""Transfer functions at the contact: full order against reduced."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -29,13 +29,13 @@ from klack.machine.progress import Progress
 __all__ = ["LOSS_FACTOR", "TRANSFER_COUNTS", "TRANSFER_MODES", "compare_transfer", "sweep_of"]
 
 TRANSFER_COUNTS = (20, 50)
-"""Elastic modes of the reduced bodies that are compared."""
+"""Elastic modes of the compared reduced bodies."""
 
 TRANSFER_MODES = max(TRANSFER_COUNTS)
-"""Elastic modes of each body that the comparison needs."""
+"""Elastic modes of each body for the comparison."""
 
 LOSS_FACTOR = 0.01
-"""With less damping the notches between two points of the axis would decide the comparison."""
+"""With less damping the notches between two points of the axis would decide."""
 
 
 def sweep_of(case: Case) -> NDArray[np.float64]:

@@ -70,7 +70,7 @@ def best_level(results: Mapping[str, LevelResult]) -> str:
 
 
 def disagreement(deviation: Deviation) -> float:
-    """Largest of the differences in peak force, contact time, impulse and restitution [-]."""
+    """Largest difference in peak force, contact time, impulse and restitution [-]."""
     numbers = (
         deviation.peak_force,
         deviation.contact_time,
@@ -214,14 +214,13 @@ def _phases(history: ImpactHistory, measures: ImpactMeasures) -> list:
 
 
 def _periods(result: LevelResult) -> np.ndarray:
-    """Periods of the modes that hold a share of the energy [s]."""
     initial = result.history.ledger.initial
     frequency = [item.frequency[item.energy > _RINGS * initial] for item in result.modal_energy]
     return 1.0 / np.concatenate([np.zeros(0), *frequency])
 
 
 def _rounded(step: float) -> str:
-    """Time step below the one given, in two digits that a case can hold."""
+    """Time step below the one given, in two digits."""
     power = 10.0 ** (np.floor(np.log10(step)) - 1)
     return format_si(float(np.floor(step / power) * power), "s", 2)
 
@@ -234,13 +233,13 @@ level is off by 18 % at a share of 0.36 and by 3 % at 0.18."""
 
 
 def flat_for_reduced(problem: ContactProblem, kept: ReducedPair) -> str:
-    """Doubt about the reduced level, for faces that meet all at once; else empty."""
+    """Doubt about the reduced level, for faces that meet all at once."""
     highest = (float(body.frequencies.max(initial=0.0)) for body in (kept.upper, kept.lower))
     return _doubt(problem, highest)
 
 
 def flat_for_modes(problem: ContactProblem, modes: Iterable[Modes]) -> str:
-    """Doubt about the interface level with these modes of the two bodies; else empty."""
+    """Doubt about the interface level with these modes of the bodies."""
     highest = (float(one.frequency.max(initial=0.0)) for one in modes)
     return _doubt(problem, highest)
 
@@ -276,7 +275,7 @@ def _doubt(problem: ContactProblem, highest: Iterable[float]) -> str:
 def doubt_modal_levels(
     results: Mapping[str, LevelResult], *, reduced: str, interface: str
 ) -> dict[str, LevelResult]:
-    """Levels with these doubts, which may be empty, on those of modes."""
+    """Add these doubts, if any, to modal levels."""
     doubts = {name: reduced if name.startswith("reduced") else "" for name in results}
     doubts["interface"] = interface
     return {name: result.doubted(doubts[name]) for name, result in results.items()}

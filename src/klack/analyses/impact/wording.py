@@ -23,11 +23,11 @@ __all__ = [
 
 
 _SAME_SPEED = 5e-4
-"""Relative change of the approach speed that three digits do not show."""
+"""Change of the approach speed that three digits do not show."""
 
 
 def answer(study: ImpactStudy) -> str:
-    """Course of the impact as text, with the deviation of the reduced level from the reference."""
+    """Course of the impact, with the deviation of the reduced level."""
     needle, partner = study.bodies[0], study.bodies[1]
     reference = study.levels[study.reference]
     numbers = reference.measures
@@ -69,7 +69,7 @@ def answer(study: ImpactStudy) -> str:
 
 
 def leaves_axis(study: ImpactStudy) -> bool:
-    """Whether axisymmetric bodies met off their axis, at points on rings."""
+    """Whether axisymmetric bodies met off-axis, at points on rings."""
     level = study.levels.get("interface")
     in_plane = all(body.model == "axisymmetric" for body in study.bodies)
     if level is None or level.pressure is None or not in_plane:
@@ -78,7 +78,7 @@ def leaves_axis(study: ImpactStudy) -> bool:
 
 
 def which_contact(numbers: ImpactMeasures, number: int) -> str:
-    """Which of several contacts a number belongs to, in brackets; empty for one."""
+    """Contact of a number, in brackets; empty for a single one."""
     if numbers.sub_contacts < 2:
         return ""
     return f" (contact {number} of {numbers.sub_contacts} in quick succession)"
@@ -91,7 +91,7 @@ def _started(study: ImpactStudy, numbers: ImpactMeasures) -> str:
 
 
 def verdict(result: LevelResult, deviation: Deviation) -> str:
-    """Deviation of one level from the reference, in one sentence."""
+    """Deviation of one level, in one sentence."""
     return (
         f"The {_called(result.level)} model ({count(result.degrees_of_freedom)} degrees of "
         f"freedom, computed in {quantity(result.wall_time, 's', 2)}) deviates from them by "
@@ -122,7 +122,7 @@ GOOD, FAIR = 0.01, 0.05
 
 
 def estimate_rows(study: ImpactStudy) -> tuple[tuple[str, ...], ...]:
-    """One row per level, and how far it may be off; the true deviation from the full order."""
+    """A row per level: error and margin, and true deviation from the full order."""
     rows = []
     for name, estimate in study.estimates.items():
         cells = _numbers(estimate)
@@ -186,7 +186,7 @@ def worst_error(study: ImpactStudy, level: str) -> float:
 
 
 def _verdict(study: ImpactStudy, level: str) -> str:
-    """Judge the largest of the four errors, unless the contact itself is in doubt."""
+    """Judge the largest error, unless the contact is in doubt."""
     if doubts := study.contact.doubts:
         return (
             "both share the same contact, which cannot be relied on, because "

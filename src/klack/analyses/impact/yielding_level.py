@@ -35,10 +35,10 @@ __all__ = [
 ]
 
 SMALL_YIELD = 2e-3
-"""Of the energy: what elastic bodies may miss without a doubt."""
+"""Share of the energy that elastic bodies may miss without a doubt."""
 
 _LARGE = 0.1
-"""Plastic strain from which on the elements themselves are turned and stretched too much."""
+"""Plastic strain that turns and stretches the elements too much."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -73,7 +73,7 @@ class YieldingFaces:
 
 
 def elastic_twin(problem: ContactProblem, pair: ReducedPair) -> ImpactHistory:
-    """Impact of the same reduced bodies, with the consistent law, whose faces do not yield."""
+    """Impact of the same bodies with elastic faces and the consistent law."""
     assert pair.local is not None
     return simulate_bodies(problem.case, pair.upper, pair.lower, pair.local.law)
 

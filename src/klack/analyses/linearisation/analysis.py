@@ -80,8 +80,6 @@ _SWEEP = JsonForm(
 
 
 class _Shared(NamedTuple):
-    """An eigenvalue, and the components that take part in it."""
-
     mode: Eigenvalue
     parts: Mapping[str, float]
 
@@ -181,7 +179,7 @@ def eigenvalue_rows(record: LinearModel, most: int) -> list[tuple[str, ...]]:
 
 
 def _shown(record: LinearModel, most: int) -> list[int]:
-    """Eigenvalues worth a row: those of the memory of friction in lines come last."""
+    """Eigenvalues for rows: those of the memory of friction in lines come last."""
     of_lines = {
         name.name.rpartition(".")[0] for name in record.states if "friction term" in name.name
     }

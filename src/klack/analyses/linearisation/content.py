@@ -1,4 +1,4 @@
-"""Files beside a linearisation, its charts, and the content of its report."""
+"""Files, charts and report of a linearisation."""
 
 from pathlib import Path
 from typing import Any
@@ -27,7 +27,7 @@ __all__ = ["linear_charts", "linear_model_content", "write_files"]
 
 
 def write_files(record: LinearModel, folder: Path) -> tuple[str, ...]:
-    """Write all of them into a folder; return their names."""
+    """Write all files; return their names."""
     content = _content(record)
     np.savez_compressed(folder / "linear-model.npz", **content)
     cells = {
@@ -118,7 +118,6 @@ def _content(record: LinearModel) -> dict[str, Any]:
 
 
 def _write_responses(record: LinearModel, file: Path) -> None:
-    """Magnitude and phase of every response and loop over the same frequencies."""
     columns: list[tuple[str, Any]] = []
     axis = (record.responses or record.loops)[0].frequency
     curves: list[tuple[str, str, Response | LoopMargins]] = [
@@ -137,7 +136,7 @@ Vector = NDArray[np.float64]
 
 
 def linear_charts(record: LinearModel) -> tuple[Chart, ...]:
-    """A chart for each response and loop, and one of the eigenvalues."""
+    """Charts of responses, loops and eigenvalues."""
     return (
         *(_response_chart(x) for x in record.responses),
         *(_loop_chart(x) for x in record.loops),
@@ -156,7 +155,7 @@ def _axis(frequency: Vector) -> AxisSpec:
 
 
 def _phase(values: NDArray[np.complex128]) -> Vector:
-    """Phase [degrees] without jumps, the first one within half a turn of zero."""
+    """Phase [degrees] without jumps, starting within 180."""
     turned = np.degrees(np.unwrap(np.angle(values)))
     return np.asarray(turned - 360.0 * np.round(turned[0] / 360.0))
 

@@ -38,7 +38,7 @@ __all__ = ["controllers_of", "gas_drives", "loop_margins", "pid_loop", "plain_na
 
 
 def plain_name(name: str) -> str:
-    """Name of a signal however its words are joined."""
+    """Name of a signal, however its words are joined."""
     return ".".join(name.replace("_", ".").replace(" ", ".").split("."))
 
 
@@ -118,7 +118,7 @@ def _place(signals: Sequence[Signal], name: str, where: str) -> int:
 
 
 def gas_drives(network: Network) -> dict[str, tuple[str, Network]]:
-    """By the name of an input: its unit, and the network with one such unit more of it."""
+    """Unit, and network with one unit more, by the name of an input."""
     found = {}
     for name, part in network.components.items():
         if not isinstance(part, GasSource):
@@ -142,7 +142,7 @@ Vector = NDArray[np.float64]
 def return_ratio(
     system: LinearSystem, output: int, source: int, sign: float
 ) -> Callable[[float], complex]:
-    """Open loop over [Hz] through one output, which adds ``sign`` times itself to one input."""
+    """Open loop over [Hz] through an output that adds ``sign`` times itself to an input."""
 
     def opened(frequency: float) -> complex:
         T = sign * complex(next(transfer(system, np.array([frequency])))[output, source])
@@ -201,6 +201,6 @@ def _crossings(
 def _nearest(
     places: list[float], value: Callable[[float], float], size: Callable[[float], float]
 ) -> tuple[float, float]:
-    """Value of the smallest size, and where; nan without any."""
+    """Smallest value and its place; nan without any."""
     found = [(value(f), f) for f in places]
     return min(found, key=lambda pair: size(pair[0])) if found else (np.nan, np.nan)

@@ -62,7 +62,7 @@ class Eigenvalue:
 
     @property
     def time_constant(self) -> float:
-        """Time [s] in which it decays to 1/e, or grows by e; infinite where it does neither."""
+        """Time [s] of decay to 1/e, or growth by e; infinite for neither."""
         return 1.0 / abs(self.real) if self.real and self.verdict != "neutral" else np.inf
 
 
@@ -225,7 +225,7 @@ class LinearModel(CaseRecord):
         return len(self.delays) > 0
 
     def parts(self, mode: int) -> dict[str, float]:
-        """Components that take part in an eigenvalue by a hundredth or more, the largest first."""
+        """Components with a share of 0.01 or more, the largest first."""
         order = np.argsort(-self.shares[mode])
         row = {self.owners[k]: float(self.shares[mode, k]) for k in order}
         return {name: share for name, share in row.items() if share >= 0.01}
@@ -237,5 +237,5 @@ class LinearModel(CaseRecord):
 
     @property
     def neutral(self) -> tuple[Eigenvalue, ...]:
-        """Eigenvalues that neither decay nor grow, as far as can be told."""
+        """Eigenvalues that neither decay nor grow."""
         return tuple(mode for mode in self.eigenvalues if mode.verdict == "neutral")

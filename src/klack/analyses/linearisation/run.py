@@ -78,7 +78,7 @@ class LinearPoint:
 
 
 def linear_point(found: PointFound, held: Sequence[str] = ()) -> LinearPoint:
-    """Linearise the network of an operating point; InputError for what has no linear law there."""
+    """Linearise about an operating point; InputError where there is no linear law."""
     network, step = compiled_at(found.rows, found.point)
     drives: dict[str, tuple[str, Rows]] = {}
     for name, coil in coils_of(found.network).items():
@@ -232,7 +232,7 @@ def _stability(
     clock: StageClock,
     threads: int | None,
 ) -> StabilitySweep:
-    """The slowest decay of an oscillation at every value of a sweep; each point on its own."""
+    """Slowest decay of an oscillation at every value of a sweep."""
     count = len(sweep.values)
     told = np.full((3, count), np.nan)
     unstable, failures = np.full(count, -1, dtype=np.int64), list[str]()
@@ -329,7 +329,7 @@ def _pairs(
 def _opened(
     linear: LinearNetwork, name: str, network: Network, rows: Rows
 ) -> tuple[str, Callable[[float], complex], float]:
-    """Name of a loop, the open loop, and the highest frequency [Hz] that it holds for."""
+    """Name of a loop, the open loop, and its highest valid frequency [Hz]."""
     controllers = controllers_of(network)
     if name in controllers:
         return name, *pid_loop(name, network, rows, linear.system)

@@ -94,7 +94,7 @@ _STUDY = JsonForm(
 
 
 def _bands(bands: ThirdOctaves, energy: Floats) -> list[tuple[float, str, float]]:
-    """Middle frequency [Hz], nominal one and level [dB] of each band."""
+    """Middle and nominal frequency [Hz], and level [dB], of each band."""
     return [
         (
             middle,

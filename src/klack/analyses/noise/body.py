@@ -71,13 +71,13 @@ def net_share(net: TimeSeries | None, bands: Sequence[ThirdOctaves]) -> Floats:
 
 
 def share_at(frequency: Floats, bands: ThirdOctaves, share: Floats) -> Floats:
-    """The share at some frequencies [Hz], straight in logarithms between the bands."""
+    """Share at frequencies [Hz], linear in logarithms between bands."""
     level = np.interp(np.log(frequency), np.log(bands.middle), np.log(share))
     return np.asarray(np.exp(level))
 
 
 def _at_rest_outside(net: TimeSeries) -> TimeSeries:
-    """With a zero on both sides: before and after the record the needle is not pushed."""
+    """With a zero on both sides: no push outside of the record."""
     return TimeSeries(
         step=net.step,
         values=np.pad(net.values, 1),
@@ -88,7 +88,7 @@ def _at_rest_outside(net: TimeSeries) -> TimeSeries:
 
 
 ASSUMED_DAMPING = 0.005
-"""Damping ratio of radiating modes, where the case gives none: a loss factor of 1 %."""
+"""Damping ratio of radiating modes where the case gives none."""
 _LOWEST, _HIGHEST = 20.0, 400e3  # [Hz] of mobilities
 _AUDIBLE = 24e3  # [Hz]
 _LINES, _ROUND_A_PEAK = 1200, 40
@@ -183,13 +183,13 @@ def body_noise(
 
 
 class Transfers:
-    """Radiated power per force of ports, kept for further runs of the same bodies."""
+    """Radiated power per force of ports, kept for runs of the same bodies."""
 
     def __init__(self) -> None:
         self._found: dict[tuple[object, ...], tuple[Floats, Floats]] = {}
 
     def of(self, structure: Structure, port: str, around: Surroundings) -> tuple[Floats, Floats]:
-        """Audible frequencies [Hz] and radiated power [W/N^2] of a force at a port."""
+        """Audible frequencies [Hz] and radiated power [W/N^2] of a port."""
         key = (structure, port, around.mount, around.plate, around.air, around.efficiency)
         found = self._found.get(key)
         if found is None:
@@ -217,7 +217,7 @@ def port_transfers(
     around: Surroundings,
     transfers: Transfers,
 ) -> list[tuple[TimeSeries, Floats, Floats]]:
-    """Of every port that is hit: force [N], audible frequencies [Hz], radiated power [W/N^2]."""
+    """Force [N], audible frequencies [Hz] and radiated power [W/N^2] of every hit port."""
     found = []
     for port, force in port_forces(structure, stop_forces).items():
         frequency, transfer = transfers.of(structure, port, around)
@@ -227,7 +227,7 @@ def port_transfers(
 
 
 def damped(structure: Structure) -> Structure:
-    """Give modes without damping the assumed one; they would ring, and radiate, without end."""
+    """Give undamped modes, which would ring and radiate without end, the assumed damping."""
     if np.all(structure.damping > 0.0):
         return structure
     damping = np.where(structure.damping > 0.0, structure.damping, ASSUMED_DAMPING)
@@ -235,7 +235,7 @@ def damped(structure: Structure) -> Structure:
 
 
 def frequency_lines(structure: Structure, mount: Mount | None, low: float, high: float) -> Floats:
-    """Rising frequencies [Hz] that resolve every resonance, also those on the mount."""
+    """Rising frequencies [Hz] that resolve every resonance, also on the mount."""
     kinds = [damped(structure)]
     if mount is not None:
         kinds.append(mounted(kinds[0], mount))
@@ -252,7 +252,7 @@ def frequency_lines(structure: Structure, mount: Mount | None, low: float, high:
 
 
 def _by_mobility(structure: Structure, forces: Mapping[str, TimeSeries]) -> float:
-    """Vibration energy by ``int 2 Re(Y) |F|^2 df`` [J]; nan where its lines are too narrow."""
+    """Vibration energy by ``int 2 Re(Y) |F|^2 df`` [J]; nan if the lines are too narrow."""
     width = structure.damping * structure.omega / (2.0 * np.pi)
     step = next(iter(forces.values())).step
     if not np.all(width > 0.0) or 3.0 / (width.min() * step) > _LONGEST:

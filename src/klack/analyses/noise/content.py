@@ -37,7 +37,7 @@ __all__ = ["noise_content"]
 
 
 def noise_answer(study: NoiseStudy) -> str:
-    """How loud the first design is, and how the others differ from it."""
+    """How loud the first design is, and how the others differ."""
     first = study.reference
     stop = strongest(first)
     begin = f"One {first.kind} of '{first.name}'" if len(study.designs) > 1 else f"One {first.kind}"

@@ -63,7 +63,7 @@ def _of_stops(
     *,
     hit: bool = False,
 ) -> list[tuple[str, list[Curve]]]:
-    """Curves of the designs on each stop, or if it is ``hit``; each in the legend once."""
+    """Curves of designs on each stop (or ``hit`` ones); each once in the legend."""
     found, named = [], set[str]()
     for name in _stop_names(study):
         curves = []
@@ -125,7 +125,7 @@ def strongest_chart(study: NoiseStudy) -> Chart:
 
 
 def _window(panels: Sequence[Panel]) -> tuple[float, float]:
-    """Where the force is above a hundredth of its peak, with some time around it [us]."""
+    """Where the force exceeds a hundredth of its peak, with a margin [us]."""
     begins, ends = [], []
     for panel in panels:
         for curve in panel.curves:
@@ -142,7 +142,7 @@ def _window(panels: Sequence[Panel]) -> tuple[float, float]:
 
 
 def spectrum_chart(study: NoiseStudy) -> Chart:
-    """Spectra of the strongest impacts; third octaves, difference and gathered energy of all."""
+    """Spectra of the strongest impacts; third octaves, difference and cumulated energy of all."""
     stops = _of_stops(study, lambda stop: (1e-3 * stop.frequency, stop.level), hit=True)
     panels = [_level_panel(name, "dB re 1 µN s", curves, 70.0) for name, curves in stops]
     named = {curve.label for _, curves in stops for curve in curves}
@@ -212,7 +212,6 @@ def _steps(
 
 
 def _level_panel(label: str, unit: str, curves: Sequence[Curve], depth: float) -> Panel:
-    """Panel that reaches at most ``depth`` below the highest level; notches go deeper."""
     highest = max(float(np.nanmax(curve.y)) for curve in curves)
     lowest = max(min(float(np.nanmin(curve.y)) for curve in curves), highest - depth)
     limits = (5.0 * floor((lowest - 2.0) / 5.0), 5.0 * ceil((highest + 3.0) / 5.0))
@@ -227,7 +226,7 @@ def _compared(
     differences: Sequence[Curve],
     bands: tuple[Band, ...] = (),
 ) -> tuple[Panel, ...]:
-    """Levels, and below them how far designs are from the first one, if there are several."""
+    """Levels, and below them differences from the first design."""
     levels = replace(_level_panel(label, unit, curves, depth), bands=bands)
     if not differences:
         return (levels,)
@@ -243,7 +242,7 @@ def _compared(
 
 
 def _limits(study: NoiseStudy) -> tuple[float, float]:
-    """Frequencies [Hz] between which every design can be believed; nan if no limit is known."""
+    """Frequencies [Hz] within which every design is valid; nan without a limit."""
     tops = [d.valid_up_to for d in study.designs if np.isfinite(d.valid_up_to)]
     return max(d.valid_from for d in study.designs), min(tops, default=float("nan"))
 
@@ -268,7 +267,7 @@ def _trusted_words(study: NoiseStudy) -> str:
 
 
 def mobility_charts(study: NoiseStudy) -> tuple[Chart, ...]:
-    """Drive-point and transfer mobility of every body that is hit."""
+    """Drive-point and transfer mobility of every hit body."""
     return tuple(_mobility_chart(study, name) for name in _body_names(study))
 
 
@@ -312,7 +311,7 @@ def _mobility_chart(study: NoiseStudy, name: str) -> Chart:
 def _distinct(
     found: Sequence[tuple[int, NoiseDesign, BodyNoise]],
 ) -> list[tuple[NoiseDesign, BodyNoise]]:
-    """Bodies of different mobility; variants of one valve share theirs."""
+    """Bodies of different mobility; variants of a valve share theirs."""
     result: list[tuple[NoiseDesign, BodyNoise]] = []
     for _, design, body in found:
         if not any(
@@ -325,7 +324,7 @@ def _distinct(
 
 
 def blocked_charts(study: NoiseStudy) -> tuple[Chart, ...]:
-    """Force on the support of every body, over time and in third octaves."""
+    """Force on every support, over time and in third octaves."""
     charts = []
     for name in _body_names(study):
         curves, bands, differences, levels = [], [], [], list[Floats]()
@@ -366,7 +365,7 @@ def blocked_charts(study: NoiseStudy) -> tuple[Chart, ...]:
 
 
 def radiation_chart(study: NoiseStudy) -> Chart | None:
-    """Estimated sound energy per band, its upper bound, and the difference of designs."""
+    """Sound energy per band, its upper bound, and the difference of designs."""
     with_bodies = [(i, design) for i, design in _designs(study) if design.bodies]
     if not with_bodies:
         return None
@@ -399,7 +398,7 @@ def radiation_chart(study: NoiseStudy) -> Chart | None:
 
 
 def click_charts(study: NoiseStudy) -> tuple[Chart, ...]:
-    """Sound pressure of one click over time, its third octaves, and its loudness."""
+    """Sound pressure of a click, its third octaves, and its loudness."""
     heard = [(i, d, d.sound) for i, d in _designs(study) if d.sound is not None]
     if not heard:
         return ()
@@ -447,7 +446,7 @@ def click_charts(study: NoiseStudy) -> tuple[Chart, ...]:
 
 
 def _end(time: Floats, values: Floats) -> float:
-    """When the sound has fallen below a hundredth of its peak, with some time after it [s]."""
+    """When the sound is below a hundredth of its peak, with a margin [s]."""
     loud = np.flatnonzero(np.abs(values) > 0.01 * np.abs(values).max())
     last = float(time[loud[-1]]) if loud.size else float(time[-1])
     return min(last + 0.1 * (last - float(time[0])) + 5e-3, float(time[-1]))

@@ -115,7 +115,7 @@ _ROUND_OFF = 1e-3  # of a fine step, whose parts are longer
 
 
 def impact_force(history: ImpactHistory) -> TimeSeries:
-    """Contact force [N] of an impact, means over its intervals, with a zero before the start."""
+    """Contact force [N], means over intervals, with a zero before the start."""
     series = force_series(history)
     return TimeSeries(
         step=series.step,
@@ -153,7 +153,7 @@ def interrupted_impact(events: Sequence[ImpactEvent], net: TimeSeries | None) ->
 
 
 def before_impact(series: TimeSeries, event: ImpactEvent | None) -> TimeSeries:
-    """Series up to a contact time before an impact; all of it without one."""
+    """Series up to a contact time before an impact, if there is one."""
     if event is None:
         return series
     end = event.time - event.contact_time
@@ -162,12 +162,12 @@ def before_impact(series: TimeSeries, event: ImpactEvent | None) -> TimeSeries:
 
 
 def stop_forces(result: NetworkResult) -> Mapping[str, TimeSeries]:
-    """Force of every stop of a stroke [N]; see :func:`stop_force`."""
+    """Force [N] of every stop by :func:`stop_force`."""
     return {stop: stop_force(result, stop) for stop in result.interfaces}
 
 
 def stop_force(result: NetworkResult, stop: str) -> TimeSeries:
-    """Contact and film force [N] of one stop, means over fine steps, above zero when it presses."""
+    """Contact and film force [N], means over fine steps, positive when it presses."""
     step = result.step
     start, spacing = float(result.time[0]), float(result.time[1] - result.time[0])
     size = round(spacing / step)  # fine steps of a record
@@ -189,7 +189,7 @@ def stop_force(result: NetworkResult, stop: str) -> TimeSeries:
 
 
 def _record_means(result: NetworkResult, stop: str) -> Floats | None:
-    """Mean of contact and film force over every record; the first channel value has no record."""
+    """Mean of contact and film force of every record; the first value has none."""
     found = [
         result.channels[name].values[1:]
         for name in (f"{stop} contact force", f"{stop} film force")
@@ -199,7 +199,7 @@ def _record_means(result: NetworkResult, stop: str) -> Floats | None:
 
 
 def _share_out(values: Floats, known: NDArray[np.bool_], mean: Floats) -> None:
-    """Give the unknown steps of each record (row) the impulse that the known ones leave over."""
+    """Give unknown steps of each record (row) the rest of its impulse."""
     size = values.shape[1]
     missing = size - known.sum(axis=1)
     left = mean * size - values.sum(axis=1)

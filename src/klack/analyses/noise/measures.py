@@ -1,4 +1,4 @@
-"""Measures of noise: of a design, of the force of a stop, and of the vibration of a body."""
+"""Measures of noise: of a design, a stop and a body."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -125,7 +125,7 @@ CLICK_MEASURES: tuple[Measure[SoundStatistics], ...] = described_in(
         page=True,
     ),
 )
-"""Of one click: these need no more than its pressure."""
+"""Of one click, from its pressure alone."""
 
 
 def _of_design(measure: Measure[SoundStatistics]) -> Measure[NoiseDesign]:
@@ -343,7 +343,7 @@ DESIGN_MEASURES: tuple[Measure[NoiseDesign], ...] = described_in(
         page=True,
     ),
 )
-"""Of one design: from the force of the stops to the sound of one stroke."""
+"""Of one design, from the force of the stops to the sound."""
 
 STOP_MEASURES: tuple[Measure[StopForce], ...] = described_in(
     _THEORY,

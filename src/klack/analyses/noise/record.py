@@ -1,4 +1,4 @@
-"""Record of a noise study: from the force of every stop to the sound of a click."""
+"""Record of a noise study, from force to click."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -258,7 +258,7 @@ class NoiseDesign:
 
     @property
     def band_energy(self) -> Floats:
-        """Energy of the forces of all stops together per band [N^2 s]."""
+        """Energy of all stop forces per band [N^2 s]."""
         return np.asarray(np.sum([stop.bands.energy for stop in self.stops], axis=0))
 
     @property
@@ -268,7 +268,7 @@ class NoiseDesign:
 
     @property
     def balanced_below(self) -> float:
-        """Frequency [Hz] below which half of the forces or more is balanced in the valve; or 0."""
+        """Frequency [Hz] below which half or more of the forces is balanced; or 0."""
         balanced = np.flatnonzero(self.net_share < 0.5)
         return float(self.stops[0].bands.high[balanced[-1]]) if balanced.size else 0.0
 
@@ -283,7 +283,7 @@ class NoiseDesign:
 
     @property
     def injected_energy(self) -> float:
-        """Structure-borne energy [J] through all ports of held bodies; nan without bodies."""
+        """Structure-borne energy [J] through all ports; nan without bodies."""
         return self._over_bodies(lambda body: body.injected.sum())
 
     @property
@@ -315,7 +315,7 @@ class NoiseStudy(Record):
 
     @property
     def reference(self) -> NoiseDesign:
-        """First design: the one that the others are compared with."""
+        """First design, with which others are compared."""
         return self.designs[0]
 
     @property
@@ -330,7 +330,7 @@ class NoiseStudy(Record):
 
     @property
     def own_components(self) -> Mapping[str, str]:
-        """Components of all designs that are not part of klack."""
+        """Components of all designs that are not klack's."""
         return {
             name: digest for item in self.designs for name, digest in item.own_components.items()
         }

@@ -1,4 +1,4 @@
-"""``klack noise``: from the force of every stop to the sound, for one or several designs."""
+"""``klack noise``: from stop forces to sound."""
 
 from collections.abc import Sequence
 from time import perf_counter

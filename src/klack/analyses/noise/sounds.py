@@ -11,11 +11,11 @@ from klack.signals.sampled import TimeSeries
 __all__ = ["StudySound", "common_full_scale", "study_sounds", "write_sounds"]
 
 StudySound = tuple[str, NoiseDesign, TimeSeries]
-"""Name of the file, whose sound it is, and the sound pressure."""
+"""File name, design, and sound pressure."""
 
 
 def study_sounds(study: NoiseStudy) -> tuple[StudySound, ...]:
-    """Of each design one click, then its drive pattern [Pa]."""
+    """One click of each design, then its drive pattern [Pa]."""
     found: list[StudySound] = []
     for design in study.designs:
         if design.sound is None:
@@ -28,12 +28,12 @@ def study_sounds(study: NoiseStudy) -> tuple[StudySound, ...]:
 
 
 def common_full_scale(sounds: tuple[StudySound, ...]) -> float:
-    """Full scale of all files of a study [Pa], so that designs compare by ear."""
+    """Full scale [Pa] of all files, so that designs compare by ear."""
     return full_scale_of(*(pressure for *_, pressure in sounds))
 
 
 def write_sounds(study: NoiseStudy, folder: Path) -> tuple[str, ...]:
-    """Write every sound as a WAV file of 24 bit and 48 kHz, to one full scale; return the names."""
+    """Write WAV files of 24 bit and 48 kHz to one full scale; return the names."""
     sounds = study_sounds(study)
     scale = common_full_scale(sounds)
     for name, _, pressure in sounds:

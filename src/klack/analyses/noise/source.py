@@ -1,4 +1,4 @@
-"""Where a noise study takes its forces and bodies from: stored impacts and strokes, or cases."""
+"""Forces and bodies for a noise study, from stored results or cases."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -53,7 +53,7 @@ _AROUND = 5.0  # contact times shown on each side of the strongest impact
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SourceStop:
-    """Force of one stop: all of it, and its strongest impact alone."""
+    """Force of one stop: all of it, and its strongest impact."""
 
     name: str
     force: TimeSeries
@@ -262,7 +262,7 @@ def stroke_sources(
 def _stops(
     study: StrokeStudy, variant: StrokeVariant, last: ImpactEvent | None
 ) -> tuple[SourceStop, ...]:
-    """Stops in the order of a stroke, the opening stop first; without the interrupted impact."""
+    """Stops, the opening stop first; without the interrupted impact."""
     order = dict.fromkeys(
         name for name in (study.channels.opening_stop, study.channels.seat) if name
     )
@@ -283,7 +283,7 @@ def _stops(
 
 
 def _strongest(force: TimeSeries, events: Sequence[ImpactEvent]) -> TimeSeries:
-    """Force about the impact with the highest peak, between its neighbours; time from its touch."""
+    """Force about the highest impact, between its neighbours; time from its touch."""
     if not events:
         return force
     k = int(np.argmax([event.peak_force for event in events]))
@@ -313,7 +313,7 @@ def _end(event: ImpactEvent) -> float:
 
 
 def net_force(study: StrokeStudy, variant: StrokeVariant) -> TimeSeries | None:
-    """Mass times acceleration [N] of the centre of mass of the needle, in records."""
+    """Mass times acceleration [N] of the needle's centre of mass, in records."""
     masses = [body.mass for body in study.bodies if body.name == study.needle]
     speed = variant.channel(study.channels.velocity)
     if not masses or speed is None:
@@ -351,12 +351,11 @@ def _notes(variant: StrokeVariant, last: ImpactEvent | None) -> tuple[str, ...]:
 
 
 def _contact_notes(contacts: Sequence[ContactSummary | StopSummary]) -> tuple[str, ...]:
-    """What speaks against the contacts that the forces come from."""
     return tuple(filter(None, map(contact_doubt, contacts)))
 
 
 def _yield_notes(result: LevelResult) -> tuple[str, ...]:
-    """Note that faces were new, where their yield took more than elastic levels may miss."""
+    """Note that faces were new, where yield exceeds what elastic levels may miss."""
     share = yield_share(result)
     if share < SMALL_YIELD:
         return ()
@@ -368,7 +367,6 @@ def _yield_notes(result: LevelResult) -> tuple[str, ...]:
 
 
 def _require_structures(study: ImpactStudy | StrokeStudy) -> None:
-    """Refuse a result with held bodies whose modes were not stored."""
     held = [body.name for body in study.bodies if body.support != "free"]
     if held and not study.structures:
         raise InputError(
@@ -414,7 +412,7 @@ def _kept_up_to(bodies: Sequence[BodySummary]) -> float:
 def _noise_of(
     text: str, case: Case | ValveCase | None
 ) -> tuple[CaseNoise, bool, Mapping[str, CaseMaterial]]:
-    """Section ``noise``, whether it is given, and materials: of a case, or of its text."""
+    """Section ``noise``, whether it is given, and materials."""
     if case is not None:
         return case.noise or CaseNoise(), case.noise is not None, case.materials
     data = YAML(typ="safe").load(text)  # faster than the reader of cases, which knows the lines

@@ -39,7 +39,7 @@ _MOST = 4  # pictures side by side
 
 
 def shown_bands(study: NoiseStudy) -> tuple[int, ...]:
-    """Bands in which the bodies radiate most: of what can be heard, and of all."""
+    """Bands of the strongest radiation: audible ones, and all."""
     designs = [design for design in study.designs if design.bodies]
     if not designs:
         return ()
@@ -157,14 +157,14 @@ def _draw_solids(axes: Any, bodies: Sequence[BodyNoise], band: int, scale: Norma
 
 
 def _normals(corners: Floats) -> Floats:
-    """Outward normals (f, 3) of faces; a quadrangle that repeats a corner is a triangle."""
+    """Outward normals (f, 3); a quadrangle that repeats a corner is a triangle."""
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     size = np.linalg.norm(normals, axis=1, keepdims=True)
     return np.asarray(normals / np.maximum(size, 1e-300))
 
 
 def _best_view(bodies: Sequence[BodyNoise], band: int) -> tuple[Floats, Floats, Floats]:
-    """From above or from below, wherever more of the motion is seen."""
+    """From above or below, whichever shows more motion."""
     views = [_axes_of_view(lift) for lift in (_LIFT, -_LIFT)]
     seen = np.zeros(2)
     for body in bodies:
@@ -179,7 +179,7 @@ def _best_view(bodies: Sequence[BodyNoise], band: int) -> tuple[Floats, Floats, 
 
 
 def _axes_of_view(lift: float) -> tuple[Floats, Floats, Floats]:
-    """To the right, up, and towards the eye, in the coordinates of the body."""
+    """Right, up, and towards the eye, in coordinates of the body."""
     towards = np.array([np.cos(lift) * np.sin(_TURN), -np.cos(lift) * np.cos(_TURN), np.sin(lift)])
     right = np.array([np.cos(_TURN), np.sin(_TURN), 0.0])
     return right, np.cross(towards, right), towards

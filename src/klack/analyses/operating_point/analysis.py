@@ -121,7 +121,7 @@ def operating_point_told(record: OperatingPoints) -> Iterator[TextTable | str]:
 
 
 def residual_rows(record: OperatingPoints) -> list[tuple[str, str]]:
-    """Balances, and what is left of them at the worst point."""
+    """Balances, and their residuals at the worst point."""
     found = record.found
     rows: Mapping[str, tuple[NDArray[np.float64], str]] = {
         "forces on each free body": (record.force_left, "N"),

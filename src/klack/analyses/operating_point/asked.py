@@ -80,7 +80,7 @@ class SteadyAsked:
     ] = None
 
     def require_fitting(self, **others: object) -> None:
-        """Refuse options of an actuation beside --steady, and those of --steady without it."""
+        """Refuse options of an actuation with --steady, and of --steady without it."""
         names = {"continued": "continue", "check_steps": "check-steps"}
         if self.steady:
             given = [f"--{names.get(name, name)}" for name, x in others.items() if x is not None]

@@ -1,4 +1,4 @@
-"""``klack stroke --steady``: options to record, files and tables."""
+"""Options of ``klack stroke --steady`` to record, files and tables."""
 
 from collections.abc import Sequence
 from pathlib import Path

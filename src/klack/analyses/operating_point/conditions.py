@@ -1,4 +1,4 @@
-"""What is constant at an operating point, and what a sweep changes."""
+"""Conditions of an operating point, and what a sweep changes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -104,7 +104,7 @@ class Sweep:
 
 
 def stated_drive(texts: Sequence[str], option: str, kind: Kind) -> dict[str, float]:
-    """Values by coil from ``"3 A"`` or ``"coil=3 A"``; an empty name stands for all coils."""
+    """Values by coil from ``"3 A"`` or ``"coil=3 A"``; an empty name means all coils."""
     found: dict[str, float] = {}
     for text in texts:
         name, _, value = text.rpartition("=")
@@ -181,7 +181,7 @@ def _sweep(case: ValveCase, tree: CaseTree, name: str, low: str, high: str, step
 
 
 def _plain(text: str, kind: Kind) -> str | float:
-    """A pure number as a number, as a case file has it."""
+    """A pure number as a number."""
     if not kind.bare:
         return text
     try:

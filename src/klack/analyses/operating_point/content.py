@@ -1,4 +1,4 @@
-"""Files beside operating points, their charts, and the content of their report."""
+"""Files, charts and report of operating points."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -27,7 +27,7 @@ CSV_NAME = "operating-point.csv"
 
 
 def write_csv(record: OperatingPoints, file: Path) -> None:
-    """Write component, quantity, value and unit of one point; of a sweep a table of its points."""
+    """Write component, quantity, value and unit of a point; of a sweep a table."""
     if record.swept:
         left = (
             ("force left", "N", record.force_left),
@@ -90,7 +90,7 @@ def sweep_charts(
 
 
 def _told_apart(charts: Sequence[Chart]) -> tuple[Chart, ...]:
-    """Charts, numbered where several bear one name: each is a file."""
+    """Charts with numbers where names repeat: each is a file."""
     names = [chart.name for chart in charts]
     return tuple(
         replace(chart, name=f"{chart.name}-{names[: i + 1].count(chart.name)}")
@@ -101,7 +101,7 @@ def _told_apart(charts: Sequence[Chart]) -> tuple[Chart, ...]:
 
 
 def _kind(item: PointQuantity) -> str:
-    """What may share an axis: quantities that are called the same."""
+    """Name that quantities on one axis share."""
     return f"{item.unit} {item.quantity.split()[-1]}"
 
 
@@ -146,7 +146,6 @@ def _chart(
 def _family(
     record: OperatingPoints, x: SweptQuantity | PointQuantity, item: PointQuantity
 ) -> Chart:
-    """A quantity over another, for values of the second swept one."""
     second = record.swept[1]
     levels = np.unique(second.values)
     if len(levels) > len(LINE_LOOKS):  # evenly chosen ones, the ends among them
@@ -168,7 +167,7 @@ def _drawn(
     lines: Sequence[tuple[str, Vector, Vector]],
     title: str,
 ) -> Chart:
-    """Lines with their names, x and y [SI]; axes with their factors from SI."""
+    """Named lines, x and y [SI]; axes with their factors from SI."""
     (spec, x_factor), (y_spec, factor) = _axis(x.short, x.values, x.unit), y
     curves = [
         curve

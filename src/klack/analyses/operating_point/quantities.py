@@ -1,4 +1,4 @@
-"""Quantities of an operating point by component, and what is left of its balances."""
+"""Quantities of an operating point, and its residuals."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -39,7 +39,7 @@ def measured(
     currents: Mapping[str, float],
     roles: ValveRoles,
 ) -> Measured:
-    """Collect the quantities of a point: bodies, stops, magnets, volumes, flows."""
+    """Quantities of a point: bodies, stops, magnets, volumes, flows."""
     names = sorted((*network.components, "ambient"), key=len, reverse=True)
     found: dict[Key, float] = {}
     sliding = {f"{row.component}.{port} force" for row in rows.sliders for port in row.names}
@@ -110,7 +110,7 @@ def _liquid_flows(point: OperatingPoint, rows: Rows) -> dict[Key, float]:
 def _voltage_left(
     point: OperatingPoint, network: Network, rows: Rows, currents: Mapping[str, float]
 ) -> float:
-    """Largest difference of what a coil needs for its fluxes from the voltage at it."""
+    """Largest difference of the voltage for a coil's fluxes from that at it."""
     moved = {
         handle: point.start.displacement[f"{row.component}.{name}"]
         for row in rows.bodies

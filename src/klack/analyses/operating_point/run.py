@@ -70,7 +70,7 @@ _BEYOND = 1e-9  # of the travel: a lift that lies on its stop
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PointFound:
-    """An operating point, its network with constant drives, and what has to be known of it."""
+    """Operating point, network with constant drives, and notes."""
 
     point: OperatingPoint
     network: Network
@@ -182,7 +182,7 @@ def find_point(
     conditions: Conditions,
     origin: Origin = "start",
 ) -> PointFound:
-    """Find one operating point, and look for others from other places."""
+    """Find one operating point, and others from other places."""
     network = variant_network(valve, variant)
     currents = conditions.currents(network, start_currents(network))
     network = driven(network, currents).at_start()
@@ -209,7 +209,7 @@ def find_point(
 
 
 def held_network(network: Network, currents: Mapping[str, float]) -> Network:
-    """Network with constant currents, sources and forces: a run of it stays where it rests."""
+    """Network with constant currents, sources and forces, which stays at rest."""
     return driven(network, currents).at_start()
 
 
@@ -220,7 +220,7 @@ def valve_at(
     progress: Progress,
     threads: int | None,
 ) -> Valve:
-    """Valve with the changes of a point, built anew where meshes or laws may follow from them."""
+    """Valve with the changes of a point, built anew where meshes or laws may change."""
     changes = conditions.changes
     if not changes:
         return valve
@@ -365,7 +365,7 @@ def _swept(sweeps: Sequence[Sweep]) -> tuple[SweptQuantity, ...]:
 
 
 def _quantities(found: Sequence[Measured | None]) -> tuple[PointQuantity, ...]:
-    """Columns of all points; one that a point does not have is nan there."""
+    """Columns of all points; nan where a point has none."""
     keys = dict.fromkeys(key for point in found if point is not None for key in point.values)
     return tuple(
         PointQuantity(
@@ -385,7 +385,6 @@ def _column(values: Sequence[float | None]) -> Vector:
 
 
 def _told(failures: Sequence[str], doubts: Sequence[str], sweeps: Sequence[Sweep]) -> list[str]:
-    """Each doubt once, and how many points are missing."""
     if not sweeps:
         return [line for line in doubts[0].splitlines() if line]
     told = []

@@ -100,7 +100,7 @@ BODY_MEASURES: tuple[Measure[ReducedBody], ...] = described_in(
 
 
 def _limits(item: TransferComparison) -> dict[str, float]:
-    """Frequency [Hz] up to which each kind of reduction is right."""
+    """Frequency [Hz] up to which each kind of reduction is valid."""
     return dict(zip(item.labels, item.valid_up_to, strict=True))
 
 
@@ -219,7 +219,7 @@ def reduction_told(study: ReductionStudy) -> Iterator[TextTable]:
 
 
 def _nodes_told(study: ReductionStudy) -> TextTable:
-    """Nodes as outputs, and how far up the recipe is right there."""
+    """Nodes as outputs, and how high the recipe is valid there."""
     rows = []
     for node in study.nodes:
         limits = _limits(node.transfer)
@@ -251,7 +251,7 @@ def _nodes_told(study: ReductionStudy) -> TextTable:
 
 
 def _impacts_told(study: ReductionStudy) -> TextTable:
-    """Energy that these nodes make or take where they stand for the contact."""
+    """Energy that nodes add or take in place of the contact."""
     rows = []
     for item in study.impacts:
         for name, found in (("one node", item.nodes), ("port", item.ports)):
@@ -271,7 +271,7 @@ def _impacts_told(study: ReductionStudy) -> TextTable:
 
 
 def _bending_told(study: ReductionStudy) -> TextTable:
-    """Lowest modes of order 1 beside the axial ones; a dash where a body keeps no more."""
+    """Lowest modes of order 1 and axial ones; a dash where there are no more."""
     columns = [
         (f"{item.body} {kind} [kHz]", frequencies)
         for item in study.bending
@@ -293,7 +293,7 @@ def _khz(frequencies: NDArray[np.float64], i: int) -> str:
 
 
 def _change(percent: float) -> str:
-    """With a sign; what is below 0.005 % depends on the step and is not told."""
+    """With a sign; below 0.005 % it depends on the step."""
     if abs(percent) < 0.005:
         return "0.00"
     return f"{percent:+.2f}" if abs(percent) < 1.0 else f"{percent:+.1f}"

@@ -159,7 +159,7 @@ def _settled(
     stiffness: float,
     *reads: tuple[Floats, Floats],
 ) -> list[ObservedImpact]:
-    """Impacts read in several ways, in steps so short that none of their energies changes."""
+    """Impacts read in several ways, in steps that change none of their energies."""
     step, before = case.run.reduced_step, np.full(len(reads), np.nan)
     for _ in range(_HALVINGS):
         found = [
@@ -204,7 +204,7 @@ def _sides(problem: ContactProblem, ports: tuple[Port, Port]) -> tuple[_Side, _S
 def _nearest_node(
     problem: ContactProblem, side: _Side, place: tuple[float, ...]
 ) -> tuple[int, float]:
-    """Node next to a place of the drawing, and how far it is away [m]."""
+    """Nearest node to a place of the drawing, and the distance [m]."""
     mesh = side.body.mesh
     where = f"{problem.case.path or 'case'}: run.transfer.nodes.{side.body.name}"
     at = placed_point(np.array(place), side.pose)
@@ -292,7 +292,7 @@ def _recipe(
 
 
 def corrected_label(count: int) -> str:
-    """Label of so many modes with the static correction of the recipe."""
+    """Label of so many modes with the static correction."""
     return f"{count} modes with correction"
 
 
@@ -310,7 +310,7 @@ def _drawn(point: Floats, pose: Pose) -> Floats:
 
 
 def place_words(node: OneNode) -> str:
-    """Where the node is, for example ``(0, 0, -0.6) mm``."""
+    """Place of the node, for example ``(0, 0, -0.6) mm``."""
     return f"({', '.join(f'{round(1e3 * x, 4) + 0.0:g}' for x in node.place)}) mm"
 
 
@@ -319,7 +319,7 @@ def _attached(node: OneNode) -> str:
 
 
 def node_chart(node: OneNode) -> Chart:
-    """Displacement of the node per contact force, and the deviation from the full order there."""
+    """Displacement of the node per contact force, and its deviation."""
     item = node.transfer
     drawn = transfer_chart(item)
     return replace(

@@ -61,7 +61,7 @@ def bending_modes(
     threads: int | None,
     progress: Progress,
 ) -> tuple[BendingModes, ...]:
-    """Bending modes of both bodies; none of solids and of bodies from given matrices."""
+    """Bending modes of both bodies; none of solids and of given matrices."""
     found = []
     progress("bending modes", 0.0)
     for body, kept in zip((problem.pair.upper, problem.pair.lower), reduced, strict=True):

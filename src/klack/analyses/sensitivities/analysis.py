@@ -112,7 +112,7 @@ _RECORD = JsonForm(
 
 
 def sensitivities_told(record: SensitivityRecord) -> Iterator[TextTable | str]:
-    """For each measure its derivatives, then the check and the impacts."""
+    """Derivatives of each measure, then the check and the impacts."""
     for item in record.measures:
         value = "no value" if item.value is None else _quantity(item.value, item.unit)
         yield TextTable(

@@ -1,4 +1,4 @@
-"""Parameters whose derivatives are wanted: of a study, or keys of the case."""
+"""Parameters for derivatives: of a study, or keys of the case."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -21,7 +21,7 @@ __all__ = ["SlopeSpace", "VariedKey", "asked_measures", "slope_space"]
 
 
 def asked_measures(source: StudySource | None, names: Sequence[str] = ()) -> tuple[str, ...]:
-    """Given names; without any, measures and constraints of the study."""
+    """Given names, else measures and constraints of the study."""
     if names or source is None:
         return tuple(names)
     return tuple(dict.fromkeys((*source.study.measures, *source.study.constraints)))
@@ -102,7 +102,7 @@ class SlopeSpace:
         return predicted, sqrt(sum(part * part for part in parts))
 
     def at(self, values: Values) -> "SlopeSpace":
-        """The same about other values [SI] of all parameters of the study."""
+        """The same about other values [SI] of the parameters."""
         return replace(
             self,
             varied=tuple(replace(item, value=float(values[item.name])) for item in self.varied),
@@ -207,7 +207,7 @@ def _is_fixed(space: Space, name: str) -> bool:
 
 
 def _reason(case: AnyCase, item: VariedKey, linked: Sequence[Linked]) -> tuple[str, str] | None:
-    """Why there is no derivative with a parameter, and what to do instead."""
+    """Why a parameter has no derivative, and what to do instead."""
     if item.size == 0.0:
         return "a value of zero", "a range in a study tells how large a small change of it is."
     follow = [other.name for other in linked if item.name in other.words.values()]

@@ -10,15 +10,15 @@ from klack.units import is_level
 __all__ = ["HOLDS", "MISSED", "ImpactSlope", "MeasureSlopes", "SensitivityRecord", "SlopeParameter"]
 
 HOLDS = 0.25
-"""Deviation from two runs beyond which a derivative says nothing about them."""
+"""Deviation from two runs above which a derivative says nothing."""
 
 MISSED = 0.05
-"""Deviation from two runs beyond which it is told."""
+"""Deviation from two runs that is reported."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlopeParameter:
-    """A parameter (path of its key, or a word of the study) and its value in the SI unit."""
+    """Parameter: path of its key, or a word of the study; value in SI."""
 
     name: str
     unit: str
@@ -70,7 +70,7 @@ class MeasureSlopes:
 
     @property
     def deviation(self) -> float | None:
-        """Difference of both predictions over the scale of the change, if there are both."""
+        """Difference of both predictions over the scale of the change."""
         if self.predicted is None or self.secant is None or self.scale == 0.0:
             return None
         return abs(self.predicted - self.secant) / self.scale
@@ -89,12 +89,12 @@ class MeasureSlopes:
 
     @property
     def is_rough(self) -> bool:
-        """Whether two runs miss it by more than :data:`MISSED`, but not by so much as to doubt."""
+        """Whether two runs miss it by more than :data:`MISSED`, but not doubtfully."""
         return self._is_apart and self._is_missed and not self.is_doubtful
 
     @property
     def is_unconfirmed(self) -> bool:
-        """Whether the steps do not resolve the change of the check to :data:`MISSED` of it."""
+        """Whether the steps resolve the change worse than :data:`MISSED` of it."""
         return self._is_missed and not self._is_apart and not self.is_doubtful
 
     @property
@@ -103,7 +103,7 @@ class MeasureSlopes:
 
     @property
     def _is_apart(self) -> bool:
-        """Whether both predictions differ by more than the steps resolve."""
+        """Whether the predictions differ by more than the steps resolve."""
         if self.predicted is None or self.secant is None:
             return False
         return abs(self.predicted - self.secant) > self.resolution
@@ -163,12 +163,12 @@ class SensitivityRecord(CaseRecord):
     by_differences: bool = False
 
     def derivative(self, measure: str, parameter: str) -> float | None:
-        """Derivative in the unit of the measure per unit of the parameter [SI]."""
+        """Derivative in SI units."""
         of, k = self._at(measure, parameter)
         return of.slopes[k]
 
     def elasticity(self, measure: str, parameter: str) -> float | None:
-        """Relative change of a measure over that of a parameter; None at a value of zero."""
+        """Relative change over that of a parameter; None at a value of zero."""
         of, k = self._at(measure, parameter)
         return of.elasticity(k, self.parameters[k])
 

@@ -292,7 +292,7 @@ def _touch_time(variant: StrokeVariant, stop: str, number: int) -> float | None:
 
 
 def _unbounded(runs: Sequence[TangentRun], space: SlopeSpace) -> tuple[str, ...]:
-    """What tells that tangents have left the motion, with the parameter that does so first."""
+    """Sign that tangents have left the motion, with the first parameter."""
     found = []
     for k, item in enumerate(space.varied):
         time = runs[k // DIRECTIONS].without_bound(k % DIRECTIONS, item.size)
@@ -314,7 +314,7 @@ def _doubts(
     impacts: Sequence[ImpactSlope],
     others: _Others | None = None,
 ) -> tuple[str, ...]:
-    """Derivatives that do not predict what another run does, and why."""
+    """Derivatives that do not predict another run, and why."""
     found = []
     wrong = [item.name for item in measures if item.is_doubtful]
     if wrong:

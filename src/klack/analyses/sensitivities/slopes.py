@@ -126,7 +126,7 @@ def transported(values: Floats, late: Floats, step: float) -> Floats:
 
 
 def _evenly(late: Floats, count: int) -> Floats:
-    """Derivatives of the times of the ends of so many intervals, straight between those known."""
+    """Derivatives of the times of interval ends, linear between known ones."""
     places = np.arange(late.size) * (count / (late.size - 1))
     return np.interp(np.arange(count + 1), places, late)
 
@@ -144,7 +144,7 @@ _STAGE = "derivatives"
 
 
 def has_slope(item: ChosenMeasure) -> bool:
-    """Whether a measure has derivatives: times of the stroke, impacts, energies and levels."""
+    """Whether a measure has derivatives: times, impacts, energies and levels."""
     if item.of == "impact":
         return True
     if item.is_noise:
@@ -153,7 +153,7 @@ def has_slope(item: ChosenMeasure) -> bool:
 
 
 class SlopeRunner:
-    """One variant of a case, at points about that of the case."""
+    """One variant of a case, at points about it."""
 
     def __init__(
         self,
@@ -179,7 +179,7 @@ class SlopeRunner:
         self.roles: ValveRoles = find_roles(self.valve.case, self.valve.network)
 
     def about(self, space: SlopeSpace) -> Self:
-        """The same strokes about another point, of the same parameters."""
+        """The same strokes about another point."""
         other = copy(self)
         other.space, other.runs_time = space, 0.0
         other.valve = other.at({})
@@ -198,7 +198,7 @@ class SlopeRunner:
         return variant_network(self.at(shifts), self.name).rows()
 
     def tangents(self) -> list[TangentRun]:
-        """Runs with derivatives, each in some of the directions."""
+        """Runs with derivatives, each for some directions."""
         run, rows, found = self.valve.case.run, self.rows({}), list[TangentRun]()
         if not has_python_steps(rows):
             compile_tangents(rows, step=run.fine_step)
@@ -282,7 +282,7 @@ class SlopeRunner:
         return list(zip(values, map(tuple, found), strict=True))
 
     def _ahead(self, run: TangentRun, direction: int) -> Callable[[float], StrokeOfPoint]:
-        """The stroke where the parameter of a direction has changed by an amount."""
+        """Stroke with the parameter of a direction changed by an amount."""
         name = run.directions[direction].name if run.directions else ""
 
         def moved(amount: float) -> VariantRun:
@@ -307,6 +307,6 @@ class SlopeRunner:
 
 
 def measured(item: ChosenMeasure, point: StrokeOfPoint) -> float | None:
-    """Value of a measure in a stroke; None where it has none."""
+    """Value of a measure in a stroke, if it has one."""
     value = item.value(point)
     return value if value is not None and isfinite(value) else None

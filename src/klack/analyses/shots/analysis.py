@@ -116,7 +116,7 @@ def shots_told(study: ShotsStudy) -> Iterator[TextTable | str]:
 
 
 def shots_measured(study: ShotsStudy) -> Iterator[Measured]:
-    """The centred shot, every other, and the rule of the highest rebound with their measures."""
+    """Measures of the centred shot, the others, and the rule."""
     yield "centred", study.centric.row(0), SHOT_MEASURES
     for index in range(study.shots.count):
         yield f"shot {index}", study.shots.row(index), SHOT_MEASURES

@@ -1,4 +1,4 @@
-"""Content of a shots report before its layout: the same texts for screen and paper."""
+"""Content of a shots report."""
 
 from collections.abc import Callable
 
@@ -84,7 +84,7 @@ def shots_content(study: ShotsStudy) -> Content:
 
 
 def _rule(study: ShotsStudy) -> str:
-    """Position of the centred impact among the shots, and the correlation of the rebound."""
+    """Place of the centred impact, and correlations of the rebound."""
     rank, text = study.rule.rank, "No shot rebounds as high as the centred impact."
     if rank:
         those = "One shot rebounds" if rank == 1 else f"{rank} shots rebound"
@@ -106,7 +106,7 @@ def _related(study: ShotsStudy, shown: Shown) -> float:
 
 
 def _drawn_numbers(study: ShotsStudy) -> list[Shown]:
-    """Quantities that vary from shot to shot and may explain the rebound, as axes."""
+    """Varying quantities that may explain the rebound."""
     candidates = (
         Shown("eccentricity", "eccentricity", *length_unit(study.shots.eccentricity)),
         Shown("tilt", "tilt", "°", np.degrees(1.0)),
@@ -125,7 +125,6 @@ def _varies(shots: ShotColumns, column: str) -> bool:
 
 
 def _pressure(study: ShotsStudy) -> Section:
-    """Contact pressure of the centred impact, the highest and the lowest shot."""
     title = "Pressure in the contact"
     lowest = int(np.nanargmin(study.shots.restitution))
     names = {
@@ -189,7 +188,7 @@ _ShotText = Callable[[dict[str, float]], str]
 
 
 def _columns(study: ShotsStudy) -> tuple[tuple[str, _ShotText, str, bool], ...]:
-    """Head, text, column, and whether it stands there even if it never varies."""
+    """Head, text, column, and whether it is shown without variation."""
     unit, factor = length_unit(study.shots.rebound_height)
     return (
         ("eccentricity\n[µm]", _fixed("eccentricity", 1e6, 2), "eccentricity", True),

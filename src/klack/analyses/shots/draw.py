@@ -87,7 +87,7 @@ class ShotDraw:
     harmonics: NDArray[np.int64]
 
     def radial_deviation(self, angle: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Deviation of the ring from a circle [m], outwards, at angles round the axis [rad]."""
+        """Outward deviation of the ring [m] at angles round the axis [rad]."""
         phase = self.harmonics[:, None] * np.asarray(angle)[None, :]
         return np.asarray(self.waves[:, 0] @ np.cos(phase) + self.waves[:, 1] @ np.sin(phase))
 
@@ -99,7 +99,7 @@ def closing_force(case: Case) -> Distribution:
 
 
 def face_friction(case: Case) -> Distribution:
-    """Distribution of the kinetic coefficient of friction between the faces."""
+    """Distribution of the kinetic friction coefficient of the faces."""
     stated = case.shots.contact_friction if case.shots is not None else None
     return stated if stated is not None else Distribution("fixed", case.contact.friction)
 
@@ -179,7 +179,7 @@ def extreme_placements(
 def runs_asked(
     stated: Shots | StrokeShots, count: int | None, seed: int | None, workers: int | None, runs: str
 ) -> tuple[int, int, int]:
-    """Number of shots or strokes, seed, and processes: as asked for, else as stated."""
+    """Count, seed and processes: as asked for, else as stated."""
     wanted = stated.count if count is None else count
     require_positive("shots: count", wanted, runs)
     own = stated.seed if seed is None else seed
@@ -199,7 +199,7 @@ def shots_of(case: Case) -> Shots:
 
 
 def _stream(seed: int, index: int, attempt: int) -> NDArray[np.float64]:
-    """Random numbers between 0 and 1 of one attempt to draw one shot."""
+    """Numbers between 0 and 1 for one attempt to draw a shot."""
     return np.random.default_rng([seed, index, attempt]).random(_NUMBERS)
 
 
@@ -211,7 +211,7 @@ def drawn_friction(case: AnyCase, shots: Shots | StrokeShots, seed: int, index: 
 
 
 def drawn_face_friction(shots: StrokeShots, seed: int, index: int) -> float:
-    """Coulomb's coefficient between all faces in one stroke; nan where it is not drawn."""
+    """Coulomb's coefficient of all faces; nan where it is not drawn."""
     drawn = shots.contact_friction
     return float("nan") if drawn is None else drawn.quantile(_stream(seed, index, 0)[_FACES])
 

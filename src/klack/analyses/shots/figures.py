@@ -86,12 +86,12 @@ Floats = NDArray[np.float64]
 _ALL, _CENTRED, _HIGHEST = "all shots", "centred impact", "highest rebound"
 _MOST_TRACES = 60
 _LONGER = 1.08
-"""Length of a time axis over the time that matters."""
+"""Length of a time axis over the relevant time."""
 
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """A column of shots on an axis, with the factor from SI to the unit there."""
+    """Column of shots on an axis, with the factor from SI."""
 
     column: str
     label: str
@@ -107,7 +107,7 @@ _RESTITUTION = Shown("restitution", "restitution", "", 1.0)
 
 
 def rebound_chart(study: ShotsStudy, over: Shown) -> Chart:
-    """Restitution and rebound height of every shot over one number that was drawn."""
+    """Restitution and rebound height over a drawn number."""
     height = Shown("rebound_height", "rebound height", *length_unit(study.shots.rebound_height))
     panels = [
         _rebound_panel(study, over, shown)
@@ -146,7 +146,7 @@ def _rebound_panel(study: ShotsStudy, over: Shown, shown: Shown) -> Panel:
 
 
 def _dots(study: ShotsStudy, over: Shown, shown: Shown) -> tuple[Curve, Curve, Curve]:
-    """One number over another: of all shots, of the highest, and of the centred one."""
+    """All shots, the highest, and the centred one."""
     x, y, best = over.of(study.shots), shown.of(study.shots), study.highest
     alone = over.of(study.centric), shown.of(study.centric)
     return (
@@ -160,7 +160,7 @@ def _dots(study: ShotsStudy, over: Shown, shown: Shown) -> tuple[Curve, Curve, C
 
 
 def distribution_chart(study: ShotsStudy) -> Chart:
-    """Histogram and share of shots below, of the rebound height; of the restitution without."""
+    """Histogram and cumulative share of the rebound height, or of the restitution."""
     shown = Shown("rebound_height", "rebound height", *length_unit(study.shots.rebound_height))
     if not np.isfinite(study.shots.rebound_height).all():
         shown = _RESTITUTION
@@ -237,7 +237,7 @@ def peak_chart(study: ShotsStudy) -> Chart:
 
 
 def height_traces_chart(study: ShotsStudy) -> Chart:
-    """Height of the centre of mass over time, as long as the highlighted shots last."""
+    """Height of the centre of mass while the highlighted shots last."""
     unit, factor = length_unit(study.shot_traces.height)
     ends = [_last(traces.time, traces.height[row]) for traces, row, *_ in _bold(study)]
     limit = _LONGER * max(ends)
@@ -280,7 +280,7 @@ def force_traces_chart(study: ShotsStudy) -> Chart:
 
 
 def _last(time: Floats, values: NDArray[np.float32]) -> float:
-    """Last time [s] at which something is known, (k,) or (k, n) of it."""
+    """Last time [s] with a known value, (k,) or (k, n)."""
     known = np.isfinite(values).reshape(len(time), -1).any(axis=1)
     return float(time[known][-1]) if known.any() else float(time[-1])
 
@@ -296,7 +296,7 @@ def _lines(
     factors: tuple[float, float],
     limit: float,
 ) -> tuple[Curve, ...]:
-    """Many thin lines up to ``limit`` [s], the first with the name of all; on top the bold ones."""
+    """Many thin lines up to ``limit`` [s], and bold ones on top."""
     shots = study.shot_traces
     thin = range(min(study.shots.count, _MOST_TRACES))
     looks: list[tuple[ShotTraces, int, str, Colour, Style, float]] = [
@@ -322,7 +322,7 @@ def _lines(
 
 
 def _bold(study: ShotsStudy) -> tuple[tuple[ShotTraces, int, str, Colour, Style, float], ...]:
-    """Traces, row, label, colour, style and width of the lowest, the highest and the centred."""
+    """Traces, row, label, colour, style and width of the lowest, highest and centred."""
     lowest, highest = int(np.nanargmin(study.shots.restitution)), study.highest
     shots, low, high = study.shot_traces, shot_name(lowest), shot_name(highest)
     return (

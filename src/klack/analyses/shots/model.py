@@ -154,7 +154,7 @@ def _model(
 def _candidates(
     case: Case, problem: ContactProblem, height: float, drawn_height: float
 ) -> ContactSpace:
-    """Contact points that close in a centred impact or in one from the farthest placements."""
+    """Contact points that close in centred or farthest placements."""
     farthest = extreme_placements(case, drawn_height)
     off_axis = max(float(np.linalg.norm(aside)) for aside, _ in farthest)
     about, centre = np.array([0.0, 0.0, height]), problem.pair.upper.centre_of_mass
@@ -168,7 +168,7 @@ def _candidates(
 
 
 def _force_span(problem: ContactProblem, model: InterfaceModel) -> float:
-    """Length of the record of a first impact [s]: some times half a period on a linear spring."""
+    """Record of a first impact [s]: some half periods on a linear spring."""
     static = problem.static
     stiffness = static.max_force / float(static.approach[-1])
     inverse = sum(1.0 / mass for mass in model.masses)

@@ -1,4 +1,4 @@
-"""One drop of a valve at the interface level: from a draw to its numbers."""
+"""One drop of a valve at the interface level."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -106,18 +106,18 @@ class ShotSetup:
         return replace(self.model, friction=faces)
 
     def gaps_of(self, draw: ShotDraw) -> "ShotGaps":
-        """Gaps as a function of the placement, with the ring of this draw."""
+        """Gaps by placement, with the ring of this draw."""
         added = self.radial * draw.radial_deviation(self.angle)
         return ShotGaps(self.gaps, added, self.opposite_gap, self.opposite_slope)
 
     def placement(self, draw: ShotDraw) -> NDArray[np.float64]:
-        """Rigid placement (6,) of the moving body at the start, but for its height."""
+        """Rigid placement (6,) at the start, without its height."""
         return rigid_placement(draw.aside, draw.lean, self.about, self.model.centre)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ShotGaps:
-    """Gaps [m] at a rigid placement, with what an out-of-round ring adds to them."""
+    """Gaps [m] at a rigid placement, with those of an out-of-round ring."""
 
     exact: RigidGaps
     added: NDArray[np.float64]
@@ -198,7 +198,7 @@ def simulate_shot(
 def run_shot(
     setup: ShotSetup, draw: ShotDraw, worn: NDArray[np.float64] | None = None
 ) -> ShotOutcome:
-    """Simulate one shot and measure its first impact and its rebound."""
+    """Simulate a shot; measure its first impact and rebound."""
     with collected_warnings() as doubts:
         result = simulate_shot(setup, draw, worn=worn)
     first = measure_impact(result.impacts[0].history)
@@ -262,7 +262,7 @@ def traces_of(setup: ShotSetup, outcomes: Sequence[ShotOutcome]) -> ShotTraces:
 
 
 def _path(result: InterfaceResult) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Height of the centre of mass over time: all steps of impacts, parabolas in flight."""
+    """Height of the centre of mass: all steps of impacts, parabolas in flight."""
     motion = result.motion
     z, v = motion.position[:, 2], motion.velocity[:, 2]
     times, heights = [], []
@@ -299,7 +299,7 @@ def _path(result: InterfaceResult) -> tuple[NDArray[np.float64], NDArray[np.floa
 def _highest(
     time: NDArray[np.float64], height: NDArray[np.float64], release: float, second: float
 ) -> float:
-    """Highest place between two impacts; nan if the record ends before it was reached."""
+    """Highest place between two impacts; nan if the record ends before."""
     end = second if np.isfinite(second) else np.inf
     flight = np.flatnonzero((time >= release) & (time <= end))
     if not len(flight):
@@ -313,7 +313,7 @@ def _highest(
 def _rocking(
     setup: ShotSetup, result: InterfaceResult, release: float, first: ImpactMeasures
 ) -> float:
-    """Kinetic energy across the axis and of rotation after the impact, over that of approach."""
+    """Energy across the axis and of rotation after the impact, over that of approach."""
     motion = result.motion
     after = min(int(np.searchsorted(motion.time, release)), len(motion.time) - 1)
     v = motion.velocity[after]

@@ -1,4 +1,4 @@
-"""Record of ``klack shots``, one row per shot: many drops of one valve, and the centred drop."""
+"""Record of ``klack shots``: drops in rows, and the centred drop."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -159,7 +159,7 @@ FIRST_IMPACT: tuple[Measure[Shot], ...] = described_in(
         definition="Integral of the contact force over the first impact, with all its contacts.",
     ),
 )
-"""Of the first impact; the first two tell how high it comes back."""
+"""Of the first impact; the first two tell the rebound."""
 
 ROCKING = Measure[Shot](
     key="rocking",
@@ -277,7 +277,7 @@ RULE_MEASURES: tuple[Measure[RuleVerdict], ...] = described_in(
         json_name="shots_at_least_as_high_as_centric",
     ),
 )
-"""Of the rule that takes the highest rebound of all shots for the centred one."""
+"""Of the rule that the highest rebound is the centred one."""
 
 
 @with_columns(

@@ -168,13 +168,13 @@ class DroppedShots:
         return ShotColumns.of([item.numbers for item in self.outcomes])
 
     def worn_before(self, index: int) -> Worn | None:
-        """Set of the faces [m] that a shot meets; None for new or elastic ones."""
+        """Set of the faces [m] before a shot; None for new or elastic ones."""
         worn = self.outcomes[index - 1].worn if index > 0 else np.zeros(0)
         return worn if len(worn) else None
 
     @cached_property
     def centric(self) -> ShotColumns:
-        """Numbers of the centred shot as columns of one row."""
+        """Columns of the centred shot, one row."""
         return ShotColumns.of([self.alone.numbers])
 
 
@@ -187,7 +187,7 @@ def drop_shots(
     log: ShotLog,
     progress: Progress,
 ) -> DroppedShots:
-    """Draw so many shots, compute those that the log does not have, and the centred one."""
+    """Draw shots, compute those missing in the log, and the centred one."""
     draws = [draw_shot(case, seed, index, model.touch_height) for index in range(count)]
     progress("shots", 0.0)
     setup, centric = model.setup, centric_draw(case)
@@ -204,7 +204,7 @@ def drop_shots(
 def _one_after_another(
     setup: ShotSetup, draws: Sequence[ShotDraw], log: ShotLog, progress: Progress
 ) -> tuple[ShotOutcome, ...]:
-    """Shots on faces that yield: each meets them as those before have left them."""
+    """Shots on yielding faces, as those before have left them."""
     outcomes: list[ShotOutcome] = []
     for draw in draws:
         worn = outcomes[-1].worn if outcomes else None
@@ -219,7 +219,7 @@ def _one_after_another(
 def run_shots_on(
     workers: int, setup: ShotSetup, draws: Sequence[ShotDraw], log: ShotLog, progress: Progress
 ) -> None:
-    """Run the shots missing in the log, and add them; an error names the first that fails."""
+    """Add missing shots to the log; an error names the first that fails."""
     with LoggedWork(run_shot, setup, workers, log, "shot {}".format, fewest=3) as work:
         progress("shots", len(log.done) / len(draws))
         for _ in work.completed({draw.index: draw for draw in draws}):
@@ -260,7 +260,7 @@ def judge_rule(shots: ShotColumns, centric: ShotColumns, highest: int) -> RuleVe
 
 
 def highest_of(shots: ShotColumns) -> int | None:
-    """Row with the highest rebound; None where no shot reached the top of its rebound."""
+    """Row with the highest rebound; None if none reached its top."""
     complete = np.isfinite(shots.rebound_height) & np.isfinite(shots.restitution)
     if not np.any(complete):
         return None
@@ -270,7 +270,7 @@ def highest_of(shots: ShotColumns) -> int | None:
 def _pressures(
     setup: ShotSetup, pictured: Mapping[str, tuple[ShotDraw, Worn | None]]
 ) -> dict[str, PressureRecord]:
-    """Contact forces point by point of the first impact of some shots, on their faces."""
+    """Point forces of the first impact of some shots, on their faces."""
     records = {}
     for name, (draw, worn) in pictured.items():
         result = simulate_shot(setup, draw, impacts=1, points=True, worn=worn)
@@ -374,7 +374,7 @@ def _unfinished(shots: ShotColumns) -> tuple[str, ...]:
 
 
 def shot_doubts(dropped: DroppedShots) -> tuple[str, ...]:
-    """Doubts of single shots, those that differ in numbers only as one; and energy from nowhere."""
+    """Doubts of single shots, alike ones once; and energy from nowhere."""
     notes = [f"The centred shot: {doubt}" for doubt in dropped.alone.doubts]
     notes += grouped_doubts(((item.index, item.doubts) for item in dropped.outcomes), "shots")
     residual = float(np.max(np.abs(dropped.shots.energy_residual)))

@@ -55,7 +55,7 @@ def shots_answer(study: ShotsStudy) -> str:
 
 
 def shot_name(index: int) -> str:
-    """Name of a shot in tables and legends; counted from 0, as in the result."""
+    """Name of a shot; counted from 0, as in the result."""
     return f"shot {index}"
 
 
@@ -75,14 +75,14 @@ def length_unit(values: ArrayLike) -> tuple[str, float]:
 
 
 def plain(value: float, decimals: int) -> str:
-    """Number with fixed decimals in a table of a report; a dash where there is none."""
+    """Number with fixed decimals; a dash without one."""
     if not np.isfinite(value):
         return "–"
     return f"{value:.{decimals}f}".replace("-", "\N{MINUS SIGN}")
 
 
 def degrees(angle: float) -> str:
-    """Whole degrees from 0 to 359 of an angle [rad]; a dash where there is none."""
+    """Whole degrees, 0 to 359, of an angle [rad]; a dash without one."""
     return f"{round(np.degrees(angle)) % 360}" if np.isfinite(angle) else "–"
 
 

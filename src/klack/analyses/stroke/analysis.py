@@ -262,7 +262,7 @@ def stroke_told(study: StrokeStudy) -> Iterator[TextTable | str]:
 
 
 def stroke_measured(study: StrokeStudy) -> Iterator[Measured]:
-    """Every variant and each of its impacts with its measures."""
+    """Every variant and impact with its measures."""
     for name, variant in study.variants.items():
         yield name, variant, VARIANT_MEASURES
         counts, called = Counter[str](), list[str]()
@@ -275,7 +275,7 @@ def stroke_measured(study: StrokeStudy) -> Iterator[Measured]:
 
 
 def time_rows(study: StrokeStudy) -> tuple[tuple[str, ...], ...]:
-    """Rows of :data:`TIME_COLUMNS`: opening and closing of every body between stops, in order."""
+    """Rows of :data:`TIME_COLUMNS`, for every body between stops."""
     return tuple(
         (
             variant.name,
@@ -295,7 +295,7 @@ def time_rows(study: StrokeStudy) -> tuple[tuple[str, ...], ...]:
 
 
 def change_name(event: ImpactEvent, change: ImpactChange) -> str:
-    """Which impact changes so, and what is not promised of it, or why it has no numbers."""
+    """Impact of a change, and what is not promised, or why numbers are missing."""
     number = f" {change.number}" if change.number else ""
     later = change.number and not change.promised and not change.reason
     note = change.reason or ("not promised" if later else "")
@@ -303,7 +303,7 @@ def change_name(event: ImpactEvent, change: ImpactChange) -> str:
 
 
 def _changes_told(variant: StrokeVariant) -> Iterator[TextTable]:
-    """What doubled steps change in promised impacts; nothing where that was not asked for."""
+    """Changes of promised impacts with doubled steps, if asked for."""
     pairs = zip(variant.result.events, variant.changes, strict=False)
     named = [(change_name(event, change), change) for event, change in pairs if change.promised]
     if named:
@@ -312,7 +312,7 @@ def _changes_told(variant: StrokeVariant) -> Iterator[TextTable]:
 
 
 def _axis_told(study: StrokeStudy, variant: StrokeVariant) -> Iterator[TextTable]:
-    """Where the axis is at the start and at each touch; nothing for a motion along the axis."""
+    """Axis at the start and at each touch, in three dimensions."""
     moments = [("start", float(variant.result.time[0]))]
     moments += [(event.stop, event.time) for event in variant.result.events[:_TOLD]]
     rows = [
@@ -326,7 +326,7 @@ def _axis_told(study: StrokeStudy, variant: StrokeVariant) -> Iterator[TextTable
 
 
 def yield_told(variant: StrokeVariant) -> Iterator[str]:
-    """What yield has left on the faces of each stop."""
+    """Yield left on the faces of each stop."""
     for stop, faces in variant.result.faces.items():
         if faces.set > 0.0:
             lost = variant.result.books.losses.get(f"{stop} contact", 0.0)
@@ -338,7 +338,7 @@ def yield_told(variant: StrokeVariant) -> Iterator[str]:
 
 
 def touch_event(variant: StrokeVariant, passage: Passage) -> ImpactEvent | None:
-    """Impact that ends a passage, if it reaches its stop."""
+    """Impact that ends a passage at its stop."""
     return next(
         (
             event
@@ -361,7 +361,7 @@ def first_impact(variant: StrokeVariant, stop: str) -> ImpactEvent | None:
 
 
 def start_text(variant: StrokeVariant) -> str:
-    """Equilibrium from which a variant began, in one line; empty if it began in none."""
+    """Equilibrium at the start, in one line; empty without one."""
     start = variant.result.start
     if start is None:
         return ""
@@ -376,7 +376,7 @@ def start_text(variant: StrokeVariant) -> str:
 
 
 def _from_to(displacements: list[float]) -> str:
-    """Where the points of a body are: one displacement if it is rigid."""
+    """Displacements of the points of a body; one if it is rigid."""
     ends = dict.fromkeys((min(displacements), max(displacements)))
     return " to ".join(format_si(y, "m", 3) for y in ends)
 
@@ -392,7 +392,7 @@ def _moment(time: float | None) -> str:
 
 
 def stroke_answer(study: StrokeStudy) -> str:
-    """Opening, closing and impacts of the reference, and how the other variants differ."""
+    """Opening, closing and impacts of the reference; differences of others."""
     variant = study.reference
     times = variant.needle_times
     ways = [_opening(study, variant), _closing(study, variant)]
@@ -410,7 +410,7 @@ def stroke_answer(study: StrokeStudy) -> str:
 
 
 def largest(variant: StrokeVariant, channels: tuple[str, ...]) -> float:
-    """Largest magnitude of some channels over the run; nan if there are none."""
+    """Largest magnitude of some channels; nan without any."""
     found = [data for name in channels if (data := variant.channel(name)) is not None]
     return max((float(np.abs(data.values).max(initial=0.0)) for data in found), default=np.nan)
 
@@ -499,7 +499,7 @@ def _renewed(study: StrokeStudy) -> StrokeStudy:
 
 
 def _renamed(study: StrokeStudy) -> StrokeStudy:
-    """Mass flows under the names of today: formerly those of restrictions were called flow."""
+    """Names of today for mass flows: those of restrictions were called flow."""
     variants = {
         name: replace(
             variant,

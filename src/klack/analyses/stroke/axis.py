@@ -1,4 +1,4 @@
-"""Axis of a needle that moves in three dimensions: at each touch, and in figures."""
+"""Axis of a needle in three dimensions: at each touch, and in figures."""
 
 from dataclasses import dataclass
 
@@ -57,7 +57,7 @@ def moves_in_space(study: StrokeStudy, variant: StrokeVariant) -> bool:
 
 
 def axis_place(study: StrokeStudy, variant: StrokeVariant, time: float) -> AxisPlace | None:
-    """Place of the axis at a moment, between records; None for a motion along the axis."""
+    """Axis at a moment, between records; None for a motion along the axis."""
     found = []
     for what in ("x", "y", "tilt x", "tilt y"):
         channel = variant.channel(f"{study.needle} {what}")
@@ -68,13 +68,13 @@ def axis_place(study: StrokeStudy, variant: StrokeVariant, time: float) -> AxisP
 
 
 def acts_across(variant: StrokeVariant) -> tuple[str, ...]:
-    """Magnets and seats that act across the axis in a variant."""
+    """Magnets and seats that act across the axis."""
     end = " side force x"
     return tuple(name.removesuffix(end) for name in variant.result.channels if name.endswith(end))
 
 
 def guide_of(study: StrokeStudy) -> ValveGuide | None:
-    """Section ``guide`` of the case, which was checked when it was run."""
+    """Section ``guide`` of the case."""
     given = YAML(typ="safe").load(study.case_text).get("guide")
     return None if given is None else ValveGuide.model_validate(given)
 
@@ -155,7 +155,7 @@ def axis_path_chart(study: StrokeStudy) -> Chart | None:
 
 
 def axis_over_time_chart(study: StrokeStudy) -> Chart | None:
-    """Position at the seat, tilt, and forces of the guide, for a motion in three dimensions."""
+    """Position at the seat, tilt, and guide forces, in three dimensions."""
     variant = study.reference
     if not moves_in_space(study, variant):
         return None
@@ -196,7 +196,7 @@ def axis_over_time_chart(study: StrokeStudy) -> Chart | None:
 
 
 def _path(variant: StrokeVariant, number: int) -> Floats:
-    """Position (n, 2) [um] of the axis at a height of the guide."""
+    """Position (n, 2) [um] of the axis at a guide height."""
     found = [variant.channel(f"guide {number} {a}") for a in "xy"]
     return 1e6 * np.column_stack([channel.values for channel in found if channel is not None])
 
@@ -237,7 +237,7 @@ def _panel(
     least: float,
     first: int = 0,
 ) -> Panel:
-    """Curves over time; the axis spans at least ``least``, so that round-off stays a line."""
+    """Curves over time; the axis spans at least ``least``."""
     curves = []
     for k, (channel, word) in enumerate(names):
         data = variant.channel(channel)

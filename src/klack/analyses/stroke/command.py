@@ -1,4 +1,4 @@
-"""``klack stroke``: one actuation of a whole valve, in one or several variants."""
+"""``klack stroke``: one actuation of a whole valve."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -145,7 +145,7 @@ def _checked_case(
     *,
     check_steps: bool | None = None,
 ) -> "ValveCase":
-    """Read the case; duration, step and accuracy of the command line replace its own."""
+    """Read the case, with duration, step and accuracy of the command line."""
     from klack.case.any_case import load_valve_case
 
     case = load_valve_case(path, components)

@@ -111,13 +111,12 @@ def _named(*charts: AnyChart | None) -> tuple[AnyChart, ...]:
 
 
 def _flexible(study: StrokeStudy) -> list[str]:
-    """Variants with elastic bodies; all if there are none."""
     found = [name for name, variant in study.variants.items() if variant.flexible]
     return found or list(study.variants)
 
 
 def _comparison(study: StrokeStudy, *, wet: bool) -> Section:
-    """Compare dry with wet, or lumped with flexible, if there is something to compare."""
+    """Dry against wet, or lumped against flexible, if there are both."""
     if wet:
         names, title = _flexible(study), "Dry and wet"
         kinds = {study.variants[name].wet for name in names}
@@ -374,7 +373,7 @@ def _row(measure: Measure[StrokeVariant], variants: list[StrokeVariant]) -> tupl
 
 
 def _energy_table(study: StrokeStudy) -> Table:
-    """Every entry of the energy balance that is not zero in all variants."""
+    """Entries of the energy balance that are not zero in all variants."""
     variants = list(study.variants.values())
     books = [variant.result.books for variant in variants]
     rows: list[tuple[str, ...]] = []
@@ -419,7 +418,7 @@ def _energy(value: float | None, books: EnergyBooks) -> str:
 
 
 def _next_steps(study: StrokeStudy) -> tuple[NextStep, ...]:
-    """Commands that work with this result: without stops there is no sound."""
+    """Commands for this result: without stops there is no sound."""
     sounds = bool(study.reference.result.interfaces)
     return tuple(step for step in NEXT_STEPS if sounds or step is not _SOUND)
 
@@ -477,7 +476,7 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
 
 
 def _along_the_axis(study: StrokeStudy) -> str:
-    """What does not follow a needle off its axis."""
+    """What does not follow an off-axis needle."""
     across = [f"'{name}'" for name in acts_across(study.reference)]
     if not across:
         return (

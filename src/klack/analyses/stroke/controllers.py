@@ -1,4 +1,4 @@
-"""Controllers in place of those of a case: FMUs, by component."""
+"""FMUs in place of controllers, by component."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -29,7 +29,7 @@ def controller_files(given: Sequence[str]) -> dict[str, Path]:
 
 
 def with_controllers(case: ValveCase, files: Mapping[str, Path]) -> ValveCase:
-    """A case with FMUs in place of the controllers of some components."""
+    """Case with FMUs in place of some controllers."""
     components = dict(case.network.components)
     controlled = [name for name, part in components.items() if isinstance(part, Controlled)]
     for name, file in files.items():
@@ -49,7 +49,7 @@ def with_controllers(case: ValveCase, files: Mapping[str, Path]) -> ValveCase:
 
 
 def controller_notes(case: ValveCase) -> tuple[str, ...]:
-    """Which FMUs control a run: its record holds the case, not them."""
+    """FMUs of a run, which its record does not hold."""
     notes = []
     for name, part in case.network.components.items():
         law = part.own_law if isinstance(part, Controlled) else None

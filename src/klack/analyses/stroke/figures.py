@@ -41,7 +41,7 @@ _LOOKS: dict[str, Look] = {
 _TIME = AxisSpec(label="time", unit="ms")
 _ZERO = Mark(value=0.0, axis="y")
 _SMALL = 0.01
-"""Share of a bar below which a part goes to "everything else"."""
+"""Share of a bar below which a part is "everything else"."""
 _MOST_PARTS = 7
 _KINDS = {
     "flow": "throttling",
@@ -51,14 +51,14 @@ _KINDS = {
     "friction": "friction in lines",
     "(stored)": "stored in bodies, springs and fluid",
 }
-"""Last word of an entry of the energy balance: its kind in the bars."""
+"""Last word of an entry of the energy balance: its kind."""
 
 
 # --------------------------------------------------------------------------- whole stroke
 
 
 def actuation_chart(study: StrokeStudy) -> Chart:
-    """Everything about the reference on one time axis, from the voltage to the motion."""
+    """Reference on one time axis, from voltage to motion."""
     variant, channels = study.reference, study.channels
     panels = [
         _channel_panel(variant, names, AxisSpec(label=label, unit=unit), factor, share)
@@ -93,7 +93,7 @@ def actuation_chart(study: StrokeStudy) -> Chart:
 def variants_chart(
     study: StrokeStudy, names: Sequence[str], *, name: str, title: str, note: str
 ) -> Chart:
-    """Lift, velocity and force on each stop of several variants over each other."""
+    """Lift, velocity and stop forces of several variants."""
     variants = [study.variants[key] for key in names]
     panels = [
         _variant_panel(variants, study.channels.lift, AxisSpec(label="lift", unit="µm"), 1e6, 0.6),
@@ -184,7 +184,7 @@ def _moments(
 
 
 def shown_stops(study: StrokeStudy) -> tuple[str, ...]:
-    """Both stops in the order of a stroke: the opening stop first."""
+    """Both stops, the opening stop first."""
     names = (study.channels.opening_stop, study.channels.seat)
     return tuple(name for name in names if name)
 
@@ -249,7 +249,7 @@ def _window(events: Sequence[ImpactEvent]) -> tuple[float, float]:
 def _forces(
     variant: StrokeVariant, stop: str, event: ImpactEvent, window: tuple[float, float]
 ) -> tuple[Floats, Floats, Floats]:
-    """Time since first touch [us], contact and film force [N] in fine steps; zero in flight."""
+    """Time since touch [us], contact and film force [N] in fine steps; zero in flight."""
     record = variant.result.interfaces[stop]
     time = 1e6 * (record.time + 0.5 * record.step - event.time)
     seen = (time >= window[0]) & (time <= window[1])
@@ -262,7 +262,7 @@ def _forces(
 def _with_flights(
     time: Floats, step: Floats, forces: tuple[Floats, Floats], window: tuple[float, float]
 ) -> tuple[Floats, Floats, Floats]:
-    """Insert zeros at both ends of every stretch without a record."""
+    """Zeros at both ends of stretches without a record."""
     if not time.size:
         ends = np.array(window)
         return ends, np.zeros(2), np.zeros(2)
@@ -279,7 +279,7 @@ def _with_flights(
 def _gap(
     variant: StrokeVariant, stop: str, event: ImpactEvent, window: tuple[float, float]
 ) -> tuple[Floats, Floats]:
-    """Time since first touch [us] and gap [um]: fine steps, and between them the records."""
+    """Time since touch [us] and gap [um]: fine steps, records between them."""
     record = variant.result.interfaces[stop]
     time, gap = 1e6 * (record.time + record.step - event.time), 1e6 * record.gap
     coarse = variant.channel(f"{stop} gap")
@@ -388,7 +388,7 @@ def _contacts(variant: StrokeVariant, zero: float, window: tuple[float, float]) 
 
 
 def _staggered(marks: Sequence[Mark]) -> tuple[Mark, ...]:
-    """Only the first marks have labels, which would otherwise fill the panel."""
+    """Only the first marks have labels, else they fill the panel."""
     return tuple(mark if i < 4 else Mark(value=mark.value) for i, mark in enumerate(marks))
 
 
@@ -453,7 +453,7 @@ def stop_law_chart(stop: StopSummary, *, in_space: bool = False) -> Chart | None
 
 
 def energy_bars(study: StrokeStudy) -> BarChart:
-    """Energy supplies and losses of each run, solenoid included."""
+    """Energy supplies and losses of each run, with the solenoid."""
     return _bars(
         study,
         name="energy",
@@ -468,7 +468,7 @@ def energy_bars(study: StrokeStudy) -> BarChart:
 
 
 def mechanical_energy_bars(study: StrokeStudy) -> BarChart | None:
-    """The same without the circuit: what the magnet did as work, and what became of it."""
+    """The same without the circuit: work of the magnet, and its losses."""
     coils = tuple(name.removesuffix("current") for name in study.channels.current)
     if not coils:
         return None
@@ -501,7 +501,7 @@ def mechanical_energy_bars(study: StrokeStudy) -> BarChart | None:
 
 
 def _flows(books: EnergyBooks) -> dict[str, float]:
-    """Every entry of the energy balance over the run [J]: above zero is a supply."""
+    """Entries of the energy balance [J]: positive is a supply."""
     entries = dict(books.supplies)
     for key, value in books.losses.items():
         entries[key] = entries.get(key, 0.0) - value
@@ -564,7 +564,7 @@ _SHARE = 0.8
 
 
 def loop_chart(study: StrokeStudy) -> Chart | None:
-    """Flux over current of the reference; None without hysteresis."""
+    """Flux over current of the reference, with hysteresis."""
     variant = study.reference
     losses, channels = variant.result.books.losses, variant.result.channels
     coils = [name.removesuffix(" hysteresis") for name in losses if name.endswith(" hysteresis")]

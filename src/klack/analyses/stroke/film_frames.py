@@ -1,4 +1,4 @@
-"""Pressure in the sectors of squeeze films about the first impacts, as an animation."""
+"""Animated pressure in sectors of squeeze films at first impacts."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +40,7 @@ _FELT = 0.1  # [bar] of some sector, from the first frame to the last
 
 
 def film_charts(variant: StrokeVariant) -> tuple[RingFrames, ...]:
-    """Animations of the first impacts of a variant that have a film with sectors."""
+    """Animations of first impacts with a film in sectors."""
     found = [item for item in recorded_impacts(variant) if item[2].film is not None]
     charts = [_chart(variant, *item, left=len(found) - _CHARTS) for item in found[:_CHARTS]]
     return tuple(chart for chart in charts if chart is not None)
@@ -81,7 +81,7 @@ def _chart(
 
 
 def _moments(time: Floats, pressure: Floats) -> NDArray[np.int64]:
-    """Places of the frames, while the film is felt: even in time and in the change of colours."""
+    """Places of frames, while the film acts: even in time and in change of colours."""
     felt = np.flatnonzero(np.abs(pressure).max(axis=1) > _FELT)
     first, last = (int(felt[0]), int(felt[-1]) + 1) if len(felt) > 1 else (0, len(time))
     time, colour = time[first:last], np.arcsinh(pressure[first:last])

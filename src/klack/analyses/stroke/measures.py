@@ -1,4 +1,4 @@
-"""Measures of a stroke: of every impact, and of a variant as a whole."""
+"""Measures of impacts and variants of a stroke."""
 
 from operator import attrgetter
 from typing import Literal
@@ -22,7 +22,7 @@ def real_time_factor(variant: StrokeVariant) -> float:
 
 
 def steps_told(variant: StrokeVariant) -> str:
-    """Number and size of the steps of each kind, in words."""
+    """Number and size of the steps of each kind."""
     done, sizes = variant.result.steps, variant.result.sizes
     fine = format_si(sizes.step, "s", 3)
     if variant.halvings:
@@ -121,7 +121,7 @@ EVENT_MEASURES: tuple[Measure[ImpactEvent], ...] = described_in(
         page=True,
     ),
 )
-"""Of one impact; contacts closer together than the longest period of the needle are one."""
+"""Of one impact; contacts closer than the longest period of the needle are one."""
 
 
 def _at_shares(way: Literal["opening", "closing"]) -> tuple[Measure[StrokeVariant], ...]:

@@ -1,4 +1,4 @@
-"""Missing parts of the record of a stroke: runs that ended early, truncated fine records."""
+"""Missing parts of a stroke: early ends, truncated fine records."""
 
 from collections.abc import Mapping, Sequence
 
@@ -39,7 +39,7 @@ def missing_notes(
 
 
 def cut_records(result: NetworkResult) -> dict[str, float]:
-    """Stops whose fine record was full before the end of the run, and where it ends [s]."""
+    """Stops whose fine record was full early, and where it ends [s]."""
     return {
         stop: float(record.time[-1] + record.step[-1]) if record.time.size else float("nan")
         for stop, record in result.interfaces.items()

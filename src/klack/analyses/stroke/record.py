@@ -1,4 +1,4 @@
-"""Record of a stroke study: the same valve in several variants."""
+"""Record of a stroke study: a valve in several variants."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -202,7 +202,7 @@ class StrokeVariant:
 
     @property
     def needle_times(self) -> LiftTimes:
-        """Opening and closing of the needle; of older results, its touches only."""
+        """Opening and closing of the needle; of older results, its touches."""
         if self.times:
             return self.times[0]
         touches = [
@@ -220,7 +220,7 @@ class StrokeVariant:
         )
 
     def impacts(self, stop: str, *, slowest: float = 0.0) -> tuple[ImpactEvent, ...]:
-        """Impacts on one stop, faster than ``slowest`` [m/s], in order of time."""
+        """Impacts on one stop, faster than ``slowest`` [m/s]."""
         return tuple(
             event
             for event in self.result.events
@@ -228,7 +228,7 @@ class StrokeVariant:
         )
 
     def channel(self, name: str) -> ChannelData | None:
-        """Return a recorded channel; None if this variant has none of this name."""
+        """Recorded channel, if this variant has it."""
         return self.result.channels.get(name)
 
 
@@ -272,7 +272,7 @@ class StrokeStudy(CaseRecord):
 
     @property
     def reference(self) -> StrokeVariant:
-        """First variant: the one that the others are compared with."""
+        """First variant, with which others are compared."""
         return next(iter(self.variants.values()))
 
     @property
@@ -287,7 +287,7 @@ class StrokeStudy(CaseRecord):
 
 
 class IncompleteStrokeError(ConvergenceError):
-    """A variant failed during the run; ``study`` has it until then, and all variants before it."""
+    """A variant failed; ``study`` has it until then, and those before it."""
 
     def __init__(self, text: str, study: StrokeStudy) -> None:
         super().__init__(text)

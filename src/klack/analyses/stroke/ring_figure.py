@@ -1,4 +1,4 @@
-"""Line load round the ring over time, one field for each impact."""
+"""Line load round the ring over time for each impact."""
 
 import numpy as np
 from matplotlib import rc_context
@@ -19,7 +19,7 @@ _NOTHING = 1e-9  # of the highest load: round-off
 
 
 def line_load_picture(variant: StrokeVariant) -> Picture | None:
-    """Draw the first impacts of a variant, if any were recorded."""
+    """Draw the first impacts, if any were recorded."""
     found = recorded_impacts(variant)
     shown = found[:_SHOWN]
     if not shown:

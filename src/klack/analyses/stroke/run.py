@@ -1,4 +1,4 @@
-"""``klack stroke``: one actuation of a whole valve, in the requested variants."""
+"""``klack stroke``: one actuation in the requested variants."""
 
 import warnings
 from collections import defaultdict
@@ -125,7 +125,7 @@ def run_stroke(
 def stroke_notes(
     case: ValveCase, variants: Mapping[str, StrokeVariant], seat: str, warned: Sequence[str]
 ) -> tuple[str, ...]:
-    """What has to be known of variants that were computed, and was warned of on the way."""
+    """Notes on computed variants, and warnings on the way."""
     begun = [
         f"'{name}': {note}"
         for name, variant in variants.items()
@@ -159,7 +159,7 @@ def _record_notes(case: ValveCase, variants: Mapping[str, StrokeVariant]) -> Ite
 
 
 def variant_network(valve: Valve, variant: Variant) -> Network:
-    """Network of one variant of a valve: without fluid, with rigid bodies, or both."""
+    """Network of a variant: without fluid, with rigid bodies, or both."""
     network = valve.network
     if variant.startswith("dry"):
         network = network.dry()
@@ -187,7 +187,7 @@ class VariantRun:
 
 
 def _without_path(run: VariantRun) -> VariantRun:
-    """Leave out the path, which is only of use within a run: channels and impacts have it."""
+    """Leave out the path, needed only within a run: channels and impacts have it."""
     result = replace(run.variant.result, path=None)
     return replace(run, variant=replace(run.variant, result=result))
 
@@ -263,7 +263,7 @@ def run_variant(
 
 
 def _begin(case: ValveCase, after: StrokeStudy | None, name: Variant) -> NetworkResult | None:
-    """Run of a former study that a variant continues, in its steps; None to start from rest."""
+    """Run that a variant continues, in its steps; None from rest."""
     if after is None:
         return None
     if after.step != case.run.fine_step:  # the clock counts steps
@@ -289,7 +289,7 @@ def _runs(
     begins: Mapping[Variant, NetworkResult | None],
     progress: Progress,
 ) -> tuple[dict[Variant, VariantRun], ConvergenceError | None]:
-    """Variants up to the first one that fails, with what there is of it, and its error."""
+    """Variants up to the first that fails, with its part and its error."""
     runs: dict[Variant, VariantRun] = {}
     for name, after in begins.items():
         try:
@@ -468,7 +468,7 @@ def variant_of(
     result: NetworkResult,
     setup_time: float = 0.0,
 ) -> StrokeVariant:
-    """Record of one variant from its run, with the times of its needle."""
+    """Record of one variant, with the times of its needle."""
     times = all_lift_times(result, rows, roles.needle, roles.point)
     wet, flexible = not name.startswith("dry"), not name.endswith("lumped")
     return StrokeVariant(
@@ -504,19 +504,19 @@ def _label(valve: Valve, rows: Rows, *, wet: bool, flexible: bool) -> str:
 
 
 def _highest_pressure(rows: Rows) -> float:
-    """Highest pressure of the valve at the start, absolute [Pa]."""
+    """Highest absolute pressure at the start [Pa]."""
     return max((node.at_start for node in rows.nodes.values()), default=rows.ambient.pressure)
 
 
 def _lift(rows: Rows, needle: str) -> float | None:
-    """Travel between the stops [m], unloaded; None if nothing ends it."""
+    """Unloaded travel between the stops [m]; None without stops."""
     travel = Travel.of(rows)
     lift = travel.highest({needle: 1.0})[0] - travel.lowest({needle: 1.0})[0]
     return lift if isfinite(lift) else None
 
 
 def _switch_off(network: Network) -> float | None:
-    """When the drivers' command ends [s]; None if no driver says."""
+    """End of the drivers' command [s], if any."""
     drivers = [part for part in network.components.values() if isinstance(part, Driver)]
     ends = [end for driver in drivers for _, end in driver.commands()]
     return max((end for end in ends if end is not None), default=None)
@@ -568,7 +568,7 @@ def body_summaries(valve: Valve) -> tuple[BodySummary, ...]:
 
 
 def stop_summaries(valve: Valve) -> tuple[StopSummary, ...]:
-    """What a report says of the contact of each stop."""
+    """Contact of each stop, for reports."""
     return tuple(
         _stop_summary(valve, name, part)
         for name, part in valve.network.components.items()

@@ -30,10 +30,10 @@ __all__ = [
 ]
 
 NOTICED = 0.02
-"""Share of the fastest impact on a stop from which an impact counts as one."""
+"""Share of the fastest impact on a stop from which one counts."""
 
 SHARE = 0.5
-"""Of what is promised: differences of that size went with errors above the promise."""
+"""Share of the promise: such differences went with errors above it."""
 
 _PROMISED = 3  # impacts on each stop
 _TOLD = 3  # impacts in a sentence
@@ -69,11 +69,11 @@ class ImpactChange:
 
     @property
     def promised(self) -> bool:
-        """Whether klack promises the accuracy of this impact: the first three on each stop."""
+        """Whether klack promises its accuracy: the first three on each stop."""
         return 1 <= self.number <= _PROMISED
 
     def over_promise(self, accuracy: Accuracy) -> float:
-        """Change of the peak or the time over what the accuracy promises; inf without a pair."""
+        """Change of peak or time over the promised accuracy; inf without a pair."""
         if not self.promised:
             return 0.0
         if self.reason not in ("", _OPEN):
@@ -84,7 +84,7 @@ class ImpactChange:
         )
 
     def doubtful(self, accuracy: Accuracy) -> bool:
-        """Whether it changes by more than half of what the accuracy promises, or has no pair."""
+        """Whether it changes by more than half of the promise, or has no pair."""
         return self.over_promise(accuracy) > SHARE
 
 
@@ -124,7 +124,7 @@ CHANGE_MEASURES: tuple[Measure[ImpactChange], ...] = described_in(
 def impact_changes(
     events: Sequence[ImpactEvent], others: Sequence[ImpactEvent]
 ) -> tuple[ImpactChange, ...]:
-    """Change of each impact of a run to that of another, on each stop in order and near in time."""
+    """Changes between impacts of two runs, in order and near in time."""
     found: dict[int, ImpactChange] = {}
     for counted, of_other in _by_stop(events, others).values():
         found |= {
@@ -135,7 +135,7 @@ def impact_changes(
 
 
 def _by_stop(*runs: Sequence[ImpactEvent]) -> dict[str, tuple[list[ImpactEvent], ...]]:
-    """Impacts of each run on each stop, without touches that are slow beside the fastest one."""
+    """Impacts of each run by stop, without slow touches."""
     fastest: dict[str, float] = {}
     for event in chain(*runs):
         fastest[event.stop] = max(fastest.get(event.stop, 0.0), event.approach_speed)
@@ -170,7 +170,7 @@ class CheckedSteps(NamedTuple):
         return max((change.over_promise(accuracy) for change in self.changes), default=0.0)
 
     def certificate(self, accuracy: Accuracy) -> tuple[int, float]:
-        """Halvings of all steps, and the change over the promise: inf in other doubt."""
+        """Halvings, and change over the promise: inf in other doubt."""
         largest = self.largest(accuracy)
         return self.halvings, inf if self.doubt and largest <= SHARE else largest
 
@@ -193,14 +193,14 @@ def checked_steps(
 
 
 def not_checked(events: Sequence[ImpactEvent], reason: str) -> CheckedSteps:
-    """No numbers for any impact: there is no other run."""
+    """Changes without numbers: there is no other run."""
     numbers = [change.number for change in impact_changes(events, events)]
     changes = tuple(ImpactChange(number=number, reason="no other run") for number in numbers)
     return CheckedSteps(changes, f"the time steps were not checked: {reason}")
 
 
 def _pairs(run: Sequence[ImpactEvent], other: Sequence[ImpactEvent]) -> Iterator[ImpactChange]:
-    """Changes on one stop; none from the first impact on that has no counterpart."""
+    """Changes on one stop, up to the first impact without a counterpart."""
     reason = ""
     for k, event in enumerate(run):
         if not reason:
@@ -213,7 +213,7 @@ def _pairs(run: Sequence[ImpactEvent], other: Sequence[ImpactEvent]) -> Iterator
 
 
 def _change(event: ImpactEvent, other: ImpactEvent, number: int) -> ImpactChange:
-    """Change of one impact, without what the end of the runs cuts off."""
+    """Change of one impact, without what the end cuts off."""
     both = (event, other)
     over = all(isfinite(e.restitution) for e in both)
     grows = not over and any(e.peak_time - e.time > _LATE * e.contact_time for e in both)
@@ -228,7 +228,7 @@ def _change(event: ImpactEvent, other: ImpactEvent, number: int) -> ImpactChange
 
 
 def _unlike(run: Sequence[ImpactEvent], other: Sequence[ImpactEvent], k: int) -> str:
-    """Why impacts ``k`` of two runs are not the same one; empty if they are."""
+    """Why impacts ``k`` of two runs differ; empty if they are the same."""
     if k >= len(other):
         return "missing with longer steps"
     if not _near(run, other, k):
@@ -242,7 +242,7 @@ def _unlike(run: Sequence[ImpactEvent], other: Sequence[ImpactEvent], k: int) ->
 
 
 def _near(run: Sequence[ImpactEvent], other: Sequence[ImpactEvent], k: int) -> bool:
-    """Whether impacts ``k`` are the nearest to each other, and nearer than they last."""
+    """Whether impacts ``k`` are nearest to each other, and nearer than they last."""
     if k >= min(len(run), len(other)):
         return False
     apart = abs(run[k].time - other[k].time)

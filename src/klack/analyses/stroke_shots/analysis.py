@@ -65,7 +65,7 @@ RATIO_COLUMNS = ("standard deviation", "wet", "dry", "wet / dry", "its 95 % inte
 
 @with_measures(FIRST_TOUCH_MEASURES)
 class StrokeStopJson(TypedDict):
-    """First impact of a stroke on one stop, and the position at touch."""
+    """First impact on one stop, and the position at touch."""
 
 
 @with_measures(STROKE_MEASURES)
@@ -143,7 +143,7 @@ class StrokeShotsJson(TypedDict):
 
 
 def stroke_shots_to_json(study: StrokeShotsStudy) -> StrokeShotsJson:
-    """Plain numbers in SI, the unit in the key; numbers that do not exist (nan) are None."""
+    """Plain numbers in SI, the unit in the key; None for nan."""
     return {
         "schema": "klack-stroke-shots/1",
         "case": study.case,
@@ -208,7 +208,7 @@ def _ratio(wet: Scattered, dry: Scattered) -> RatioJson:
 
 
 def stroke_shots_told(study: StrokeShotsStudy) -> Iterator[TextTable | str]:
-    """Scatter of each variant, correlations, wet against dry, and the answers."""
+    """Scatter, correlations, wet against dry, and the answers."""
     row = "in a row" if study.carry else "independent"
     for name, shots in study.variants.items():
         title = f"{study.title}: {study.count} strokes {name}, {row}, seed {study.seed}"
@@ -273,7 +273,7 @@ def ratio_rows(study: StrokeShotsStudy, told: Told = told_value) -> tuple[tuple[
 
 
 def stroke_shots_measured(study: StrokeShotsStudy) -> Iterator[Measured]:
-    """The centred stroke and every other, their first impacts, and the highest rebounds."""
+    """Centred and other strokes, first impacts, highest rebounds."""
     for name, shots in study.variants.items():
         yield from _measured(f"{name} centred", shots.centric, shots.centric_stops, 0)
         for index in range(shots.strokes.count):

@@ -42,7 +42,7 @@ _MOST_TRACES = 60
 
 
 def rebound_chart(study: StrokeShotsStudy, stop: str) -> Chart | None:
-    """Rebound height and restitution over the eccentricity at touch, if any stroke rebounds."""
+    """Rebound height and restitution over the eccentricity at touch."""
     every = [shots.stops[stop] for shots in study.variants.values()]
     if not any(np.isfinite(columns.eccentricity).any() for columns in every):
         return None
@@ -133,7 +133,7 @@ _LEVER = 3e-3  # [m] of the lines that show the tilt
 
 
 def histograms(study: StrokeShotsStudy) -> Picture | None:
-    """Histogram of each measure, the variants over each other."""
+    """Histograms of each measure and variant."""
     found: dict[str, dict[str, Scattered]] = {}
     for name, shots in study.variants.items():
         for item in scattered(shots):
@@ -187,7 +187,7 @@ def _histogram(axis, items: dict[str, Scattered]) -> None:  # type: ignore[no-un
 
 
 def touch_map(study: StrokeShotsStudy) -> Picture | None:
-    """Axis of the needle at first touch of each stop, seen from above."""
+    """Axis at first touch of each stop, from above."""
     stops = [
         stop
         for stop in next(iter(study.variants.values())).stops

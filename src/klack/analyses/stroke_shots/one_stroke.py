@@ -105,7 +105,7 @@ class Starts:
 
     @classmethod
     def of(cls, valve: Valve, needle: str, seed: int) -> "Starts":
-        """Starts of a valve whose needle is this body."""
+        """Starts for a valve with this needle."""
         return cls(
             case=valve.case,
             seed=seed,
@@ -127,11 +127,11 @@ class Starts:
         return self._at(index, *position, self.friction(index))
 
     def centred(self) -> StrokeStart:
-        """Centred and upright, without Coulomb friction in the guide, which it does not touch."""
+        """Centred and upright, without friction in the guide, which it does not touch."""
         return self._at(CENTRED, np.zeros(2), np.zeros(2), 0.0)
 
     def contact_friction(self, index: int) -> float:
-        """Coefficient of friction between the faces, the mean one in the centred stroke."""
+        """Friction coefficient of the faces, the mean in the centred stroke."""
         shots = shots_of_valve(self.case)
         if index == CENTRED and shots.contact_friction is not None:
             return shots.contact_friction.mean
@@ -148,7 +148,7 @@ class Starts:
         return self._at(index, aside, lean, self.friction(index), float(end[5]))
 
     def friction(self, index: int) -> float:
-        """Coefficient of friction in the guide of a stroke."""
+        """Friction coefficient of the guide in a stroke."""
         return drawn_friction(self.case, shots_of_valve(self.case), self.seed, index)
 
     def _at(
@@ -205,7 +205,7 @@ _ENERGIES = {
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StrokeSetup:
-    """What all strokes share, sent to each process once: a valve without meshes and contacts."""
+    """Shared by all strokes, sent to each process once; no meshes and contacts."""
 
     valve: Valve
     spatial: SpatialValve
@@ -221,7 +221,7 @@ class StrokeSetup:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StrokeTask:
-    """One stroke to be computed: in which variant, and from where."""
+    """Variant and start of a stroke."""
 
     variant: Variant
     start: StrokeStart
@@ -260,7 +260,7 @@ class StrokeOutcome:
 
 
 def run_one_stroke(setup: StrokeSetup, task: StrokeTask) -> StrokeOutcome:
-    """Compute one stroke, on one thread, and measure it."""
+    """Compute and measure one stroke, on one thread."""
     start, spatial = task.start, setup.spatial
     guide = None if spatial.guide is None else spatial.guide.with_friction(start.friction)
     spatial = replace(spatial, placement=start.placement, guide=guide, model=_faces(spatial, start))
@@ -353,7 +353,7 @@ def _stroke_numbers(
 def _energies(
     valve: Valve, setup: StrokeSetup, variant: Variant, run: VariantRun
 ) -> tuple[Numbers, list[str]]:
-    """Energy into the held bodies and out of their surfaces, and why it is missing."""
+    """Energy through ports and surfaces of held bodies, or why it is missing."""
     found = dict.fromkeys(_ENERGIES, _NAN)
     if run.failure is not None:
         return found, []
@@ -377,7 +377,7 @@ def _lift(setup: StrokeSetup, result: NetworkResult) -> NDArray[np.float32]:
 
 
 def _unrest(setup: StrokeSetup, result: NetworkResult, path: SpatialPath) -> str:
-    """Doubt whether the next stroke may start where this one ends: only from rest on the seat."""
+    """Doubt about the next start: this stroke does not end at rest on the seat."""
     shots, seat = setup.valve.case.shots, setup.roles.seat
     if shots is None or not shots.carry or result.failure:
         return ""
@@ -402,7 +402,7 @@ def _lower(spatial: SpatialValve) -> str:
 def _stop_numbers(
     variant: StrokeVariant, stop: str, path: SpatialPath, arm: float, *, above: bool
 ) -> Numbers:
-    """First impact on one stop, ``arm`` [m] above the centre of mass of the needle."""
+    """First impact on a stop ``arm`` [m] above the centre of mass."""
     event, side = first_impact(variant, stop), -1.0 if above else 1.0
     if event is None:
         return {

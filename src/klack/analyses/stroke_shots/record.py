@@ -1,4 +1,4 @@
-"""Record of ``klack shots`` of a whole valve, one row per stroke, and the centred one."""
+"""Record of ``klack shots`` of a whole valve, in rows."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -179,7 +179,7 @@ RESULTS: tuple[Measure[Row], ...] = described_in(
         "without a section noise.",
     ),
 )
-"""Of the whole of a stroke, with a distribution of their own."""
+"""Of a whole stroke, with a distribution."""
 
 STROKE_MEASURES: tuple[Measure[Row], ...] = described_in(
     _THEORY,
@@ -281,7 +281,7 @@ COMPARED: tuple[Measure[Row], ...] = described_in(
         definition="Kinetic energy of the centre of mass that the impact takes.",
     ),
 )
-"""Of the first impact on a stop, with a distribution of their own."""
+"""Of the first impact on a stop, with a distribution."""
 
 FIRST_TOUCH_MEASURES: tuple[Measure[Row], ...] = described_in(
     _THEORY,
@@ -350,7 +350,7 @@ _STORED = (*STARTED, *RESULTS[:2], *STROKE_MEASURES[-2:-1], *RESULTS[2:], *STROK
 
 @with_columns(_STORED, later=("contact_friction", "faces_loss"))
 class StrokeColumns(Columns):
-    """Strokes in rows: start and results; the first results of many strokes lack some columns."""
+    """Strokes in rows: start and results; early versions lack some columns."""
 
 
 @with_columns(FIRST_TOUCH_MEASURES)
@@ -441,7 +441,7 @@ class StrokeShotsStudy(CaseRecord):
 
 
 def highest_rebound(shots: VariantShots, stop: str) -> HighestRebound | None:
-    """Find the highest rebound of all strokes of a variant, if any stroke has one."""
+    """Highest rebound of all strokes of a variant."""
     columns, alone = shots.stops[stop], shots.centric_stops[stop]
     height, off = columns.rebound_height, columns.eccentricity
     known = np.flatnonzero(np.isfinite(height) & np.isfinite(off))

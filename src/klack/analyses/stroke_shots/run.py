@@ -1,4 +1,4 @@
-"""``klack shots`` of a whole valve: many strokes in three dimensions, and the centred one."""
+"""``klack shots`` of a whole valve: strokes in three dimensions, and the centred one."""
 
 import pickle
 from collections.abc import Iterator, Mapping, Sequence
@@ -48,7 +48,7 @@ from klack.units import format_si
 __all__ = ["compute_strokes", "missing_notes", "run_stroke_shots", "stroke_setup"]
 
 _SLOW = 0.2
-"""Share of the median speed below which an impact is of another kind than the others."""
+"""Share of the median speed below which an impact is of another kind."""
 
 
 @tells_place
@@ -196,7 +196,7 @@ def compute_strokes(
 
 
 def _next(starts: Starts, variant: Variant, index: int, log: StrokeLog) -> StrokeStart:
-    """Start where the stroke before has left the needle; the first one as drawn."""
+    """Start where the stroke before ended; the first one as drawn."""
     if index == 0:
         return starts.drawn(0)
     before = log.done[variant, index - 1]
@@ -293,7 +293,7 @@ def _doubts(variants: Sequence[Variant], count: int, log: StrokeLog) -> Iterator
 
 
 def missing_notes(found: Mapping[str, VariantShots]) -> Iterator[str]:
-    """What strokes did not reach, so that statistics and the highest rebound are without them."""
+    """What strokes did not reach, and statistics leave out."""
     for name, shots in found.items():
         count = shots.strokes.count
         for stop, columns in shots.stops.items():

@@ -1,4 +1,4 @@
-"""Scatter of many strokes: interval, ratio between variants, what it goes with; and in words."""
+"""Scatter of many strokes: intervals, ratios, correlations; and in words."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -68,7 +68,7 @@ class Scattered:
 
 
 def scattered(shots: VariantShots) -> tuple[Scattered, ...]:
-    """All measures of a variant that any stroke has; those of the whole stroke first."""
+    """Measures that any stroke has; those of the whole stroke first."""
     found = [
         Scattered("", item, getattr(shots.strokes, item.key), _only(shots.centric, item.key))
         for item in RESULTS
@@ -171,7 +171,7 @@ def stroke_answers(study: StrokeShotsStudy, told: Told = told_value) -> Iterator
 
 
 def scatter_answers(study: StrokeShotsStudy, told: Told) -> Iterator[str]:
-    """Mean and standard deviation of the first impact on each stop."""
+    """Mean and standard deviation of the first impacts."""
     for name, shots in study.variants.items():
         for stop in shots.stops:
             text = _scatter(stop, scattered(shots), told)
@@ -180,7 +180,7 @@ def scatter_answers(study: StrokeShotsStudy, told: Told) -> Iterator[str]:
 
 
 def ratio_answers(study: StrokeShotsStudy) -> Iterator[str]:
-    """Standard deviations wet over dry, of the main measures."""
+    """Standard deviations of main measures, wet over dry."""
     for wet, dry in wet_and_dry(study).values():
         if wet.measure.key in _RATIOS:
             text = _ratio(wet, dry, carry=study.carry)
@@ -189,7 +189,7 @@ def ratio_answers(study: StrokeShotsStudy) -> Iterator[str]:
 
 
 def highest_answers(study: StrokeShotsStudy, told: Told) -> Iterator[str]:
-    """Whether the highest rebound from each stop is that of the most centred stroke."""
+    """Whether the highest rebound is that of the most centred stroke."""
     for name, shots in study.variants.items():
         for stop in shots.stops:
             found = highest_rebound(shots, stop)

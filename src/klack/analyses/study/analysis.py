@@ -46,7 +46,7 @@ __all__ = ["STUDY", "study_to_json"]
 
 
 class StudyColumnJson(TypedDict):
-    """A parameter, what follows from parameters, or a measure, at every point."""
+    """Parameter, linked key, or measure, at every point."""
 
     unit: Annotated[str, Field(description="SI; 1 for a pure number, empty for words.")]
     spread: Annotated[str, Field(description="How it varies, or its expression.")]
@@ -55,7 +55,7 @@ class StudyColumnJson(TypedDict):
 
 
 class IndexJson(TypedDict):
-    """Share of the variance of a measure that a parameter causes."""
+    """Share of the variance of a measure by a parameter."""
 
     first: Annotated[Real, Field(description="Alone.")]
     first_low: Real
@@ -66,7 +66,7 @@ class IndexJson(TypedDict):
 
 
 class EffectJson(TypedDict):
-    """Elementary effects of a parameter on a measure, over its whole range."""
+    """Elementary effects over the whole range of a parameter."""
 
     size: Annotated[Real, Field(description="Mean of their sizes, mu*.")]
     size_error: Annotated[Real, Field(description="Its standard error.")]
@@ -83,7 +83,7 @@ class SurrogateEffectJson(TypedDict):
 
 
 class SurrogateJson(TypedDict):
-    """Function fitted to the points of a measure; no computed value is replaced by it."""
+    """Function fitted to the points of a measure; it replaces no computed value."""
 
     kind: str
     made_of: str
@@ -302,7 +302,7 @@ def _column(item: StudyColumn) -> StudyColumnJson:
 
 
 def study_told(record: StudyRecord) -> Iterator[TextTable | str]:
-    """How each parameter varies, and the range of each measure."""
+    """Spread of each parameter, range of each measure."""
     yield TextTable(
         title=f"{record.title or record.case}, {variant_words(record)}",
         columns=("parameter", "today", "values"),

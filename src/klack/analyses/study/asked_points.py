@@ -1,4 +1,4 @@
-"""Points of a case, what is computed at each of them, and by which kind of calculation."""
+"""Points of a case, and the calculation at each of them."""
 
 import warnings
 from abc import ABC, abstractmethod
@@ -99,7 +99,7 @@ def doubts_in(caught: Iterable[warnings.WarningMessage]) -> tuple[str, ...]:
 def others_in(
     caught: Iterable[warnings.WarningMessage],
 ) -> tuple[warnings.WarningMessage, ...]:
-    """Warnings that are no doubt about a number, to be shown as usual."""
+    """Other warnings, to be shown as usual."""
     return tuple(item for item in caught if not issubclass(item.category, AccuracyWarning))
 
 
@@ -107,7 +107,7 @@ CaseT = TypeVar("CaseT", bound=CaseFile, default=Any)
 Built = TypeVar("Built", default=Any)
 
 Taken = Callable[[], Sequence[warnings.WarningMessage]]
-"""Warnings of the thread that calls it, since it called last."""
+"""Warnings of the calling thread since it called last."""
 
 
 class PointKind(ABC, Generic[CaseT, Built]):
@@ -118,9 +118,9 @@ class PointKind(ABC, Generic[CaseT, Built]):
     """
 
     builds: int
-    """Groups of points whose bodies are kept for the next ones."""
+    """Groups of points whose bodies are kept."""
     same: tuple[Key, str, str]
-    """Section of the case that is the same for all points, what it has, and what to do instead."""
+    """Section of the case that is the same for all points, its content, and the alternative."""
 
     @abstractmethod
     def asked_variant(self, study: CaseStudy) -> str | None:
@@ -139,10 +139,10 @@ class PointKind(ABC, Generic[CaseT, Built]):
 
     @abstractmethod
     def measures(self, case: CaseT, names: Iterable[str]) -> tuple[ChosenMeasure, ...]:
-        """Measures by their names, each once; an error proposes the nearest name."""
+        """Measures by name, each once; an error proposes the nearest."""
 
     def require_keys(self, keys: Iterable[PointKey]) -> None:
-        """Refuse points that exchange what is the same for all of them."""
+        """Refuse points that change what is the same for all."""
         section, what, hint = self.same
         for key in keys:
             refuse_if(
@@ -155,10 +155,10 @@ class PointKind(ABC, Generic[CaseT, Built]):
 
     @abstractmethod
     def makes_bodies(self, case: CaseT, place: Key) -> bool:
-        """Whether what is built for a group may follow from what stands there."""
+        """Whether what is built may follow from this key."""
 
     def holds_interpreter(self, asked: "AskedPoints[CaseT]") -> bool:
-        """Whether threads compute these points hardly faster than one of them."""
+        """Whether threads hardly speed these points up."""
         return True
 
     @abstractmethod
@@ -176,7 +176,7 @@ class PointKind(ABC, Generic[CaseT, Built]):
         """
 
     def close(self, built: Built) -> None:
-        """Free what was built: nothing, unless a kind says so."""
+        """Free what was built, if a kind has to."""
 
     def crew(
         self,
@@ -254,7 +254,7 @@ class PointGroup:
 
 
 def groups_of(asked: AskedPoints, places: Iterable[int]) -> tuple[PointGroup, ...]:
-    """Points that share their bodies, in the order of the first one of each group."""
+    """Points with the same bodies, in order of their first ones."""
     found: dict[tuple[tuple[Key, PointValue], ...], list[int]] = {}
     for i in places:
         changes = asked.points.changes(i).items()
@@ -264,5 +264,5 @@ def groups_of(asked: AskedPoints, places: Iterable[int]) -> tuple[PointGroup, ..
 
 
 def _makes_bodies(asked: AskedPoints, place: Key) -> bool:
-    """Whether bodies may follow from a key, or from what a parameter decides."""
+    """Whether bodies may follow from a key, or from a parameter behind it."""
     return any(asked.kind.makes_bodies(asked.case, key) for key in asked.case.behind(place))

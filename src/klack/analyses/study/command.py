@@ -105,7 +105,7 @@ def _tree(case: Path, component: Components, check_steps: bool | None) -> "CaseT
 
 @contextmanager
 def _live(progress: "Progress") -> "Iterator[dict[str, Any]]":
-    """What shows the points so far to the program that started this process, if one did."""
+    """Shows points so far to the program that started this process, if any."""
     file = os.environ.get(PROGRESS_FILE)
     if not file:
         yield {}

@@ -129,12 +129,12 @@ def _taken(
 
 
 def never_stopped() -> None:
-    """The check of work that nothing asks to stop."""
+    """Check of work that nothing stops."""
 
 
 @contextmanager
 def one_thread_of_blas() -> Iterator[None]:
-    """Let NumPy and SciPy take one thread each: points are what is computed side by side."""
+    """NumPy and SciPy on one thread each: points run side by side."""
     with _controller().limit(limits=1, user_api="blas"):
         yield
 
@@ -255,12 +255,12 @@ class Tally(Closing):
         self._progress(_STAGE, self._done / self._whole)
 
     def close(self) -> None:
-        """Show the warnings that are no doubts about numbers."""
+        """Show warnings that are no doubts."""
         show(self._others.values())
 
 
 class Builds(Closing):
-    """Bodies and laws of the latest groups, for the next points of the same case."""
+    """Bodies and laws of the latest groups."""
 
     def __init__(self) -> None:
         self._found: OrderedDict[tuple[object, ...], tuple[AskedPoints, Any]] = OrderedDict()
@@ -409,7 +409,7 @@ def _build(
 
 
 def sounds_of(asked: AskedPoints, progress: Progress) -> tuple[TimeSeries | None, ...]:
-    """Sound of a click of every point, computed once more, if there is one."""
+    """Clicks of every point, computed once more."""
     found: list[TimeSeries | None] = [None] * len(asked.points)
     done = 0
     with warnings.catch_warnings(), one_thread_of_blas():
@@ -428,7 +428,7 @@ def sounds_of(asked: AskedPoints, progress: Progress) -> tuple[TimeSeries | None
 
 
 class PointWorkers(Closing):
-    """Threads, processes or a cluster that compute points, which end when it is closed."""
+    """Threads, processes or a cluster for points; closing ends them."""
 
     count: int
     """Points that are computed at a time."""
@@ -465,7 +465,7 @@ class ThreadWorkers(PointWorkers):
         keep: Callable[[int, PointRow], None],
         progress: Progress,
     ) -> None:
-        """Compute some of the points; ``count`` are the threads that this takes, at most."""
+        """Compute some of the points; ``count`` becomes the number of threads."""
         most = compute_points(asked, places, keep, self._threads, progress, self._builds)
         self._most = max(self._most, most)
         self.count = self._most or self.count

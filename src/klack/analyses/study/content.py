@@ -164,7 +164,7 @@ def _answer(
 
 
 def _best_answer(record: StudyRecord, labels: dict[str, str]) -> str:
-    """The recommended point, against that of today; empty without an optimum."""
+    """Recommended point against that of today."""
     found = record.optimum
     if found is None or found.best < 0:
         return ""
@@ -355,7 +355,7 @@ def _share_tables(
 
 
 def _surrogate_sections(record: StudyRecord, labels: dict[str, str]) -> tuple[Section, ...]:
-    """How well surrogates predict, and what follows from those that do."""
+    """How well surrogates predict, and what follows."""
     if not record.surrogates:
         return ()
     used = [item for item in record.surrogates if not item.reason]

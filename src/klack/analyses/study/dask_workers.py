@@ -29,9 +29,9 @@ __all__ = ["DaskTasks", "DaskWorkers", "require_dask"]
 Given = TypeVar("Given")
 
 LOST = (OSError, futures.CancelledError, asyncio.CancelledError)
-"""Raised where a worker, or the scheduler, is lost; a timeout is the first of them."""
+"""Raised where a worker or the scheduler is lost; a timeout is the first."""
 _FETCH = 5.0
-"""Time for the rows of a task to come from its worker [s]."""
+"""Time limit for fetching rows of a task [s]."""
 _ROUNDS = 2
 """Times that dask gives a point up, each after four workers: over a neighbour, then over itself."""
 
@@ -88,7 +88,7 @@ class DaskTasks:
             unwrapped(f"worker {address}", failure)
 
     def give_up(self) -> None:
-        """Keep the rows that have come, and take back the rest."""
+        """Keep rows that have come; take back the rest."""
         try:
             for future in [one for one in self._places if one.status == "finished"]:
                 self._keep(future)
@@ -129,7 +129,7 @@ class DaskTasks:
         return []
 
     def _again(self, future: "Future") -> None:
-        """Send points of a task without an answer once more, one by one; or give them up."""
+        """Send points of a lost task once more, one by one; or give them up."""
         from distributed import KilledWorker
 
         places = self._places.pop(future)
@@ -152,7 +152,7 @@ class DaskTasks:
             self._tally(place, died_row(self._asked, str(error or "the task was taken back")))
 
     def _send_case(self) -> "Future":
-        """A task of its own: the scheduler has it done again where its worker is lost."""
+        """A task of its own: the scheduler repeats it where its worker is lost."""
         key = f"klack-case-{uuid4().hex}"
         return self._client.submit(_same, self._sent, key=key)
 
@@ -176,7 +176,7 @@ _PATIENCE = 20.0
 _AHEAD = 2
 """Tasks on their way for each worker."""
 _FEWEST = 16
-"""Tasks on their way, also to a cluster that has still to grow."""
+"""Tasks on their way, also to a growing cluster."""
 
 
 def require_dask() -> None:
@@ -245,7 +245,7 @@ class DaskWorkers(PointWorkers):
                     tasks.give_up()
 
     def _require_a_worker(self, progress: Progress) -> None:
-        """Wait for the first worker, by a task that makes a cluster grow and needs no klack."""
+        """Wait for the first worker, by a task that needs no klack."""
         probe = self._client.submit(version, "klack", pure=False)
         try:
             while not probe.done():
@@ -259,7 +259,7 @@ class DaskWorkers(PointWorkers):
             probe.release()
 
     def _count_workers(self, progress: Progress) -> None:
-        """Count the workers once a second, and check those that are new."""
+        """Count workers once a second, and check new ones."""
         if monotonic() < self._counted + _COUNT:
             return
         self._counted = monotonic()
@@ -298,7 +298,7 @@ class DaskWorkers(PointWorkers):
 
 
 def _require_version(address: str, found: object) -> None:
-    """Refuse a worker without klack, or with another one, before it gets what it cannot read."""
+    """Refuse a worker without this klack before it gets what it cannot read."""
     if found == klack.__version__ or not isinstance(found, str | ImportError):  # it has gone again
         return
     got = f"klack {found}" if isinstance(found, str) else f"no klack ({found})"
@@ -312,10 +312,10 @@ def _require_version(address: str, found: object) -> None:
 
 
 class _TaskSize:
-    """How many points make a task that is worth its way."""
+    """Number of points in a task that is worth its way."""
 
     _short, _long, _most = 0.5, 5.0, 64
-    """Work of a task with the bodies of all others, and with bodies of its own [s]; points."""
+    """Work of a task with the bodies of all others, and with its own [s]; points."""
 
     def __init__(self) -> None:
         self._seconds: deque[float] = deque(maxlen=32)
@@ -325,7 +325,7 @@ class _TaskSize:
         self._seconds.append(answer.seconds / max(len(answer.rows), 1))
 
     def points(self, left: int, tasks: int, own_bodies: bool) -> int:
-        """Points for the next task, if so many are left for so many tasks."""
+        """Points for the next task."""
         if not self._seconds:
             return 1
         usual = sorted(self._seconds)[len(self._seconds) // 2]
@@ -334,7 +334,7 @@ class _TaskSize:
 
 
 def _client(scheduler: "str | Client") -> "tuple[Client, bool]":
-    """A client, and whether it is to be closed; InputError if the scheduler does not answer."""
+    """A client, and whether to close it; InputError without an answer."""
     from distributed import Client
 
     if isinstance(scheduler, Client):

@@ -45,12 +45,12 @@ __all__ = [
 
 
 _ASIDE = ("study", "calibration", "measurement", "title", "description")
-"""Sections of a case that no point depends on."""
+"""Sections that no point depends on."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KeptPoint:
-    """Measures of one point by their names, or why it has none."""
+    """Measures of one point, or why it has none."""
 
     values: Mapping[str, float | None]
     failure: str
@@ -59,7 +59,7 @@ class KeptPoint:
     steps: PointSteps | None = None
 
     def row(self, measures: tuple[str, ...]) -> PointRow | None:
-        """Row of a table of these measures, if all of them are known."""
+        """Row of these measures, if all are known."""
         if self.failure:
             return PointRow((None,) * len(measures), self.failure, self.notes, steps=self.steps)
         if not all(name in self.values for name in measures):
@@ -68,7 +68,7 @@ class KeptPoint:
         return PointRow(values, "", self.notes, model=self.model, steps=self.steps)
 
     def with_row(self, measures: tuple[str, ...], row: PointRow) -> "KeptPoint":
-        """The same with what was computed now; doubts of what was there before stay."""
+        """The same with new values; earlier doubts stay."""
         values = dict(self.values) | dict(zip(measures, row.values, strict=True))
         notes, steps = tuple(dict.fromkeys((*self.notes, *row.notes))), row.steps
         if steps is not None and self.steps is not None:
@@ -83,7 +83,7 @@ PointLog = UnfinishedLog[str, KeptPoint]
 
 
 def point_log_form(case: AnyCase, tree: CaseTree) -> tuple[LogForm[str, KeptPoint], str]:
-    """How the points of a case are kept, and the mark of the case."""
+    """Storage of the points of a case, and its mark."""
     data = {name: value for name, value in tree.data.items() if name not in _ASIDE}
     source = json.dumps(data, sort_keys=True, default=str)
     mark = fingerprint(case, _own_code(case), source)
@@ -168,7 +168,7 @@ def asked_of(
     written: GivenPoints,
     names: Iterable[str],
 ) -> AskedPoints:
-    """Points of a study, with the measures of these names; errors name file, line and key."""
+    """Points of a study with these measures; errors name file, line and key."""
     try:
         variant = kind_of(case).asked_variant(source.study)
         return ask(case, tree, written, names, variant)
@@ -179,13 +179,13 @@ def asked_of(
 
 
 class Evaluation:
-    """Computes what the log does not hold; counts points and seconds."""
+    """Computes what the log lacks; counts points and seconds."""
 
     def __init__(self, log: PointLog, workers: PointWorkers) -> None:
         self._log, self._workers = log, workers
         self.computed, self.seconds = 0, 0.0
         self.so_far: list[PointRow | None] = []
-        """Rows of the points that are being computed, as far as they are there."""
+        """Rows computed so far."""
 
     @property
     def done(self) -> int:
@@ -193,7 +193,7 @@ class Evaluation:
         return sum(row is not None for row in self.so_far)
 
     def rows(self, asked: AskedPoints, progress: Progress) -> list[PointRow]:
-        """Rows of all points that are asked for, equal ones computed once."""
+        """Rows of all points, equal ones computed once."""
         begin = perf_counter()
         measures = tuple(item.name for item in asked.chosen)
         keys = [
@@ -260,7 +260,7 @@ def point_fields(
     rows: Sequence[PointRow],
     today: PointRow,
 ) -> dict[str, Any]:
-    """Values of the parameters and of what follows from them, and how each point ended."""
+    """Values of parameters and linked keys, and how each point ended."""
     known = space.known()
     steps = step_columns(rows)
     return dict(
@@ -292,7 +292,7 @@ def step_columns(rows: Sequence[PointRow]) -> NDArray[np.float64]:
 
 
 def _model(rows: Sequence[PointRow], today: PointRow) -> str:
-    """Model of the case as it is, and how many points have another one; empty for strokes."""
+    """Model of the case, and how many points differ; empty for strokes."""
     first = next((row.model for row in (today, *rows) if row.model), "")
     others = sum(1 for row in rows if row.model not in ("", first))
     points = "1 point" if others == 1 else f"{others} points"
@@ -323,7 +323,7 @@ def _column(
 def measure_columns(
     asked: AskedPoints, rows: Sequence[PointRow], today: PointRow
 ) -> tuple[StudyColumn, ...]:
-    """Columns of the measures; ``today`` is the row of the case as it is."""
+    """Columns of the measures; ``today`` is the case as it is."""
     return tuple(
         StudyColumn(
             name=item.name,
@@ -368,7 +368,7 @@ def _of_rows(rows: Sequence[PointRow]) -> tuple[str, ...]:
 def row_warnings(
     rows: Sequence[PointRow], today: PointRow, columns: Sequence[StudyColumn]
 ) -> tuple[str, ...]:
-    """How many points failed or are in doubt, with the most frequent reasons."""
+    """Numbers of failed and doubtful points, with frequent reasons."""
     missing = (
         f"'{item.name}' has no value at any point. Try: a longer run.duration if it comes later."
         for item in columns

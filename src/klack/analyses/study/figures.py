@@ -1,4 +1,4 @@
-"""The figures of a study, each built from its record by one function."""
+"""Figures of a study."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -45,11 +45,11 @@ _MOST_LINES = 4000
 _MOST_EFFECTS = 3
 _LEAST_SHARE = 0.01
 _MARGIN = 0.05
-"""Of the range of an axis, free at its ends."""
+"""Free share of the range of an axis at its ends."""
 
 
 def parallel_chart(record: StudyRecord, labels: Mapping[str, str]) -> ParallelChart:
-    """Every point as a line over its parameters and measures."""
+    """Points as lines over parameters and measures."""
     shown = [item for item in (*record.parameters, *record.measures) if item.varies]
     wanted = record.optimum.objectives if record.optimum else ()
     measures = [k for k, item in enumerate(shown) if item in record.measures]
@@ -80,7 +80,7 @@ def scatter_chart(
     over: Sequence[StudyColumn],
     labels: Mapping[str, str],
 ) -> Chart:
-    """A measure over the parameter that it follows most; coloured halves of the second one."""
+    """Measure over its main parameter, coloured by the second one."""
     first = over[0]
     x, x_factor = _axis(first, labels)
     y, y_factor = _axis(measure, labels)
@@ -113,7 +113,7 @@ def scatter_chart(
 def front_charts(
     record: StudyRecord, found: Optimum, labels: Mapping[str, str]
 ) -> tuple[Chart, ...]:
-    """Each objective over the first one: all points, the front, the recommended one, today."""
+    """Objectives over the first: points, front, recommended, today."""
     first, *others = map(record.measure, found.objectives)
     return tuple(_front_chart(first, item, found, labels) for item in others)
 
@@ -152,7 +152,7 @@ def _front_chart(
 def _framed(
     item: StudyColumn, shown: NDArray[np.bool_], labels: Mapping[str, str]
 ) -> tuple[AxisSpec, float]:
-    """Axis over the points shown and that of today, with a margin."""
+    """Axis over the points shown and today, with a margin."""
     spec, factor = _axis(item, labels)
     values = factor * np.append(item.values[shown], item.today)
     values = values[np.isfinite(values)]
@@ -171,7 +171,7 @@ def _points(
     colour: Colour,
     width: float,
 ) -> Curve:
-    """Dots at some of the points of the study, each with its number."""
+    """Numbered dots at some points."""
     return dots(x[places], y[places], label, colour, width, (f"point {i}" for i in places))
 
 
@@ -180,7 +180,7 @@ def _today(x: float, y: float) -> Curve:
 
 
 def effect_bars(measure: StudyColumn, item: Screening, labels: Mapping[str, str]) -> BarChart:
-    """Sizes of the effects of all parameters on a measure, the largest first."""
+    """Effects of all parameters on a measure, the largest first."""
     unit, factor = printed_unit(item.size, "" if measure.unit == "1" else measure.unit)
     order = largest_first(item)
     sizes = factor * np.nan_to_num(item.size[order])
@@ -195,13 +195,13 @@ def effect_bars(measure: StudyColumn, item: Screening, labels: Mapping[str, str]
 
 
 def sensitivity_bars(item: Sensitivity, labels: Mapping[str, str]) -> BarChart:
-    """Shares of the variance of a measure from base points, the largest first."""
+    """Variance shares of a measure from base points, the largest first."""
     note = f"From {item.rows} base points; the table has the intervals."
     return _share_bars(item, f"sensitivity-{item.measure}", note, labels)
 
 
 def surrogate_bars(item: StudySurrogate, labels: Mapping[str, str]) -> BarChart:
-    """Shares of the variance of a surrogate, the largest first."""
+    """Variance shares of a surrogate, the largest first."""
     note = f"By a surrogate of {item.points} points; the table has what its error can change."
     return _share_bars(item, f"surrogate-{item.measure}", note, labels)
 
@@ -234,7 +234,7 @@ def _share_bars(
 def main_effect_charts(
     record: StudyRecord, item: StudySurrogate, labels: Mapping[str, str]
 ) -> tuple[Chart, ...]:
-    """Main effects of the parameters that a measure follows most, with the computed points."""
+    """Main effects of the main parameters, with the computed points."""
     own = {of.name: of for of in (*record.parameters, *record.measures)}
     order = np.argsort(-item.total, kind="stable")
     shown = [item.effects[k] for k in order if item.total[k] >= _LEAST_SHARE]
@@ -273,7 +273,7 @@ def _main_effect(
 
 
 def _axis(item: StudyColumn, labels: Mapping[str, str]) -> tuple[AxisSpec, float]:
-    """Axis of a column in a unit with a fitting prefix, and the factor from SI to it."""
+    """Axis with a prefix, and the factor from SI."""
     own, to_own = shown_unit(item.unit)
     unit, factor = printed_unit(to_own * item.values, own)
     return AxisSpec(label=labels[item.name], unit=unit), to_own * factor

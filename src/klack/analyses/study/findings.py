@@ -1,4 +1,4 @@
-"""What follows from all points of a study: sensitivities, missed bounds, surrogates."""
+"""Findings from all points: sensitivities, missed bounds, surrogates."""
 
 from collections.abc import Sequence
 
@@ -36,7 +36,7 @@ __all__ = [
 
 
 def sensitivity_of(item: StudyColumn, parameters: tuple[str, ...]) -> Sensitivity:
-    """Indices of a measure over the points of Saltelli's design, in the order of the design."""
+    """Indices over the points of Saltelli's design, in its order."""
     found = sobol_indices(item.values, len(parameters))
     return Sensitivity(
         measure=item.name,
@@ -57,7 +57,7 @@ def sensitivity_of(item: StudyColumn, parameters: tuple[str, ...]) -> Sensitivit
 def screening_of(
     item: StudyColumn, parameters: tuple[str, ...], cube: NDArray[np.float64]
 ) -> Screening:
-    """Elementary effects of each parameter on a measure, over the trajectories of Morris."""
+    """Elementary effects over the trajectories of Morris."""
     found = elementary_effects(cube, item.values)
     return Screening(
         measure=item.name,
@@ -93,7 +93,7 @@ def missed_bound(bound: Bound, column: StudyColumn) -> MissedBound:
 
 
 _DESIGNS = ("sobol", "latin-hypercube", "made", "file")
-"""Designs that may fill the ranges evenly; a grid hides what is between its levels."""
+"""Designs that may fill ranges evenly; a grid has gaps between levels."""
 _MOST = {"polynomial-chaos": 10_000, "gaussian-process": 500}
 _UNEVEN = 4.0
 _OUTSIDE = 1e-9
@@ -132,7 +132,7 @@ def require_surrogates(source: StudySource, points: StudyPoints) -> None:
 
 
 def _require_even(source: StudySource, points: StudyPoints) -> None:
-    """Points of a file have to lie in the ranges and fill them as random points do."""
+    """Points of a file lie in the ranges and fill them as random ones do."""
     where = str(source.study.design.file)
     shares = []
     for item, axis in zip(points.space.varied, _axes(points), strict=True):

@@ -1,4 +1,4 @@
-"""What an optimisation searches for: measures to minimise or maximise, and bounds to keep."""
+"""Goals of an optimisation: objectives and bounds."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -25,7 +25,7 @@ __all__ = [
 ]
 
 Side = tuple[str, bool]
-"""A measure, and whether its high side is the worse one."""
+"""Measure, and whether high is worse."""
 
 _LEVELS = ("dB", "dBA", "phon", "sone", "acum")
 _TODAY = re.compile(r"today(?:\s*(?P<sign>[+-])\s*(?P<change>\S.*))?")
@@ -40,7 +40,7 @@ class Bound:
     is_most: bool
 
     def violation(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """By how much of the bound it is missed; zero or less where it is kept."""
+        """Excess over a bound, relative to it; zero or less where it is kept."""
         past = values - self.value if self.is_most else self.value - values
         return past / (abs(self.value) or 1.0)
 
@@ -55,7 +55,7 @@ class Goals:
 
     @property
     def sides(self) -> tuple[Side, ...]:
-        """Measures that are looked at, each with whether it is worse when it is higher."""
+        """Measures of the goals, and whether high is worse."""
         own = zip(self.objectives, (sign > 0.0 for sign in self.signs), strict=True)
         return tuple(dict.fromkeys([*own, *((b.measure, b.is_most) for b in self.bounds)]))
 
@@ -77,7 +77,7 @@ class Goals:
         )
 
     def objective_values(self, of: Mapping[Side, NDArray[np.float64]]) -> NDArray[np.float64]:
-        """Numbers to minimise (points, objectives), from columns of measures."""
+        """Numbers (points, objectives) to minimise."""
         pairs = zip(self.signs, self.objectives, strict=True)
         return np.column_stack([sign * of[name, sign > 0.0] for sign, name in pairs])
 
@@ -89,7 +89,7 @@ class Goals:
 
 
 def require_objectives(source: StudySource) -> None:
-    """Refuse a study that has nothing to search for, before its first point."""
+    """Refuse a study without objectives before its first point."""
     refuse_if(
         not source.study.objectives,
         source.where(()),
@@ -130,7 +130,7 @@ def bounds_of(
 
 
 def is_by_today(written: Written | None) -> bool:
-    """Whether a bound counts from the case as it is: ``today + 2 %``."""
+    """Whether a bound counts from the case: ``today + 2 %``."""
     return written is not None and _TODAY.fullmatch(str(written).strip()) is not None
 
 
@@ -156,7 +156,7 @@ def _bound(where: str, written: Written, unit: str, today: float) -> float:
 
 
 def _kind(unit: str) -> Kind:
-    """Kind of quantity with an SI unit; a level is written with its own unit."""
+    """Kind of an SI unit; a level has its own unit."""
     if unit in ("", "1"):
         return RATIO
     plain = unit.replace(" ", "*")

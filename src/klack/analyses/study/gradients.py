@@ -1,4 +1,4 @@
-"""Derivatives of objectives and bounds with the parameters of a search, in its unit cube."""
+"""Derivatives of objectives and bounds in the unit cube."""
 
 from dataclasses import dataclass
 
@@ -22,7 +22,7 @@ from klack.studies.polish import NoValue
 __all__ = ["Gradients", "require_gradients"]
 
 _AHEAD = 1e-6
-"""Part of the cube by which values of a parameter are differentiated."""
+"""Step in the cube for differences of values."""
 
 
 def require_gradients(source: StudySource, asked: AskedPoints, space: Space) -> SlopeSpace | None:
@@ -128,7 +128,7 @@ class Gradients:
         return objectives, np.reshape(bounds, (len(bounds), per_share.size))
 
     def _values_per_share(self, point: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Derivatives of the values of the parameters [SI] with their shares of the cube."""
+        """Derivatives of values [SI] with shares of the cube."""
         found = []
         for item, share in zip(self.space.varied, point, strict=True):
             low, high = max(float(share) - _AHEAD, 0.0), min(float(share) + _AHEAD, 1.0)

@@ -55,7 +55,7 @@ _ASIDE = (
     *("run", "lumped", "guide", "shots"),
     *("measurement", "noise", "study", "title", "description"),
 )
-"""Sections that bodies and modes do not depend on."""
+"""Sections without influence on bodies and modes."""
 _OF_THE_IMPACT = (
     ("motion", "speed"),
     ("motion", "force"),
@@ -107,7 +107,7 @@ class _Impacts(PointKind[Case, _Built]):
         return study.level
 
     def variant(self, case: Case, name: str | None, chosen: Sequence[ChosenMeasure]) -> str:
-        """The level, ``reduced`` by default, as far as a measure takes an impact; and shots."""
+        """Level, ``reduced`` by default, if a measure takes an impact; and shots."""
         (level,) = case.require_levels([name or "reduced"])
         if not case.has_surfaces:
             require_given_levels(case, [level])
@@ -231,7 +231,7 @@ class _Point:
 def _point(
     asked: AskedPoints[Case], built: _Built, place: int, check: Callable[[], None]
 ) -> _Point:
-    """Impact and shots of a point, as far as its measures take them."""
+    """Impact and shots of a point, as its measures need them."""
     case = case_at(Case, asked.tree, asked.tree, asked.points.changes(place))
     level, progress = _level(asked), lambda stage, fraction: check()
     if built.shots is None:
@@ -265,7 +265,6 @@ def _impact(case: Case, bodies: ImpactBodies | None, level: str, progress: Progr
 
 
 def _shots(case: Case, bodies: ImpactBodies, names: list[str], progress: Progress) -> _Point:
-    """Shots of a point, one after another, as ``klack shots`` computes them."""
     given, model = shots_of(case), shot_model(case, bodies, progress)
     with shot_log(None, "") as log:
         found = drop_shots(case, model, given.count, given.seed, 1, log, progress)
@@ -281,7 +280,7 @@ def _shots(case: Case, bodies: ImpactBodies, names: list[str], progress: Progres
 
 
 def _other_answer(study: ImpactStudy, level: str) -> str:
-    """Warning that a single impact would answer with another level; empty if it would not."""
+    """Warning that a single impact would answer with another level."""
     if study.reference == level:
         return ""
     return (

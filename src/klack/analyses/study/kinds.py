@@ -15,12 +15,12 @@ __all__ = ["ask", "kind_of", "measure_names"]
 
 
 def kind_of(case: AnyCase) -> PointKind[Any, Any]:
-    """Impacts and shots of two bodies, or strokes of a whole valve."""
+    """Impacts and shots of two bodies, or strokes of a valve."""
     return IMPACTS if isinstance(case, Case) else STROKES
 
 
 def measure_names(case: AnyCase) -> tuple[str, ...]:
-    """Names of what can be computed at the points of a case."""
+    """Measures that points of a case can have."""
     return impact_measure_names(case) if isinstance(case, Case) else stroke_measure_names(case)
 
 
@@ -31,7 +31,7 @@ def ask(
     measures: Iterable[str],
     variant: str | None,
 ) -> AskedPoints:
-    """Check everything that can be known before the first run; ``variant`` may be a level."""
+    """Check all that can be known before the first run; ``variant`` may be a level."""
     kind = kind_of(case)
     chosen = kind.measures(case, measures)
     asked = points_of(case, tree, points)

@@ -1,4 +1,4 @@
-"""What a study shows while it runs: lines on its pace, its points on disk, a page of its search."""
+"""What a study shows while it runs: pace, points on disk, page of its search."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -17,7 +17,7 @@ _FIRST, _LONGEST = 5.0, 60.0  # [s] until the first line, and between later ones
 
 
 class Pace:
-    """Tells now and then how an evaluation proceeds of, in the end, ``most`` points."""
+    """Reports the pace of evaluating ``most`` points."""
 
     def __init__(self, progress: Progress, most: int) -> None:
         self._progress, self._most = progress, most
@@ -60,10 +60,10 @@ def duration_text(seconds: float) -> str:
 
 
 LIVE = "live"
-"""Folder of the record, beside the file of the progress."""
+"""Folder of the record, beside the progress file."""
 
 Seen = Callable[[Callable[[], StudyRecord]], None]
-"""Is offered what was found so far, and makes a record of it where it wants one."""
+"""Gets findings so far, and makes a record of them if wanted."""
 
 _OFTEN = 1.5  # [s] between two records
 _SHARE = 20.0  # times what a record costs, so that it slows the study by 5 % at most
@@ -81,7 +81,7 @@ class LiveRecord:
         self._latest: Callable[[], StudyRecord] | None = None
 
     def offer(self, make: Callable[[], StudyRecord]) -> None:
-        """Take what was found so far, unless the last record was just now."""
+        """Take findings, unless the last record was just now."""
         self._latest = make
         begin = perf_counter()
         if begin >= self._next and not self._failed:
@@ -90,7 +90,7 @@ class LiveRecord:
             self._next = now + max(_OFTEN, _SHARE * (now - begin))
 
     def write(self) -> None:
-        """Write what was found so far: at the end of an interrupted study, too."""
+        """Write findings; at the end of an interrupted study, too."""
         if self._latest is None or self._failed:
             return
         try:

@@ -55,7 +55,7 @@ class Scatter:
     cube: NDArray[np.float64]
 
     def made(self, design: Values) -> list[dict[str, PointValue]]:
-        """What the case file has for each valve made after a design."""
+        """Texts for each valve made after a design."""
         own = {item.name: design[item.name] for item in self.space.parameters}
         return [self._valve(own, shares) for shares in self.cube]
 
@@ -272,7 +272,7 @@ class MadeValves:
         rows: Sequence[PointRow],
         today: PointRow,
     ) -> tuple[StudyColumn, ...]:
-        """Columns of the sides, beside those of the designs as drawn."""
+        """Columns of the sides, beside designs as drawn."""
         own = {item.name: item for item in measures}
         return tuple(
             StudyColumn(
@@ -288,7 +288,7 @@ class MadeValves:
 
 
 def made_valves_of(case: AnyCase, source: StudySource, space: Space) -> MadeValves | None:
-    """Made valves of a study; None for one that compares designs as drawn."""
+    """Made valves of a study, unless it compares designs as drawn."""
     given, scatter = source.study.robust, scatter_of(case, source, space)
     if given is None or scatter is None:
         return None

@@ -81,17 +81,17 @@ class PointNoise:
 
     @cached_property
     def pressure(self) -> TimeSeries | None:
-        """Sound of a click; None, with a note, where it cannot be had."""
+        """Sound of a click, or None with a note."""
         return self._noted(lambda: click_sound(self._source, self._transfers))
 
     @cached_property
     def click(self) -> SoundStatistics | None:
-        """Levels of a click; None where there is no sound."""
+        """Levels of a click, if it has a sound."""
         return None if self.pressure is None else sound_statistics(self.pressure)
 
     @cached_property
     def design(self) -> NoiseDesign | None:
-        """Noise as a whole; None, with a note, where it cannot be had."""
+        """Noise as a whole, or None with a note."""
         return self._noted(lambda: noise_design(self._source))
 
     def _noted(self, make: Callable[[], Found]) -> Found | None:
@@ -144,7 +144,7 @@ _OF_NOISE = {
     for measure in measures
     for name in [f"{_NOISE}.{measure.key}"]
 }
-"""Measures of the noise of a run, which has a :class:`PointNoise`, by their names."""
+"""Measures of the noise of a run with :class:`PointNoise`."""
 
 
 def choose_measures(
@@ -236,7 +236,7 @@ def shot_measure(name: str) -> ChosenMeasure | None:
 
 
 def shot_notes(names: Iterable[str], found: DroppedShots) -> tuple[str, ...]:
-    """Why measures of the shots have no value, or tell less than they are called."""
+    """Why measures of shots have no value, or say less than their name."""
     parts = [name.split(".")[1:] for name in names]
     columns = dict.fromkeys(of for of, _ in parts if of in _RESULTS)
     single = dict.fromkeys(key for of, key in parts if of == _CENTRIC)
@@ -274,7 +274,7 @@ def _chosen(
 
 
 def _judged(found: DroppedShots, measure: Measure[RuleVerdict]) -> float | None:
-    """Number of the rule; None unless all shots and the centred one have a rebound."""
+    """Number of the rule, if all shots and the centred one rebound."""
     every = (getattr(columns, key) for columns in (found.shots, found.centric) for key in _JUDGED)
     highest = highest_of(found.shots)
     if highest is None or not all(np.isfinite(values).all() for values in every):
@@ -290,7 +290,7 @@ _OF_LEVELS = {item.key: item for item in LEVEL_MEASURES if item.key not in _OF_T
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImpactOfPoint:
-    """What the measures of a point are read from, as far as they ask for it."""
+    """Source of the measures of a point, as far as they need it."""
 
     level: LevelResult | None = None
     noise: PointNoise | None = None
@@ -321,7 +321,7 @@ def impact_measures(case: Case, names: Iterable[str]) -> tuple[ChosenMeasure, ..
 
 
 def impact_measure_names(case: Case) -> tuple[str, ...]:
-    """Names of the measures of an impact, of its noise, and of the shots of a case with them."""
+    """Measures of an impact, its noise, and its shots if there are any."""
     return (*_OF_LEVELS, *NOISE_NAMES, *(SHOT_NAMES if case.shots is not None else ()))
 
 
@@ -351,7 +351,7 @@ def _impact_measure(case: Case, name: str) -> ChosenMeasure | None:
 
 
 TIMES = ("opening_time", "closing_time")
-"""Measures of a stroke, beside those of its impacts, that end with a touch."""
+"""Stroke measures, beside those of impacts, that end with a touch."""
 
 _OF_VARIANTS = {measure.key: measure for measure in VARIANT_MEASURES}
 _OF_IMPACTS = {measure.key: measure for measure in EVENT_MEASURES}
@@ -379,7 +379,7 @@ def stroke_measures(case: ValveCase, names: Iterable[str]) -> tuple[ChosenMeasur
 
 
 def stroke_measure_names(case: ValveCase) -> tuple[str, ...]:
-    """Names of the measures of a stroke, of the first impact on each stop, and of the noise."""
+    """Measures of a stroke, first impacts on each stop, and noise."""
     of_impacts = (f"{stop}.{key}" for stop in _stops(case) for key in _OF_IMPACTS)
     return (*_OF_VARIANTS, *of_impacts, *NOISE_NAMES)
 
@@ -409,7 +409,7 @@ def _stroke_measure(name: str, stops: list[str]) -> ChosenMeasure | None:
 
 
 def _impact_on(stop: str, number: int) -> Callable[[StrokeOfPoint], ImpactEvent | None]:
-    """Impact on a stop of this number from 1; for 0 the first one that is no mere tremble."""
+    """Impact of this number from 1; 0: the first that is no mere tremble."""
 
     def impact(run: StrokeOfPoint) -> ImpactEvent | None:
         if number:

@@ -1,4 +1,4 @@
-"""``klack optimise``: search the points of a study for those that no other one beats."""
+"""``klack optimise``: search for points that no other one beats."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -46,14 +46,14 @@ from klack.studies.search import Search, SearchSettings, require_pymoo
 __all__ = ["run_optimisation"]
 
 _EDGE = 1e-3
-"""Share that points keep from the ends of a distribution without ends."""
+"""Share that points keep from infinite ends of a distribution."""
 _REFINED = 8
 _PLAYED = 8
-"""Points of the front whose sound is kept, beside the recommended one and that of today."""
+"""Points of the front with stored sound, beside the recommended and today."""
 _ROUNDS = 8
-"""In which points of the front are computed with their steps checked."""
+"""Rounds of checking the steps of front points."""
 _POLLS = 4
-"""Rounds about each of them that have to fit into the points allowed."""
+"""Rounds of each refined point that must fit into the points allowed."""
 
 
 def run_optimisation(
@@ -168,11 +168,11 @@ _NOT_FEASIBLE = (
     "bounds."
 )
 _DRAWS = ("shots.seed", "shots.count")
-"""Keys that decide which shots are drawn, and nothing about the valve."""
+"""Keys of the draws of shots, not of the valve."""
 
 
 def _require_same_draws(source: StudySource) -> None:
-    """Refuse a search among draws of shots: it would find the luckiest of them."""
+    """Refuse a search among draws of shots: it would find the luckiest."""
     for name in _DRAWS:
         refuse_if(
             name in source.study.parameters,
@@ -184,7 +184,7 @@ def _require_same_draws(source: StudySource) -> None:
 
 
 class _Work:
-    """Points of a search in the order in which they were asked for, with their rows."""
+    """Points of a search in order, with their rows."""
 
     def __init__(
         self,
@@ -235,7 +235,7 @@ class _Work:
     def told(
         self, cube: NDArray[np.float64], front: "_Front"
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Objectives and violations of points of the unit cube, which join the front."""
+        """Objectives and violations of points, which join the front."""
         values = [self.space.at(point) for point in cube]
         rows, made, columns = self._computed(values, front.goals.sides)
         self.values += values
@@ -275,7 +275,7 @@ class _Work:
     def _computed(
         self, values: Sequence[Values], sides: Sequence[Side]
     ) -> tuple[list[PointRow], list[PointRow], Mapping[Side, NDArray[np.float64]]]:
-        """Rows of designs and of their made valves, and the columns that goals are held against."""
+        """Rows of designs and of made valves, and columns for the goals."""
         rows = self.rows([self.space.written(point) for point in values], self.names)
         table = np.array([row.numbers for row in rows])
         columns = {side: table[:, self.names.index(side[0])] for side in sides}
@@ -315,7 +315,7 @@ class _Front:
     def add(
         self, columns: Mapping[Side, NDArray[np.float64]]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Take the measures of the next points; return their objectives and violations."""
+        """Take the next measures; return objectives and violations."""
         objectives = self.goals.objective_values(columns)
         violations = self.goals.violations(columns)
         new = np.arange(len(self.objectives), len(self.objectives) + len(objectives))
@@ -347,7 +347,7 @@ class _Front:
 
     @property
     def scales(self) -> NDArray[np.float64]:
-        """Ranges of the objectives on the front; their size where a range is zero."""
+        """Ranges of the objectives on the front; sizes where a range is zero."""
         found = self.objectives[self.points]
         spans, sizes = np.ptp(found, axis=0), np.abs(found).max(axis=0)
         return np.where(spans > 0.0, spans, np.maximum(sizes, 1e-300))
@@ -387,7 +387,7 @@ def _refinement(source: StudySource, work: _Work, front: _Front) -> Batches | No
 def _polish(
     source: StudySource, work: _Work, front: _Front, slopes: SlopeSpace, progress: Progress
 ) -> list[str]:
-    """Polish the recommended point, if there is one; return what ended it early."""
+    """Polish the recommended point, if any; return what ended it early."""
     if front.best < 0:
         return []
     start, known = work.cubes[front.best], front.row(front.best)
@@ -447,7 +447,7 @@ def _optimum(
 
 
 def _sounds(work: _Work, front: _Front, progress: Progress) -> tuple[PointSound, ...]:
-    """Of the case as it is and of points spread over the front, if the noise was asked for."""
+    """Of the case and of spread front points, if noise was asked for."""
     if front.best < 0 or not any(item.is_noise for item in work.asked_today.chosen):
         return ()
     chosen = spread_over(front.ordered, _PLAYED)
@@ -459,7 +459,7 @@ def _sounds(work: _Work, front: _Front, progress: Progress) -> tuple[PointSound,
 
 
 def _lucky_draws(asked: AskedPoints, source: StudySource) -> tuple[str, ...]:
-    """The best of many points on the same draws owes a part of its lead to these."""
+    """The best of many points owes part of its lead to the common draws."""
     sought = {*source.study.objectives, *source.study.constraints}
     if not any(item.of == "shots" and item.name in sought for item in asked.chosen):
         return ()

@@ -49,7 +49,7 @@ def case_of_point(
 
 
 def written_of_point(record: StudyRecord, point: int) -> dict[str, str | float]:
-    """What the case file has at a point instead, by the path of the key."""
+    """Texts of the case at a point, by key."""
     columns = (*record.parameters, *record.linked)
     return {item.name: _written(item, point) for item in columns if "." in item.name}
 

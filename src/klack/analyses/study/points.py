@@ -1,4 +1,4 @@
-"""Parameters and points of a study: values in SI, and what the case file has at each point."""
+"""Parameters and points of a study, in SI and as the case file has them."""
 
 import csv
 import re
@@ -88,7 +88,7 @@ class Parameter:
 
     @property
     def middle(self) -> float | str:
-        """Where the others vary alone: the value of the case, else the middle of its own."""
+        """Value while others vary alone: that of the case, else its own middle."""
         return self.spread.at(0.5) if self.today is None else self.today
 
     def text(self) -> str:
@@ -110,14 +110,14 @@ class Parameter:
 
 
 def unit_of(kind: Kind | None) -> str:
-    """SI unit of a kind of quantity; ``"1"`` for a pure number, empty for none."""
+    """SI unit; ``"1"`` for a pure number, empty without a kind."""
     if kind is None:
         return ""
     return "1" if kind.bare else kind.unit
 
 
 def written(value: float | str, kind: Kind | None) -> PointValue:
-    """Value [SI] as a case file has it, with its unit and all digits."""
+    """Value [SI] as case text, with unit and all digits."""
     if kind is None or isinstance(value, str):
         return value
     return float(value) if kind.bare else f"{float(value)!r} {kind.unit}"
@@ -224,7 +224,7 @@ def _kind_of(item: StudyParameter) -> Kind:
 
 
 def _deviation(value: Written, kind: Kind) -> float:
-    """Standard deviation; one of 5 degC is a difference of temperatures, 5 K."""
+    """Standard deviation; 5 degC is a difference, 5 K."""
     if kind != TEMPERATURE:
         return parse_quantity(value, kind)
     text = re.sub(r"(degC|°C)$", "K", value.strip()) if isinstance(value, str) else value
@@ -337,25 +337,25 @@ class Space:
         return tuple(item for item in self.parameters if not item.is_fixed)
 
     def at(self, shares: Iterable[float]) -> Values:
-        """Values [SI] by name at a point of the unit cube."""
+        """Values [SI] at a point of the unit cube."""
         pairs = zip(self.varied, shares, strict=True)
         return self.values([item.spread.at(float(share)) for item, share in pairs])
 
     def values(self, row: Iterable[float | str]) -> Values:
-        """Values [SI] by name where the parameters that vary have these."""
+        """Values [SI] for a row of the varying parameters."""
         point = dict(zip((item.name for item in self.varied), row, strict=True))
         point |= {item.name: item.spread.at(0.5) for item in self.parameters if item.is_fixed}
         return self.completed(point)
 
     def completed(self, point: Values) -> Values:
-        """Values [SI] of the parameters with those that follow from them."""
+        """Values [SI] with those that follow from them."""
         found = {**self.constants, **point}
         for item in self.linked:
             found[item.name] = item.value(found)
         return found
 
     def written(self, values: Values) -> dict[str, PointValue]:
-        """What the case file has at a point, by the path of the key."""
+        """Texts of the case at a point, by key."""
         kinds = {item.name: item.kind for item in self.parameters if item.is_key}
         kinds |= {item.name: item.kind for item in self.linked}
         return {name: written(values[name], kind) for name, kind in kinds.items()}
@@ -373,7 +373,7 @@ class Space:
         return np.array(found, dtype=float)
 
     def known(self) -> Values:
-        """Values [SI] of parameters and linked keys in the case as it is, as far as it has them."""
+        """Known values [SI] of parameters and linked keys in the case."""
         own = {
             name: item.today
             for item in self.linked
@@ -488,7 +488,7 @@ def linked_of(
 def _levels(
     source: StudySource, varied: Sequence[Parameter]
 ) -> tuple[Iterable[Sequence[float | str]], str]:
-    """Values of the parameters on a grid or one at a time, and the design in words."""
+    """Levels on a grid or one at a time, and the design in words."""
     design = source.study.design
     if design.kind == "one-at-a-time":
         return _one_at_a_time(varied, design.levels), "one parameter at a time"
@@ -533,7 +533,7 @@ def _cube(source: StudySource, varied: Sequence[Parameter]) -> tuple[NDArray[np.
 
 
 def _one_at_a_time(varied: Sequence[Parameter], count: int) -> list[list[float | str]]:
-    """The middle, then each parameter over its levels while the others stay there."""
+    """The middle, then each parameter over its levels alone."""
     middle = [item.middle for item in varied]
     rows = [list(middle)]
     for k, item in enumerate(varied):
@@ -555,7 +555,7 @@ def require_varied(source: StudySource, varied: Sequence[Parameter]) -> None:
 def _rows_of_file(
     source: StudySource, varied: Sequence[Parameter]
 ) -> tuple[Iterable[Sequence[float | str]], str]:
-    """Rows of a CSV file: a column for each parameter that varies, values with their units."""
+    """Rows of a CSV file: a column per varying parameter, values with units."""
     file = source.study.design.file
     assert file is not None
     table = list(csv.reader(StringIO(text_of(file))))
@@ -589,7 +589,7 @@ def _rows_of_file(
 
 
 def _cell(where: str, text: str, item: Parameter) -> float | str:
-    """A quantity, a whole number where the case has one, or a word."""
+    """A quantity, a whole number if the case has one, or a word."""
     if item.kind is not None:
         return parse_quantity(text, item.kind, where)
     is_whole = isinstance(item.today, int) and text.isascii() and text.isdecimal()

@@ -1,4 +1,4 @@
-"""Points of a study in processes: how cases and points get there, and their answers back."""
+"""Points of a study in processes: orders and answers."""
 
 import os
 import pickle
@@ -148,7 +148,7 @@ class SentCase:
 
 @cache  # of the code that runs, which may not be what stands on the disk later
 def versions_here() -> Mapping[str, str]:
-    """Versions of all that decides the bits of a point: klack, its code, packages, the solver."""
+    """Versions that decide the bits of a point: klack, its code, packages, the solver."""
     code = sha256()
     for part in code_of_klack():
         code.update(part)
@@ -162,7 +162,7 @@ def versions_here() -> Mapping[str, str]:
 
 
 _CASES = 4
-"""Cases that a worker keeps at hand, with their bodies."""
+"""Cases that a worker keeps, with their bodies."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,7 +193,7 @@ class PointOrder:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """Rows of an order, and the time [s] that the worker took."""
+    """Rows of an order, and the worker's time [s]."""
 
     rows: tuple[PointRow, ...]
     seconds: float
@@ -217,7 +217,7 @@ _TURN = Lock()
 
 
 class _CaseAtWork:
-    """A case that was checked once, with the bodies of its latest points."""
+    """A checked case, with the bodies of its latest points."""
 
     def __init__(self, sent: SentCase) -> None:
         self._case, self._tree = sent.read()
@@ -238,7 +238,7 @@ class _CaseAtWork:
         return tuple(self._sent(row) for row in compute_alone(asked, self._builds))
 
     def _sent(self, row: PointRow) -> PointRow:
-        """The same in the words of the sender, and with warnings that every process can read."""
+        """The same in the sender's words, with warnings that every process can read."""
         return replace(
             row,
             failure=row.failure.replace(self._folder, "") if self._folder else row.failure,
@@ -265,7 +265,7 @@ def _plain(item: warnings.WarningMessage) -> warnings.WarningMessage:
 
 
 PROCESS_SIZE = 0.5e9
-"""Memory [byte] of a process with klack, the bodies of a small valve, and a stroke."""
+"""Memory [byte] of a process with klack, small bodies, and a stroke."""
 _ATTEMPTS = 3
 
 _Asked = tuple[tuple[int, ...], PointOrder]
@@ -326,12 +326,12 @@ class ProcessWorkers(PointWorkers):
                 ) from None
 
     def close(self) -> None:
-        """End the processes; what they compute at this moment is lost."""
+        """End the processes; work in progress is lost."""
         self._pool.close()
 
 
 def died_row(asked: AskedPoints, how: str) -> PointRow:
-    """Row of a point over which its workers died; another run tries it again."""
+    """Row of a point over which workers died; another run tries it again."""
     return replace(asked.failed(RuntimeError()), failure=f"worker died: {how}")
 
 

@@ -1,4 +1,4 @@
-"""Record of ``klack study``: parameters and measures of every point, in columns."""
+"""Record of ``klack study``, in columns."""
 
 from dataclasses import dataclass, field
 
@@ -340,7 +340,7 @@ class StudyRecord(CaseRecord):
 
 
 def study_table(record: StudyRecord) -> PointTable:
-    """Points in the order of the design: parameters, what follows from them, measures."""
+    """Points in order of the design: parameters, linked keys, measures."""
     return PointTable(
         case=record.case,
         variant=record.variant,
@@ -355,7 +355,7 @@ def study_table(record: StudyRecord) -> PointTable:
 def steps_of(
     halvings: NDArray[np.float64], changes: NDArray[np.float64]
 ) -> tuple[PointColumn, ...]:
-    """Columns of what the check of the steps has found; none of impacts."""
+    """Columns of the check of steps; none of impacts."""
     named = (("halvings", halvings), ("step_change", changes))
     return tuple(PointColumn(name, "1", values) for name, values in named if len(values))
 

@@ -1,4 +1,4 @@
-"""``klack study``: the measures of a case at the points of a design."""
+"""``klack study``: measures at the points of a design."""
 
 from pathlib import Path
 from time import perf_counter
@@ -153,7 +153,7 @@ def run_study(
 
 
 def _bounds_by_today(source: StudySource) -> tuple[str, ...]:
-    """A bound by the case as it is moves with the case that valves are made after."""
+    """A bound by today moves with the case that valves are made after."""
     found = [
         f"{name} {key} {bound}"
         for name, limit in source.study.constraints.items()

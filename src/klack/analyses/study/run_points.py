@@ -1,4 +1,4 @@
-"""One variant of a stroke, or one level of an impact, at many points, as a table."""
+"""One variant or level at many points, as a table."""
 
 from collections.abc import Iterable, Sequence
 

@@ -62,7 +62,7 @@ _ASIDE = (
     *("run", "lumped", "shots", "noise", "study", "measurement", "calibration"),
     *("title", "description"),
 )
-"""Sections that bodies, contact laws and their stops do not depend on."""
+"""Sections without influence on bodies, laws and stops."""
 _RADIATING = ("noise", "surfaces")
 """but for these surfaces of bodies."""
 
@@ -141,7 +141,7 @@ class _Strokes(PointKind[ValveCase, _Built]):
         return place[3] == "law" or (place[3] == "gap" and case.motion != "axial")
 
     def holds_interpreter(self, asked: AskedPoints[ValveCase]) -> bool:
-        """The noise does, and a motion in three dimensions."""
+        """Noise does, and a motion in three dimensions."""
         return asked.case.motion != "axial" or any(item.is_noise for item in asked.chosen)
 
     def build(
@@ -182,7 +182,7 @@ class _Strokes(PointKind[ValveCase, _Built]):
         places: Sequence[int],
         threads: int | None,
     ) -> int:
-        """Threads for these points: one where the time loop is in Python."""
+        """One where the time loop is in Python."""
         crew = min(available_cores() if threads is None else threads, max(len(places), 1))
         for i in places:
             try:
@@ -245,7 +245,7 @@ STROKES = _Strokes()
 
 
 def _valve_at(asked: AskedPoints[ValveCase], built: _Built, i: int) -> Valve:
-    """Valve of a point; its case is checked as a whole."""
+    """Valve of a point, checked as a whole."""
     changes = asked.points.changes(i)
     own = {place: value for place, value in changes.items() if place not in built.made}
     case = case_at(ValveCase, built.tree, built.parts, own)
@@ -257,7 +257,6 @@ def _valve_at(asked: AskedPoints[ValveCase], built: _Built, i: int) -> Valve:
 def _point_run(
     asked: AskedPoints[ValveCase], built: _Built, i: int, check: Callable[[], None]
 ) -> tuple[StrokeOfPoint, PointSteps, ValveRoles]:
-    """Stroke of a point, and the check of its steps."""
     valve = _valve_at(asked, built, i)
     return _stroke_of(valve.case, valve, asked, built, check)
 

@@ -1,4 +1,4 @@
-"""Where the points of a study are computed: threads, processes, a cluster."""
+"""Where points are computed: threads, processes, a cluster."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ __all__ = ["HERE", "Where"]
 
 
 _HOLDING = 64
-"""Points with noise (0.15 s), or impacts, that make up for the start of processes (4 s)."""
+"""Points with noise (0.15 s), or impacts, that repay starting processes (4 s)."""
 _GEOMETRIES = 16
 """New bodies (0.7 s) that do: threads mesh one after another."""
 
@@ -71,7 +71,7 @@ class Where:
             require_dask()
 
     def open(self, case: AnyCase, tree: CaseTree) -> PointWorkers:
-        """Workers for the points of a case, if they fit into the memory."""
+        """Workers for the points of a case, if the memory suffices."""
         if self.dask is not None:
             from klack.analyses.study.dask_workers import DaskWorkers
 
@@ -88,7 +88,7 @@ HERE = Where()
 
 
 class _Fitting(PointWorkers):
-    """Threads, until there are many points that processes compute faster."""
+    """Threads, until processes are faster for many points."""
 
     def __init__(self, case: AnyCase, tree: CaseTree) -> None:
         self._case, self._tree = case, tree

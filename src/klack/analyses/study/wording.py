@@ -43,14 +43,14 @@ _TOLD = 8  # points in a sentence
 
 
 def shown_unit(unit: str) -> tuple[str, float]:
-    """Unit that takes a prefix, and the factor from SI to it: masses in grams, numbers bare."""
+    """Unit for prefixes, and the factor from SI: masses in grams, numbers bare."""
     if unit == "kg":
         return "g", 1e3
     return ("", 1.0) if unit in ("1", "-") else (unit, 1.0)
 
 
 def in_words(item: StudyColumn, value: float, digits: int = 4) -> str:
-    """Value of a column with its unit; a dash where there is none."""
+    """Value with unit; a dash without one."""
     if not isfinite(value):
         return "–"
     if item.words:
@@ -67,7 +67,7 @@ def number_text(value: float, unit: str, digits: int = 4) -> str:
 
 
 def change(item: StudyColumn, value: float) -> str:
-    """How far a value is from that of today: in per cent, of levels the difference."""
+    """Change from today: in per cent, of levels the difference."""
     if item.words or not (isfinite(value) and isfinite(item.today)):
         return "–"
     if is_level(item.unit):
@@ -88,7 +88,7 @@ def on_page(item: StudyColumn, value: float, digits: int = 4) -> str:
 
 
 def variant_words(record: StudyRecord) -> str:
-    """Variant of a stroke; level of an impact, its shots, or both."""
+    """Variant, level, shots, or both."""
     if not record.model:
         return record.variant
     level, _, shots = record.variant.partition(" + ")
@@ -101,14 +101,14 @@ EFFECT_COLUMNS = ("parameter", "size", "standard error", "mean", "scatter", "eff
 
 
 def largest_first(item: Screening) -> list[int]:
-    """Places of the parameters, those with the largest effects first."""
+    """Parameters by falling effect."""
     return [int(k) for k in np.argsort(-np.nan_to_num(item.size), kind="stable")]
 
 
 def effect_cells(
     measure: StudyColumn, item: Screening, k: int, text: Callable[[StudyColumn, float], str]
 ) -> tuple[str, ...]:
-    """Size, its error, mean and scatter of the effects of one parameter, and how many."""
+    """Size, error, mean, scatter and number of the effects of a parameter."""
     numbers = (item.size[k], item.size_error[k], item.mean[k], item.scatter[k])
     return (*(text(measure, float(number)) for number in numbers), str(int(item.effects[k])))
 
@@ -134,7 +134,7 @@ SHARE_COLUMNS = ("alone", "", "with interactions", "")
 
 
 def index_cells(item: Sensitivity | StudySurrogate, k: int) -> tuple[str, ...]:
-    """Indices of one parameter with their intervals: alone, and with interactions."""
+    """Indices of a parameter with intervals: alone, and with interactions."""
     return (
         _index(item.first[k]),
         f"{_index(item.first_low[k])} to {_index(item.first_high[k])}",
@@ -149,7 +149,7 @@ SURROGATE_COLUMNS = ("measure", "points", "Q2", "root mean square", "largest", "
 def surrogate_cells(
     measure: StudyColumn, item: StudySurrogate, text: Callable[[StudyColumn, float], str]
 ) -> tuple[str, ...]:
-    """Leave-one-out error of a surrogate, and what it is made of or that nothing follows."""
+    """Leave-one-out error of a surrogate, and its make-up, or that nothing follows."""
     known = isfinite(item.predictivity)
     errors = (text(measure, item.error), text(measure, item.largest))
     if known and is_level(measure.unit):
@@ -163,7 +163,7 @@ def surrogate_cells(
 
 
 def _predictivity(value: float) -> str:
-    """Q2 with three digits, towards 1 with as many as tell it from 1."""
+    """Q2 with three digits, or as many as distinguish it from 1."""
     if not isfinite(value):
         return "–"
     return f"{value:.3f}" if value < 0.999 else f"1 − {1.0 - value:.1g}"
@@ -190,7 +190,7 @@ def rate_text(record: StudyRecord) -> str:
 
 
 def steps_texts(record: StudyRecord) -> Iterator[str]:
-    """What the check of the steps of strokes has found; nothing for impacts."""
+    """Findings of the check of steps; nothing for impacts."""
     known = ~np.isnan(record.step_changes)
     if not known.any():
         if len(known) > record.failed.sum():
@@ -208,7 +208,7 @@ def steps_texts(record: StudyRecord) -> Iterator[str]:
 
 
 def short_labels(record: StudyRecord) -> dict[str, str]:
-    """Names of measures, and of each key the shortest end that no other has: ``spring preload``."""
+    """Names of measures, and the shortest unique end of each key: ``spring preload``."""
     found = {item.name: item.name.replace(".", " ").replace("_", " ") for item in record.measures}
     names = [item.name for item in (*record.parameters, *record.linked)]
     for name in names:
