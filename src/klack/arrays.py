@@ -1,4 +1,4 @@
-"""Names of the arrays in signatures; shapes stand where they are used."""
+"""Names of the arrays in signatures; their shapes stand where they are used."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -46,7 +46,7 @@ __all__ = ["STUDY", "study_to_json"]
 
 
 class StudyColumnJson(TypedDict):
-    """Parameter, linked key, or measure, at every point."""
+    """A parameter, what follows from parameters, or a measure, at every point."""
 
     unit: Annotated[str, Field(description="SI; 1 for a pure number, empty for words.")]
     spread: Annotated[str, Field(description="How it varies, or its expression.")]
@@ -55,7 +55,7 @@ class StudyColumnJson(TypedDict):
 
 
 class IndexJson(TypedDict):
-    """Share of the variance of a measure by a parameter."""
+    """Share of the variance of a measure that a parameter causes."""
 
     first: Annotated[Real, Field(description="Alone.")]
     first_low: Real
@@ -66,7 +66,7 @@ class IndexJson(TypedDict):
 
 
 class EffectJson(TypedDict):
-    """Elementary effects over the whole range of a parameter."""
+    """Elementary effects of a parameter on a measure, over its whole range."""
 
     size: Annotated[Real, Field(description="Mean of their sizes, mu*.")]
     size_error: Annotated[Real, Field(description="Its standard error.")]
