@@ -35,6 +35,7 @@ _AIM = 0.7  # of that, for the step that is advised
 _SHORTEST = 1e-9  # [s] shorter ones take too long
 _FEWEST = 8  # steps of a contact; in fewer there is no peak to speak of
 _RESOLVED = 100  # steps of a contact that is as short as those tell
+_BESIDE = 5  # steps before and after a peak that may tell of it
 _TRUSTED = 0.02  # of a narrow peak; where more is missing, three steps do not tell how much
 
 
@@ -135,7 +136,7 @@ def missing_peak(
     step : float [s]
         With the peak.
     """
-    record = _behind_nothing(record)
+    record = _about(record, peak_time)
     middle = record.time + 0.5 * record.step
     k = int(np.searchsorted(middle, peak_time - 1e-3 * float(np.min(record.step, initial=1.0))))
     if not 0 < k < len(middle) - 1:
@@ -190,17 +191,17 @@ def late_by_swinging(
     return float(each.sum()), swings, float(np.average(periods, weights=share))
 
 
-def _behind_nothing(record: InterfaceRecord) -> InterfaceRecord:
-    """The record behind a step without force, where a peak may be in its first one."""
-    first, none = record.step[:1], np.zeros(len(record.step[:1]))
-    return replace(
-        record,
-        time=np.concatenate([record.time[:1] - first, record.time]),
-        step=np.concatenate([first, record.step]),
-        contact_force=np.concatenate([none, record.contact_force]),
-        film_force=np.concatenate([none, record.film_force]),
-        gap=np.concatenate([record.gap[:1], record.gap]),
-    )
+def _about(record: InterfaceRecord, time: float) -> InterfaceRecord:
+    """Some steps about a time [s]; the first of all is behind one without force."""
+    begin = max(int(np.searchsorted(record.time, time)) - _BESIDE, 0)
+    columns = record.time, record.step, record.contact_force, record.film_force, record.gap
+    at, step, contact, film, gap = (x[begin : begin + 2 * _BESIDE] for x in columns)
+    if begin == 0:  # where a peak may be in it
+        none = np.zeros(len(step[:1]))
+        at, step, gap = (np.append(x[:1], x) for x in (at, step, gap))
+        at[:1] -= step[:1]
+        contact, film = np.append(none, contact), np.append(none, film)
+    return replace(record, time=at, step=step, contact_force=contact, film_force=film, gap=gap)
 
 
 def _adjacent(record: InterfaceRecord, k: int) -> bool:

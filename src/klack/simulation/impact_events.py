@@ -121,8 +121,7 @@ class ImpactFinder:
         """
         for c, rows in enumerate(steps):
             rate = self._gap_rate(c, time, velocity)
-            closings = int(np.count_nonzero(rows[:, 2] > 0.0))
-            out = np.empty((min(closings, len(rows) // 2 + 1) + 1, len(_EVENT)))
+            out = np.empty((len(rows) // 2 + 2, len(_EVENT)))
             pause = max(_PAUSE_SHARE * self._rest[c], self._pause)
             count = _feed(
                 *(self._state, c, self._period[c], self._rest[c], pause, self._mobility[c]),

@@ -4,6 +4,7 @@ Only records are looked at, not steps: an excursion shorter than a record may be
 """
 
 import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,24 +15,10 @@ from klack.errors import AccuracyWarning, ConvergenceError
 from klack.network.ranges import limits_of, range_text, value_text
 from klack.network.rows import LimitRow
 from klack.simulation.network_compile import CompiledNetwork
+from klack.simulation.network_record import extremes
 from klack.units import format_si
 
 __all__ = ["Limits"]
-
-
-@dataclass(frozen=True, slots=True)
-class _Watched:
-    """A limit, and the columns of the records that its quantity is a sum of."""
-
-    limit: LimitRow
-    columns: NDArray[np.int64]
-    weights: Vector
-
-    def values(self, points: Matrix) -> Vector:
-        """Quantity in some records, shape (n,)."""
-        if self.columns.size == 1:
-            return self.limit.start + points[:, self.columns[0]] * self.weights[0]
-        return np.asarray(self.limit.start + points[:, self.columns] @ self.weights)
 
 
 class Limits:
@@ -47,9 +34,9 @@ class Limits:
         self._told: set[str] = set()
         ports = len(network.ports)
         pressures = 2 * ports + sum(row.body.rigid_count > 0 for row in network.rows.bodies)
-        self._watched: list[_Watched] = []
-        for limit in limits_of(network.rows):
-            weights = np.zeros(len(columns))
+        self._limits = limits_of(network.rows)
+        self._weights = np.zeros((len(self._limits), len(columns)))
+        for limit, weights in zip(self._limits, self._weights, strict=True):
             for handle, factor in limit.ports:
                 place = network.port_of[handle]
                 if place < ports:  # the last one is the ground
@@ -58,32 +45,45 @@ class Limits:
                 weights[pressures + network.node_order.index(limit.node)] = 1.0
             if limit.channel:
                 weights[columns.index(limit.channel)] = 1.0
-            used = np.flatnonzero(weights)
-            self._watched.append(_Watched(limit, used, weights[used]))
+        self._start = np.array([limit.start for limit in self._limits])
+        self._usable = np.array([limit.usable for limit in self._limits]).reshape(-1, 2)
+        slack = np.array([(-limit.slack, limit.slack) for limit in self._limits]).reshape(-1, 2)
+        self._valid = slack + np.array([limit.valid for limit in self._limits]).reshape(-1, 2)
 
     def left(self, points: Matrix, time: Vector) -> tuple[int, ConvergenceError] | None:
         """First record in which a quantity has left what can be computed with, and the error."""
         found: tuple[int, ConvergenceError] | None = None
-        for watched in self._watched:
-            limit, values = watched.limit, watched.values(points)
-            low, high = limit.usable
+        for k, values in self._near(points, self._usable):
+            low, high = self._usable[k]
             gone = np.flatnonzero((values <= low) | (values > high))
             if gone.size and (found is None or gone[0] < found[0]):
                 place = int(gone[0])
-                found = place, _stop(limit, float(values[place]), float(time[place]))
+                stop = _stop(self._limits[k], float(values[place]), float(time[place]))
+                found = place, stop
         return found
 
     def tell(self, points: Matrix, time: Vector) -> None:
         """Warn of ranges that are left in some records, once for each law."""
-        for watched in self._watched:
-            limit, values = watched.limit, watched.values(points)
+        for k, values in self._near(points, self._valid):
+            limit = self._limits[k]
             if limit.at_start and time[0] > 0.0:
                 continue
-            low, high = limit.valid[0] - limit.slack, limit.valid[1] + limit.slack
+            low, high = self._valid[k]
             out = np.flatnonzero((values < low) | (values > high))
             if out.size and limit.law not in self._told:
                 self._told.add(limit.law)
                 warnings.warn(_warning(limit, values, time, int(out[0])), AccuracyWarning, 3)
+
+    def _near(self, points: Matrix, ranges: Matrix) -> Iterator[tuple[int, Vector]]:
+        """Numbers of those limits whose range the extremes of the records leave, and quantities."""
+        low, high = extremes(points)
+        up, down = np.maximum(self._weights, 0.0), np.minimum(self._weights, 0.0)
+        least = self._start + up @ low + down @ high
+        most = self._start + up @ high + down @ low
+        inside = (least > ranges[:, 0]) & (most < ranges[:, 1])  # not where a number is none
+        for k in map(int, np.flatnonzero(~inside)):
+            used = np.flatnonzero(self._weights[k])
+            yield k, self._start[k] + points[:, used] @ self._weights[k, used]
 
 
 def _warning(limit: LimitRow, values: Vector, time: Vector, first: int) -> str:

@@ -2,13 +2,24 @@
 
 from typing import Any, NamedTuple
 
+import numpy as np
+
+from klack.arrays import Matrix, Vector
 from klack.machine.compiling.jit import njit
 from klack.network.step_function import pointers
 from klack.simulation.network_arrays import FINE, NetworkArrays, Recording
 from klack.simulation.network_ports import drive_force, port_speed
 from klack.simulation.phase import phase
 
-__all__ = ["Moment", "moment_of", "record_means", "record_moment", "record_points"]
+__all__ = [
+    "Moment",
+    "extremes",
+    "lay_across",
+    "moment_of",
+    "record_means",
+    "record_moment",
+    "record_points",
+]
 
 
 class Moment(NamedTuple):
@@ -108,3 +119,26 @@ def record_moment(recording: Recording, record: int, now: Moment) -> None:
             now.interfaces,
         ),
     )
+
+
+@njit
+def lay_across(rows: Matrix, begin: int, every: int, columns: Matrix, first: int) -> None:
+    """Copy rows, from ``begin`` on, into columns from ``first`` on: the first numbers of each."""
+    place = first
+    for i in range(begin, rows.shape[0], every):
+        for j in range(columns.shape[0]):
+            columns[j, place] = rows[i, j]
+        place += 1
+
+
+@njit
+def extremes(values: Matrix) -> tuple[Vector, Vector]:
+    """Lowest and highest of each column; nan where one is not a finite number."""
+    low, high = np.full(values.shape[1], np.inf), np.full(values.shape[1], -np.inf)
+    for i in range(values.shape[0]):
+        for j in range(values.shape[1]):
+            value = values[i, j]
+            none = value - value  # nan of what is not finite
+            low[j] = min(low[j], value) + none
+            high[j] = max(high[j], value) + none
+    return low, high

@@ -27,7 +27,7 @@ from klack.simulation.interface_step import film_force
 from klack.simulation.modal_step import FIXED_ROWS
 from klack.simulation.network_arrays import Recording, StepRows
 from klack.simulation.network_compile import CompiledNetwork
-from klack.simulation.network_record import moment_of, record_moment
+from klack.simulation.network_record import extremes, lay_across, moment_of, record_moment
 from klack.simulation.network_result import ChannelData, InterfaceRecord
 
 __all__ = ["Recorder", "recorded_columns", "values_now"]
@@ -199,11 +199,11 @@ class Recorder:
         finder.feed(time, self._velocities(count), steps)
         self._thin(count)
         for c, rows in enumerate(steps):
-            kept = rows[: self._room[c]]
-            if len(kept):
-                self._fine[c].append(kept[:, :_KEPT].copy())
-            self._room[c] -= len(kept)
-            self._complete[c] &= len(kept) == len(rows)
+            kept = np.empty((_KEPT, min(len(rows), self._room[c])))
+            lay_across(rows[: kept.shape[1]], 0, 1, kept, 0)
+            self._fine[c].append(kept)
+            self._room[c] -= kept.shape[1]
+            self._complete[c] &= kept.shape[1] == len(rows)
 
     def channels(self, records: int) -> dict[str, ChannelData]:
         """All channels by name, with so many records."""
@@ -225,15 +225,15 @@ class Recorder:
         """Steps in which an interface carried force: see :class:`InterfaceRecord`."""
         result = {}
         for c, row in enumerate(self.network.rows.interfaces):
-            part = np.concatenate([np.empty((0, _KEPT)), *self._fine[c]])
-            self._fine[c].clear()
-            columns = [part[:, i].copy() for i in range(_KEPT)]
+            parts = self._fine[c] or [np.empty((_KEPT, 0))]
+            time, step, contact, film, gap = parts[0] if len(parts) == 1 else np.hstack(parts)
+            self._fine[c] = []
             result[row.component] = InterfaceRecord(
-                time=columns[0],
-                step=columns[1],
-                contact_force=columns[2],
-                film_force=columns[3],
-                gap=columns[4],
+                time=time,
+                step=step,
+                contact_force=contact,
+                film_force=film,
+                gap=gap,
                 complete=self._complete[c],
             )
         return result
@@ -247,9 +247,8 @@ class Recorder:
             (self.means, recording.means),
             (self.peaks, recording.peaks),
         ):
-            wrong = ~np.isfinite(values[:count])
-            if wrong.any():
-                look, column = np.argwhere(wrong)[0]
+            if not np.isfinite(extremes(values[:count])[0]).all():
+                look, column = np.argwhere(~np.isfinite(values[:count]))[0]
                 if found is None or look < found[0]:
                     found = int(look), columns[column].name
         return found
@@ -260,20 +259,19 @@ class Recorder:
 
     def _thin(self, count: int) -> None:
         """Records of this chunk: means of means, largest peaks, last points."""
-        recording, looks = self.recording, self.looks
-        first = self.looked + 1
+        recording, looks, first = self.recording, self.looks, self.looked
         self.looked += count
-        record = (np.arange(first, first + count) - 1) // looks + 1
-        starts = np.flatnonzero(np.diff(record, prepend=0))
-        here = record[starts]
-        means = recording.means[:count]
+        begun = first // looks + 1  # the first record that gets anything
+        points, means = recording.points[:count], recording.means[:count]
+        peaks = recording.peaks[:count]
+        lay_across(points, begun * looks - 1 - first, looks, self._points, begun)
         if looks > 1:
+            starts = np.maximum(np.arange(begun - 1, -(-self.looked // looks)) * looks - first, 0)
             means = np.add.reduceat(means, starts, axis=0) / looks
+            peaks = np.maximum.reduceat(peaks, starts, axis=0)
+        here = slice(begun, begun + len(means))
         self._means[:, here] += means.T
-        peaks = np.maximum.reduceat(recording.peaks[:count], starts, axis=0)
-        self._peaks[:, here] = np.maximum(self._peaks[:, here], peaks.T)
-        ends = np.flatnonzero(np.arange(first, first + count) % looks == 0)
-        self._points[:, record[ends]] = recording.points[ends].T
+        np.maximum(self._peaks[:, here], peaks.T, out=self._peaks[:, here])
 
 
 def _parting(rows: Rows, blocks: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -166,12 +166,13 @@ def simulate_network(
         grid = replace(grid, look=1, looks=grid.look * grid.looks)
     step = sizes.step
     chunk = _PYTHON_CHUNK if has_python_steps(rows) or spatial is not None else _CHUNK
+    chunk = grid.divided(max(1, chunk // grid.look_steps))
     recorder = Recorder(
         network,
         records=grid.records,
         looks=grid.looks,
-        chunk=min(max(1, chunk // grid.look_steps), grid.records * grid.looks),
-        fine=PARTS * max(chunk, grid.look_steps),  # touched where it is needed
+        chunk=chunk,
+        fine=PARTS * chunk * grid.look_steps,  # touched where it is needed
     )
     clock = np.zeros(CLOCK, dtype=np.int64)
     clock[1] = -1
@@ -298,6 +299,12 @@ class Grid:
     def look_steps(self) -> int:
         """Fine steps between two looks."""
         return self.look * self.block
+
+    def divided(self, chunk: int) -> int:
+        """Looks of a chunk near this one, of which equal ones make the run, in whole records."""
+        if chunk < self.looks:
+            return chunk
+        return self.looks * -(-self.records // max(1, round(self.records * self.looks / chunk)))
 
 
 def grid_of(duration: float, sizes: StepSizes, record: float) -> Grid:
@@ -576,6 +583,22 @@ def _not_finite_part(network: CompiledNetwork) -> str:
 
 def _not_finite_account(network: CompiledNetwork) -> str:
     """Component whose state or energy is not finite; else empty."""
+    of_fluid = (
+        (network.line_state.samples, "waves in a line"),
+        (network.accounts.lines, "energy of a line"),
+        (network.accounts.waves, "energy of a line in cells"),
+        (network.node_state.mass, "mass in a chamber"),
+        (network.accounts.implicit, "energy of a chamber"),
+        (network.accounts.contact, "energy of a contact"),
+        (network.accounts.film, "energy of a film"),
+        (network.accounts.friction, "energy of a friction"),
+    )
+    bodies, ports = network.bodies, len(network.ports)
+    parts = [bodies.laid_out[: bodies.size], bodies.at[Y1 : Y1 + ports], network.accounts.rows]
+    parts += [network.elements.outputs, network.branches.outputs, network.node_state.p]
+    parts += [network.interface_state.force, network.slider_state.force]
+    if np.isfinite(np.concatenate([*parts, *(values.ravel() for values, _ in of_fluid)])).all():
+        return ""
     for name, value in zip(network.account_names, network.accounts.rows, strict=True):
         if not np.isfinite(value):
             return name
@@ -585,19 +608,7 @@ def _not_finite_account(network: CompiledNetwork) -> str:
     for b, row in enumerate(network.rows.bodies):
         if not all(np.all(np.isfinite(x)) for x in modal_state(network, b)):
             return row.component
-    for values, what in (
-        (network.line_state.samples, "waves in a line"),
-        (network.accounts.lines, "energy of a line"),
-        (network.accounts.waves, "energy of a line in cells"),
-        (network.node_state.mass, "mass in a chamber"),
-        (network.accounts.implicit, "energy of a chamber"),
-        (network.accounts.contact, "energy of a contact"),
-        (network.accounts.film, "energy of a film"),
-        (network.accounts.friction, "energy of a friction"),
-    ):
-        if not np.all(np.isfinite(values)):
-            return what
-    return ""
+    return next((what for values, what in of_fluid if not np.all(np.isfinite(values))), "")
 
 
 def _numbers(values: Vector) -> str:
