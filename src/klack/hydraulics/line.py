@@ -1,5 +1,6 @@
 """Line with water hammer: a bore in which pressure travels as waves."""
 
+from functools import lru_cache
 from math import inf, pi
 from typing import ClassVar, Literal, Self
 
@@ -225,6 +226,13 @@ class Line(Component):
             )
         rows.limits += self._limits(rows, fluid, pressure)
 
+    def _error(self, fluid: NetworkFluid, pressure: float, p: ArrayLike) -> NDArray[np.float64]:
+        """Larger one of the errors of speed and impedance, ``a / rho`` as the network counts it."""
+        at = np.append(np.asarray(p, dtype=float).ravel(), pressure)
+        speed = self._speeds(fluid, at)
+        both = [q[-1] / q[:-1] - 1.0 for q in (speed, speed / fluid.density(at))]
+        return np.asarray(np.max(np.abs(both), axis=0))
+
     def _require_liquid(self, rows: Rows, fluid: NetworkFluid, pressure: float) -> None:
         """Reject a line below boiling, where linear waves would have the speed in vapour."""
         if pressure >= fluid.all_liquid_from:
@@ -283,35 +291,23 @@ class Line(Component):
     def _limits(self, rows: Rows, fluid: NetworkFluid, pressure: float) -> list[LimitRow]:
         """Pressures at the ends for which its one wave speed and impedance hold."""
 
-        def error(p: ArrayLike) -> NDArray[np.float64]:
-            """Larger of both errors [-]; the impedance is ``a / rho`` as the network counts it."""
-            at = np.append(np.asarray(p, dtype=float).ravel(), pressure)
-            speed = self._speeds(fluid, at)
-            both = [q[-1] / q[:-1] - 1.0 for q in (speed, speed / fluid.density(at))]
-            return np.asarray(np.max(np.abs(both), axis=0))
-
         def effect(p: float) -> str:
             speeds = [self.wave_speed(fluid, x) for x in (pressure, p)]
+            off = percent_text(float(self._error(fluid, pressure, p)[0]))
             return (
                 f"Its waves run at {speeds[0]:.4g} m/s, those at {1e-5 * p:.4g} bar at "
                 f"{speeds[1]:.4g} m/s: echo times, pressures of a change "
-                f"of flow and the stored fluid are up to {percent_text(float(error(p)[0]))} off "
+                f"of flow and the stored fluid are up to {off} off "
                 "at such times."
             )
 
-        boiling = fluid.all_liquid_from  # below it the line opens a cavity of its own
-        below = np.geomspace(min(boiling, pressure), pressure, _LOOKED_AT)
-        above = np.geomspace(pressure, max(HIGHEST_PRESSURE, 2.0 * pressure), _LOOKED_AT)
-        fits_below, fits_above = error(below) <= _FOLLOWED, error(above) <= _FOLLOWED
-        low = 0.0 if fits_below.all() else float(below[np.flatnonzero(~fits_below)[-1] + 1])
-        high = above[-1] if fits_above.all() else above[np.flatnonzero(~fits_above)[0] - 1]
         nodes = {rows.port(port) for port in self.ports} & rows.nodes.keys()
         return [
             LimitRow(
                 component=rows.component,
                 quantity="pressure at an end",
                 unit="Pa",
-                valid=(low, float(high)),
+                valid=_followed(self, fluid, pressure),
                 law=f"the line '{rows.component}' with the fluid of {1e-5 * pressure:.4g} bar",
                 effect=effect,
                 advice=f"give components.{rows.component}.pressure the working pressure of "
@@ -322,3 +318,18 @@ class Line(Component):
             )
             for node in sorted(nodes)
         ]
+
+
+@lru_cache(maxsize=100)
+def _followed(line: Line, fluid: NetworkFluid, pressure: float) -> tuple[float, float]:
+    """Pressures about that of a line for which its one speed and impedance hold.
+
+    Kept, because strokes of one valve share them.
+    """
+    boiling = fluid.all_liquid_from  # below it the line opens a cavity of its own
+    below = np.geomspace(min(boiling, pressure), pressure, _LOOKED_AT)
+    above = np.geomspace(pressure, max(HIGHEST_PRESSURE, 2.0 * pressure), _LOOKED_AT)
+    fits_below, fits_above = (line._error(fluid, pressure, p) <= _FOLLOWED for p in (below, above))
+    low = 0.0 if fits_below.all() else float(below[np.flatnonzero(~fits_below)[-1] + 1])
+    high = above[-1] if fits_above.all() else above[np.flatnonzero(~fits_above)[0] - 1]
+    return low, float(high)

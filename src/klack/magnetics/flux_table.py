@@ -13,6 +13,7 @@ voltage, and a two-point driver would switch in every step.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,6 +113,7 @@ def current_weights(circuit: MagneticCircuit) -> Vector:
     return np.asarray(C @ v / (v @ n), dtype=float)
 
 
+@lru_cache(maxsize=100)
 def circuit_numbers(circuit: MagneticCircuit) -> Vector:
     """Flat circuit for :mod:`klack.magnetics.flux_kernel`.
 
@@ -178,7 +180,9 @@ def circuit_numbers(circuit: MagneticCircuit) -> Vector:
     if any(tube.gap.size or tube.iron.size or tube.remanence for tube in touched):
         head[SETTLES] = offset  # else they always balance
         tables.append(np.append(float(directions.shape[0] - 1), directions.ravel()))
-    return np.concatenate((head, circuit.loop_turns, *blocks, *tables))
+    numbers = np.concatenate((head, circuit.loop_turns, *blocks, *tables))
+    numbers.flags.writeable = False  # kept, because strokes of one valve share them
+    return numbers
 
 
 def free_directions(circuit: MagneticCircuit) -> Vector:

@@ -45,7 +45,6 @@ class FlexibleBody(Component):
     )
 
     _reduced: ReducedBody | None = PrivateAttr(None)
-    _columns: tuple[int, ...] = PrivateAttr(())
 
     @model_validator(mode="after")
     def _different_points(self) -> "FlexibleBody":
@@ -104,8 +103,8 @@ class FlexibleBody(Component):
                 hint="remove the speed, or the supports of the body.",
             )
         result = self.model_copy()
-        result._reduced = reduced
-        result._columns = tuple(reduced.port_index(name) for name in names)
+        columns = [reduced.port_index(name) for name in names]
+        result._reduced = _with_ports(reduced, columns, self.points)
         return result
 
     @property
@@ -124,7 +123,7 @@ class FlexibleBody(Component):
                 expected="a reduced body",
                 hint="klack stroke computes them; in Python use FlexibleBody.of(reduced).",
             )
-        return _with_ports(self._reduced, self._columns, self.points)
+        return self._reduced
 
     @property
     def mass(self) -> float:
@@ -146,9 +145,8 @@ class FlexibleBody(Component):
         rows.body(self.reduced, self.points, self.speed)
 
 
-def _with_ports(body: ReducedBody, columns: tuple[int, ...], names: tuple[str, ...]) -> ReducedBody:
+def _with_ports(body: ReducedBody, chosen: list[int], names: tuple[str, ...]) -> ReducedBody:
     """Return the same body with some of its ports, under new names."""
-    chosen = list(columns)
     values: dict[str, Any] = {key: getattr(body, key) for key in body.__dataclass_fields__}
     values |= {
         "port_names": names,

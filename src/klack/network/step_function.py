@@ -191,9 +191,11 @@ def address_of(step: StepFunction) -> int:
     """
     if isinstance(step, _PythonStep):
         return step.address
-    result = _compiled(step)
-    name = result.fndesc.llvm_cfunc_wrapper_name
-    return int(result.library.get_pointer_to_function(name))
+    if "address" not in vars(step):
+        result = _compiled(step)
+        name = result.fndesc.llvm_cfunc_wrapper_name
+        step.address = int(result.library.get_pointer_to_function(name))
+    return int(step.address)
 
 
 @njit

@@ -5,10 +5,8 @@ Only records are looked at, not steps: an excursion shorter than a record may be
 
 import warnings
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from klack.arrays import Matrix, Vector
 from klack.errors import AccuracyWarning, ConvergenceError

@@ -3,10 +3,11 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil
+from typing import NamedTuple, Self
 
 import numpy as np
 
-from klack.arrays import Index, Vector
+from klack.arrays import Cube, Index, Vector
 from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.contact.step_constants import LAW_YIELDING, NO_LAW
 from klack.errors import InputError
@@ -49,7 +50,7 @@ from klack.simulation.network_arrays import (
     StepRows,
 )
 from klack.simulation.network_gas import require_chambers, settle_gas
-from klack.simulation.propagator import modal_propagator
+from klack.simulation.propagator import Propagator, modal_propagator
 from klack.simulation.rest import rest_time
 from klack.simulation.step_sizes import StepSizes, kinks
 from klack.simulation.wave_rows import WAVE_THROUGHPUT, Waves, compile_waves, start_wave
@@ -58,7 +59,6 @@ __all__ = [
     "CompiledNetwork",
     "PortName",
     "body_energy",
-    "compile_bodies",
     "compile_network",
     "interface_compliance",
     "modal_state",
@@ -141,7 +141,16 @@ def compile_network(rows: Rows, sizes: StepSizes) -> CompiledNetwork:
             hint="add a rigid-mass or a flexible-body component.",
         )
     port_of, names = _number_ports(rows.bodies)
-    bodies, blocks = compile_bodies(rows.bodies, sizes.seconds)
+    if len(names) >= PORTS:
+        raise InputError(
+            "network",
+            got=f"{len(names)} mechanical ports",
+            expected=f"fewer than {PORTS}",
+            hint="leave out unconnected ports of bodies.",
+        )
+    propagators = _propagators(rows.bodies, sizes.seconds)
+    answers = _Answers.of(rows.bodies, propagators)
+    bodies, blocks = _compile_bodies(rows.bodies, propagators, answers)
     accounts = _Accounts()
     elements = _step_rows(rows.elements, 0, accounts, port_of, {})
     node_order = _order_nodes(rows)
@@ -163,7 +172,7 @@ def compile_network(rows: Rows, sizes: StepSizes) -> CompiledNetwork:
     for k, row in enumerate(rows.waves):
         start_wave(waves, rows.waves, k, *(node_state.p[node_of[node]] for node in (row.a, row.b)))
     interfaces, interface_state = _interfaces(rows, port_of, bodies)
-    sliders, slider_state = _sliders(rows, port_of, bodies, blocks, sizes.seconds)
+    sliders, slider_state = _sliders(rows, port_of, bodies, blocks, answers)
     return CompiledNetwork(
         rows=rows,
         bodies=bodies,
@@ -221,9 +230,40 @@ def _number_ports(rows: Sequence[BodyRow]) -> tuple[dict[int, int], tuple[PortNa
     return port_of, names
 
 
-def compile_bodies(rows: Sequence[BodyRow], steps: Sequence[float]) -> tuple[Bodies, Index]:
+class _Answers(NamedTuple):
     """Lay out the modes in blocks for each step size; also return the first block of each body."""
-    laid_out: tuple[list[Vector], ...] = tuple([] for _ in steps)
+
+    moved: Cube  # displacement at the end per unit force
+    moved_by_rise: Cube  # ... per force that rises evenly by one and has no mean
+    speed: Cube  # speed at the end per unit force
+
+    @classmethod
+    def of(cls, rows: Sequence[BodyRow], propagators: Sequence[Sequence[Propagator]]) -> Self:
+        """Of all bodies, each with its propagators; what follows a course is not moved."""
+        found = np.zeros((3, len(propagators[0]), PORTS, PORTS))
+        first = 0
+        for row, of_body in zip(rows, propagators, strict=True):
+            here = slice(first, first + len(row.ports))
+            shapes = np.asarray(row.body.port_shapes).T
+            for level, P in enumerate(of_body):
+                if row.course is None:
+                    found[0, level, here, here] = (shapes * P.B1) @ shapes.T
+                    found[1, level, here, here] = (shapes * P.R1) @ shapes.T
+                found[2, level, here, here] = (shapes * P.B2) @ shapes.T
+            first = here.stop
+        return cls(*found)
+
+
+def _propagators(rows: Sequence[BodyRow], steps: Sequence[float]) -> list[list[Propagator]]:
+    """Of each body, for each size of step."""
+    return [[modal_propagator(row.body.omega, row.body.damping, h) for h in steps] for row in rows]
+
+
+def _compile_bodies(
+    rows: Sequence[BodyRow], propagators: Sequence[Sequence[Propagator]], answers: _Answers
+) -> tuple[Bodies, Index]:
+    """Lay out the modes in blocks for each step size; also the first block of each body."""
+    laid_out: tuple[list[Vector], ...] = tuple([] for _ in propagators[0])
     start, count, port0, port1 = [0], list[int](), list[int](), list[int]()
     blocks = [0]
     driven, course0, course = list[int](), list[int](), list[Vector]()
@@ -231,15 +271,7 @@ def compile_bodies(rows: Sequence[BodyRow], steps: Sequence[float]) -> tuple[Bod
     ports = sum(len(row.ports) for row in rows)
     first, last = np.zeros(ports + 1, np.int64), np.zeros(ports + 1, np.int64)
     first[ports] = last[ports] = ports
-    if ports >= PORTS:
-        raise InputError(
-            "network",
-            got=f"{ports} mechanical ports",
-            expected=f"fewer than {PORTS}",
-            hint="leave out unconnected ports of bodies.",
-        )
-    G, Gr = np.zeros((2, len(steps), PORTS, PORTS))
-    for row in rows:
+    for row, of_body in zip(rows, propagators, strict=True):
         body, own = row.body, len(row.ports)
         height = FIXED_ROWS + own + 1
         modes = body.mode_count
@@ -253,27 +285,22 @@ def compile_bodies(rows: Sequence[BodyRow], steps: Sequence[float]) -> tuple[Bod
         for begin in range(0, max(modes, 1), ROW):
             part = slice(begin, min(begin + ROW, modes))
             used = part.stop - part.start
-            for level, (h, target) in enumerate(zip(steps, laid_out, strict=True)):
+            for P, target in zip(of_body, laid_out, strict=True):
                 W = np.zeros((height, ROW))
-                P = modal_propagator(body.omega[part], body.damping[part], h)
                 W[ROW_V, :used] = v0[part]
-                W[ROW_A11 : ROW_A11 + 4, :used] = P.A11, P.A12, P.A21, P.A22
-                W[ROW_P1 : ROW_P1 + 2, :used] = (
-                    P.A11 * P.B1 + P.A12 * P.B2,
-                    P.A21 * P.B1 + P.A22 * P.B2,
-                )
-                W[ROW_B1 : ROW_B1 + 2, :used] = P.B1, P.B2
-                W[ROW_K, :used] = body.omega[part] ** 2
-                W[ROW_R1 : ROW_R1 + 2, :used] = P.R1, P.R2
-                if row.course is not None:  # no force moves it, a speed does
-                    W[ROW_A11:FIXED_ROWS] = 0.0
-                    W[ROW_A11, 0], W[ROW_A11 + 1, 0], W[ROW_A11 + 3, 0] = 1.0, h, 1.0
-                shapes = np.asarray(body.port_shapes)[part].T
-                W[FIXED_ROWS:-1, :used] = shapes
-                W[-1, :used] = cm[part]
                 if row.course is None:
-                    G[level, here, here] += (shapes * P.B1) @ shapes.T
-                    Gr[level, here, here] += (shapes * P.R1) @ shapes.T
+                    W[ROW_A11 : ROW_A11 + 4, :used] = [
+                        values[part] for values in (P.A11, P.A12, P.A21, P.A22)
+                    ]
+                    pending = P.A11 * P.B1 + P.A12 * P.B2, P.A21 * P.B1 + P.A22 * P.B2
+                    W[ROW_P1 : ROW_P1 + 2, :used] = [values[part] for values in pending]
+                    W[ROW_B1 : ROW_B1 + 2, :used] = P.B1[part], P.B2[part]
+                    W[ROW_K, :used] = body.omega[part] ** 2
+                    W[ROW_R1 : ROW_R1 + 2, :used] = P.R1[part], P.R2[part]
+                else:  # no force moves it, a speed does
+                    W[ROW_A11, 0], W[ROW_A11 + 1, 0], W[ROW_A11 + 3, 0] = 1.0, P.step, 1.0
+                W[FIXED_ROWS:-1, :used] = np.asarray(body.port_shapes)[part].T
+                W[-1, :used] = cm[part]
                 target.append(W.ravel())
             start.append(start[-1] + height * ROW)
             count.append(4 * ceil(used / 4))
@@ -300,8 +327,8 @@ def compile_bodies(rows: Sequence[BodyRow], steps: Sequence[float]) -> tuple[Bod
         driven_block=np.array(driven, dtype=np.int64),
         course0=np.array(course0, dtype=np.int64),
         course=np.concatenate([*course, np.zeros(1)]),
-        G=G.ravel(),
-        Gr=Gr.ravel(),
+        G=answers.moved.ravel(),
+        Gr=answers.moved_by_rise.ravel(),
         at=np.zeros(ROWS_AT * PORTS),
     )
     return bodies, np.array(blocks, dtype=np.int64)
@@ -485,14 +512,14 @@ def _interfaces(
     lower = np.array([port_of[row.lower] for row in rows.interfaces], dtype=np.int64)
     stroke = float(np.max(np.maximum(gap, film[2]), initial=0.0))
     film_time = stroke / _FLIGHT_SPEED or 1.0  # nothing to fly, no film to judge
-    moved, _ = compile_bodies(rows.bodies, (film_time,))
-    force = film_time / interface_compliance(moved, upper, lower)[:count]  # that gives 1 m/s
+    moved = _Answers.of(rows.bodies, _propagators(rows.bodies, (film_time,))).moved
+    force = film_time / interface_compliance(moved, upper, lower)  # that gives 1 m/s
     rest = [rest_time(row, (owner.get(row.upper), owner.get(row.lower))) for row in rows.interfaces]
     interfaces = Interfaces(
         interfaces=count,
         upper=upper,
         lower=lower,
-        G=interface_compliance(bodies, upper, lower),
+        G=interface_compliance(bodies.G, upper, lower),
         dry=np.array([row.film is None for row in rows.interfaces], dtype=np.int64),
         gap0=gap,
         kind=kind,
@@ -533,7 +560,7 @@ def _sliders(
     port_of: Mapping[int, int],
     bodies: Bodies,
     body_blocks: Index,
-    steps: Sequence[float],
+    answers: _Answers,
 ) -> tuple[Sliders, SliderState]:
     count = len(rows.sliders)
     upper = np.array([port_of[row.upper] for row in rows.sliders], dtype=np.int64)
@@ -542,7 +569,8 @@ def _sliders(
     place = [i for row in rows.bodies for i in range(len(row.ports))]
     places = [port for ends in zip(upper, lower, strict=True) for port in ends]
     joined = [(p, owner[p], place[p]) if p < bodies.ports else (p, 0, 0) for p in places]
-    kick = _speed_per_force(rows.bodies, steps) @ _jumps(upper, lower).T  # (SIZES, PORTS, n)
+    kick = answers.speed[:, :, upper] - answers.speed[:, :, lower]  # (SIZES, PORTS, n)
+    every = np.arange(count)
     sliders = Sliders(
         sliders=count,
         upper=upper,
@@ -551,8 +579,8 @@ def _sliders(
         excess=np.array([row.breakaway - row.coulomb for row in rows.sliders], dtype=float),
         stribeck=np.array([row.stribeck_speed for row in rows.sliders], dtype=float),
         viscous=np.array([row.viscous for row in rows.sliders], dtype=float),
-        G=interface_compliance(bodies, upper, lower),
-        D=np.einsum("cj,ljc->lc", _jumps(upper, lower), kick).ravel(),
+        G=interface_compliance(answers.moved, upper, lower),
+        D=(kick[:, upper, every] - kick[:, lower, every]).ravel(),
         kick=np.ascontiguousarray(kick.transpose(0, 2, 1)).ravel(),
         block0=np.array([body_blocks[b] for _, b, _ in joined], dtype=np.int64),
         block1=np.array(
@@ -563,32 +591,11 @@ def _sliders(
     return sliders, SliderState(seen=np.zeros(count), force=np.zeros(count))
 
 
-def _speed_per_force(rows: Sequence[BodyRow], steps: Sequence[float]) -> Vector:
+def interface_compliance(G: Vector, upper: Index, lower: Index) -> Vector:
     """Speed of each port at the end of a step per force at another, (SIZES, PORTS, PORTS)."""
-    found = np.zeros((len(steps), PORTS, PORTS))
-    for level, h in enumerate(steps):
-        first = 0
-        for row in rows:
-            here = slice(first, first + len(row.ports))
-            shapes = np.asarray(row.body.port_shapes).T
-            pending = modal_propagator(row.body.omega, row.body.damping, h).B2
-            found[level, here, here] = (shapes * pending) @ shapes.T
-            first += len(row.ports)
-    return found
-
-
-def _jumps(upper: Index, lower: Index) -> Vector:
-    """Displacement between two ports per displacement of each port, (n, PORTS)."""
-    jump = np.zeros((len(upper), PORTS))
-    jump[np.arange(len(upper)), upper] += 1.0
-    jump[np.arange(len(lower)), lower] -= 1.0
-    return jump
-
-
-def interface_compliance(bodies: Bodies, upper: Index, lower: Index) -> Vector:
-    """Opening of each gap per unit force during a step of each size, flat."""
-    jump = _jumps(upper, lower)
-    return np.einsum("ci,lij,cj->lc", jump, bodies.G.reshape(-1, PORTS, PORTS), jump).ravel()
+    of = G.reshape(-1, PORTS, PORTS)
+    own = of[:, upper, upper] + of[:, lower, lower]
+    return np.asarray(own - of[:, upper, lower] - of[:, lower, upper]).ravel()
 
 
 def modal_state(network: CompiledNetwork, body: int) -> tuple[Vector, Vector]:
