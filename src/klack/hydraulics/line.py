@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, model_validator
 
 from klack.errors import InputError
+from klack.hydraulics.fluid import Fluid
 from klack.hydraulics.line_friction import KAGAWA, laminar_resistance, unsteady_terms
 from klack.hydraulics.liquid import HIGHEST_PRESSURE
 from klack.hydraulics.local_line import LocalLine
@@ -301,13 +302,17 @@ class Line(Component):
                 "at such times."
             )
 
+        if isinstance(fluid, Fluid):
+            valid = _kept_range(self, fluid, pressure)
+        else:  # of the user's own
+            valid = _followed(self, fluid, pressure)
         nodes = {rows.port(port) for port in self.ports} & rows.nodes.keys()
         return [
             LimitRow(
                 component=rows.component,
                 quantity="pressure at an end",
                 unit="Pa",
-                valid=_followed(self, fluid, pressure),
+                valid=valid,
                 law=f"the line '{rows.component}' with the fluid of {1e-5 * pressure:.4g} bar",
                 effect=effect,
                 advice=f"give components.{rows.component}.pressure the working pressure of "
@@ -321,11 +326,13 @@ class Line(Component):
 
 
 @lru_cache(maxsize=100)
-def _followed(line: Line, fluid: NetworkFluid, pressure: float) -> tuple[float, float]:
-    """Pressures about that of a line for which its one speed and impedance hold.
+def _kept_range(line: Line, fluid: Fluid, pressure: float) -> tuple[float, float]:
+    """Range that strokes of one valve share."""
+    return _followed(line, fluid, pressure)
 
-    Kept, because strokes of one valve share them.
-    """
+
+def _followed(line: Line, fluid: NetworkFluid, pressure: float) -> tuple[float, float]:
+    """Pressures about that of a line for which its one speed and impedance hold."""
     boiling = fluid.all_liquid_from  # below it the line opens a cavity of its own
     below = np.geomspace(min(boiling, pressure), pressure, _LOOKED_AT)
     above = np.geomspace(pressure, max(HIGHEST_PRESSURE, 2.0 * pressure), _LOOKED_AT)

@@ -180,9 +180,9 @@ def circuit_numbers(circuit: MagneticCircuit) -> Vector:
     if any(tube.gap.size or tube.iron.size or tube.remanence for tube in touched):
         head[SETTLES] = offset  # else they always balance
         tables.append(np.append(float(directions.shape[0] - 1), directions.ravel()))
-    numbers = np.concatenate((head, circuit.loop_turns, *blocks, *tables))
-    numbers.flags.writeable = False  # kept, because strokes of one valve share them
-    return numbers
+    flat = np.concatenate((head, circuit.loop_turns, *blocks, *tables))
+    flat.flags.writeable = False  # kept, because strokes of one valve share it
+    return flat
 
 
 def free_directions(circuit: MagneticCircuit) -> Vector:
