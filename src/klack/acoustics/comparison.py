@@ -41,7 +41,7 @@ def impact_third_octaves(history: ImpactHistory, *, high: float | None = None) -
 
     Parameters
     ----------
-    high : float [Hz] or None
+    high [Hz]
         ``None``: a tenth of the record rate.
     """
     series = first_impact(history)

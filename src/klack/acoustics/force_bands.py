@@ -42,7 +42,7 @@ class BandDensity:
     ----------
     low, high [Hz]
         The bands within these limits.
-    frequency, values : array, shape (k,) [Hz], [N^2 s/Hz]
+    frequency, values (k,) [Hz], [N^2 s/Hz]
         A little beyond both limits.
     """
 

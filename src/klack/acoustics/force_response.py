@@ -121,7 +121,7 @@ class ModalResponse:
     blocked_force [N]
         Axial force on the hold, means over the intervals; along +z from the forces.
     sample_time (k,) [s]
-    modal_displacement, modal_velocity : array, shape (k, m) [m sqrt(kg)], [m sqrt(kg)/s]
+    modal_displacement, modal_velocity (k, m) [m sqrt(kg)], [m sqrt(kg)/s]
         States at the sample times.
     """
 
@@ -169,7 +169,7 @@ def modal_response(
     forces : mapping of port name to TimeSeries [N]
         Along +z, means over intervals whose middles are their times, all on one grid.  The first
         value has always acted.
-    sample : float [s], optional
+    sample [s]
         Spacing of recorded states; none are recorded without.
     """
     axis, values = aligned_forces(structure, forces)

@@ -59,7 +59,7 @@ def harmonic_response(
     ----------
     frequency (k,) [Hz]
         Zero or above.
-    mount, plate : Mount, Plate or None
+    mount, plate
         What is below the held surfaces.
     """
     f, at = response_axis(frequency), structure.port_index(port)

@@ -40,7 +40,7 @@ def injected_density(
         With damping in every mode.
     forces : mapping of port name to TimeSeries [N]
         Along +z, means over intervals, constant within them; held at the last value afterwards.
-    resolution : float [Hz], optional
+    resolution [Hz]
         Inverse of the time left after the record for the vibration to die away; a third of the
         narrowest half width ``zeta f`` without.
 

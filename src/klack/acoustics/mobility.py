@@ -44,21 +44,17 @@ def transfer_mobility(
     plate: Plate | None = None,
     residual: bool = True,
 ) -> NDArray[np.complex128]:
-    """Velocity of one port per force at another [m/(N s)], ``exp(+i omega t)``.
+    """Velocity of one port per force at another [m/(N s)], ``exp(+i omega t)``, shape (k,).
 
     Parameters
     ----------
     output, source
         Names of ports.
     frequency (k,) [Hz]
-    mount, plate : Mount, Plate or None
+    mount, plate
         What is below the held surfaces.
     residual
         Add the static rest of the modes left out.
-
-    Returns
-    -------
-    complex array, shape (k,)
     """
     answer = harmonic_response(structure, frequency, source, mount=mount, plate=plate)
     i, j = structure.port_index(output), structure.port_index(source)

@@ -34,7 +34,7 @@ class Mount:
     stiffness [N/m]
         Along the axis.
     loss_factor [-]
-    mass : float [kg] or None
+    mass [kg]
         Of all that moves on it; the mass of the structure without.
     """
 
@@ -79,7 +79,6 @@ def support_mobility(
     Parameters
     ----------
     frequency (k,) [Hz]
-    mount, plate : Mount, Plate or None
     """
     omega = 2.0 * np.pi * np.asarray(frequency, dtype=float)
     total = np.zeros(omega.shape, dtype=complex)

@@ -30,16 +30,12 @@ _STEP, _FINE = 0.5e-3, 24  # [s], steps within each
 
 
 def nonlinear_decay(core: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Core loudness with the decay of hearing.
+    """Core loudness with the decay of hearing, shape (bands, n) [sone/Bark].
 
     Parameters
     ----------
     core (bands, n) [sone/Bark]
         Every 0.5 ms, zero or more; silence before the first and after the last value.
-
-    Returns
-    -------
-    array, shape (bands, n) [sone/Bark]
     """
     h = _STEP / _FINE
     b = (_LONG - _SHORT) / (_SHORT * _VARIABLE)

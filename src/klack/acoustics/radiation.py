@@ -87,9 +87,9 @@ def power_transfer(
         Above zero; fine enough for the resonances, whose half-power width is ``2 zeta f``.
     port
         Where the force acts along z.
-    mount, plate : Mount, Plate or None
+    mount, plate
         What is below the held surfaces.
-    efficiency : "piston" or "unity"
+    efficiency
         Of the surface of the body; the plate has its own.
     """
     air = air or Air()

@@ -22,7 +22,7 @@ __all__ = ["audio_band", "click_pressure", "minimum_phase_filter", "pressure_tra
 
 
 def minimum_phase_filter(magnitude: NDArray[np.float64]) -> NDArray[np.complex128]:
-    r"""Frequency response of minimum phase with a given magnitude.
+    r"""Frequency response of minimum phase with a given magnitude, shape (N/2 + 1,).
 
     A magnitude alone does not say when a filter answers.  Of all causal and stable filters of one
     magnitude the minimum-phase one gathers its energy first; its phase is the Hilbert transform of
@@ -37,10 +37,6 @@ def minimum_phase_filter(magnitude: NDArray[np.float64]) -> NDArray[np.complex12
         At N/2 + 1 frequencies, evenly from 0 to half the sampling rate; above zero everywhere.
         The cepstrum must have died out within N/2 samples, so N is taken much longer than the
         filter rings.
-
-    Returns
-    -------
-    complex array, shape (N/2 + 1,)
 
     Examples
     --------
@@ -150,7 +146,7 @@ def pressure_transfer(
     *,
     rate: float,
 ) -> NDArray[np.complex128]:
-    r"""Minimum-phase filter with a given squared magnitude, band limited.
+    """Minimum-phase filter with a given squared magnitude, band limited.
 
     Of the magnitude ``(2 sin(pi f / rate))^2`` is taken out before the logarithm is transformed and
     put back as ``(1 - z^-1)^2``, which is of minimum phase itself: at 0 Hz the rest is finite.
@@ -159,7 +155,7 @@ def pressure_transfer(
     ----------
     f (N/2 + 1,) [Hz]
         Evenly from 0 to half the rate.
-    frequency, squared : array, shape (k,) [Hz], [Pa^2/N^2]
+    frequency, squared (k,) [Hz], [Pa^2/N^2]
         Interpolated as in :func:`click_pressure`.
     rate [Hz]
     """

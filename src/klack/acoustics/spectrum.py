@@ -210,7 +210,7 @@ def force_spectrum(series: TimeSeries, *, high: float, resolution: float | None 
         Means over its steps.
     high [Hz]
         Last frequency; record at least twice as many values per second.
-    resolution : float [Hz] or None
+    resolution [Hz]
         Largest distance of the frequencies; ``None``: an eighth of the inverse length of the
         record, within 0.1 and 2 Hz.
     """

@@ -79,9 +79,8 @@ class SurfaceSpectra:
 
     Parameters
     ----------
-    mount, plate : Mount, Plate or None
     bands (n, 2) [Hz]
-    parts : tuple
+    parts
         Spectra, decade by decade.
     """
 
@@ -161,7 +160,7 @@ def surface_spectra(
         Along +z, means over intervals; held at their first and last values outside.
     bands (n, 2) [Hz]
         Lower and upper edges, ascending.
-    mount, plate : Mount, Plate or None
+    mount, plate
         What is below the held surfaces.
     """
     aligned_forces(structure, forces)
@@ -215,7 +214,6 @@ def radiated_bands(
     ----------
     structure, forces, bands, mount, plate
         See :func:`surface_spectra`.
-    efficiency : "piston" or "unity"
     """
     spectra = surface_spectra(structure, forces, bands, mount=mount, plate=plate)
     return spectra.radiated(efficiency=efficiency, air=air)

@@ -35,12 +35,10 @@ class GivenPair:
 
     Parameters
     ----------
-    ports : pair of str
     law : LinearLaw or HertzLaw
         Of the contact zone, as the case gives it.
     series_compliance [m/N]
         What the modes of both bodies miss, in series with the law.
-    summaries : pair of BodySummary
     """
 
     upper: ReducedBody

@@ -234,7 +234,6 @@ def turned(
 
     Parameters
     ----------
-    case : Case or ValveCase
     body
         Half section.
     axial
@@ -322,7 +321,7 @@ def off_axis_space(
         Centre of mass of the moving body.
     upper_moves
         Whether that is the upper one.
-    angle : array, shape (n,) [rad], or None
+    angle (n,) [rad], or None
         Of the points of every ring; None for solids.
     """
     reach = space.reach

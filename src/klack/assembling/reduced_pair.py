@@ -73,9 +73,8 @@ class ReducedPair:
 
     Parameters
     ----------
-    ports : pair of Port
+    ports
         Contact ports of the upper and of the lower body, resultant +1 N along z each.
-    law : contact law
     local
         The consistent law with its shares; None for another kind.
     pattern_force [N]
@@ -200,7 +199,6 @@ def reduce_pair(
     Parameters
     ----------
     pools : mapping of body name to Modes
-    correction : "consistent", "attachment" or "none"
     selection : mapping of body name to ModeSelection
     stiffness [N/m]
         Of the local contact, for corrections that do not compute their own law.
@@ -391,8 +389,7 @@ def impact_system(
 
     Parameters
     ----------
-    law : contact law
-    ports : pair of str
+    ports
         Where they meet, on the upper and on the lower body.
     series_compliance [m/N]
         In series with the law.

@@ -69,7 +69,7 @@ def tilting_film(
 
     Parameters
     ----------
-    space : ContactSpace or RingSpace
+    space
         Contact points of the stop, centred, all round.
     reach [m]
         Their largest gap in touch.
@@ -113,7 +113,7 @@ class Meeting:
 
     Parameters
     ----------
-    space : ContactSpace or RingSpace
+    space
         Contact points.
     reach [m]
         Largest gap of those of the centred bodies in touch.
@@ -237,7 +237,7 @@ def valve_of_meetings(
     ----------
     model
         With the contacts of the meetings.
-    placement : array, shape (6,) [m], [rad]
+    placement (6,) [m], [rad]
         Of the needle at the start.
     """
     parts = case.network.components

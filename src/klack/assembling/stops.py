@@ -70,7 +70,7 @@ class StopContact:
         Both bodies as they touch; the meshes are moved copies, the matrices are shared.
     static
         Without friction.
-    ports : pair of Port
+    ports
         Of the upper and of the lower body, resultant +1 N along z each, named like the surface.
     pattern_force [N]
         Force at which the pressure pattern of the ports was taken: the peak of an impact at the
@@ -108,9 +108,9 @@ class StopFaces:
     ----------
     local
         While the faces close, with its shares.
-    law : TableLaw, RubbingLaw or YieldingLaw
+    law
         All that the modes miss; with memory where faces have friction or yield.
-    faces : TableLaw, RubbingLaw or YieldingLaw
+    faces
         The same without the bulk, which a film presses on as well.
     bulk [m/N]
         Series compliance behind ``faces``.

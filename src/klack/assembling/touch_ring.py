@@ -32,7 +32,7 @@ def touch_ring(upper: TouchingSide, lower: TouchingSide) -> tuple[NDArray[np.flo
 
     Returns
     -------
-    ring : array, shape (n, 3) [m]
+    ring (n, 3) [m]
         None for faces that touch all at once.
     clearance : float [m]
         Along the axis, between the bodies as drawn or as meshed.

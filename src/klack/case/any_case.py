@@ -50,7 +50,6 @@ def load_valve_case(path: str | Path, components: OwnComponents = ()) -> ValveCa
 
     Parameters
     ----------
-    path : str or Path
     components : iterable of type
         Components of the user's own that the case may name, as ``package.module:Class``.
     """

@@ -29,7 +29,6 @@ def fitting_example(case: type[Section], data: Any, key: Key, kind: Kind) -> str
     case : type of Section
     data
         The parsed file, which need not be a valid case.
-    key : tuple of str and int
     kind
         Whose example is taken where the field tells nothing.
     """

@@ -23,7 +23,6 @@ class Quantity:
 
     Parameters
     ----------
-    key : tuple of str and int
     kind
         Of quantity; its unit is that of all values here.
     value

@@ -47,7 +47,7 @@ def filled(data: Any, key: Key, scope: Scope, origin: Origin, found: dict[Key, F
 
     Parameters
     ----------
-    key : tuple of str and int
+    key
         In the expanded case.
     scope
         Names that expressions may use.

@@ -19,7 +19,7 @@ class Origin:
 
     Parameters
     ----------
-    key : tuple of str and int
+    key
         In that file.
     copy
         Name of the included part; empty for the case itself.

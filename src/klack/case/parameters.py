@@ -95,11 +95,9 @@ def parameters_of_text(
     Parameters
     ----------
     written : mapping of str to str or number
-    where
-        File, line and name of a parameter, for errors.
     given
         Values that replace those of the text; of the same dimension where the text has one.
-    section : tuple
+    section
         Key of the parameters of a case, whose values follow from themselves; empty for a part.
     where_given
         File, line and name of a given value, for errors.

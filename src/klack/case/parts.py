@@ -93,8 +93,6 @@ def part_name(folder: str, file: str, where: str) -> str:
     ----------
     folder
         Of the file that includes it, relative to that of the case.
-    where
-        File, line and key of the include, for errors.
 
     Raises
     ------

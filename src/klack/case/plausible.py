@@ -24,9 +24,9 @@ class Range:
     ----------
     unit
         SI, without prefix.
-    usual : pair of float
+    usual
         Outside: in doubt.
-    possible : pair of float
+    possible
         Outside: an error.
     reason
         Why, as one clause.

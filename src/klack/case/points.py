@@ -97,7 +97,7 @@ def points_of(case: AnyCase, tree: CaseTree, given: GivenPoints) -> Points:
 
     Parameters
     ----------
-    case : Case or ValveCase
+    case
         As it is, without any of the points.
     tree
         The same as it was written.
@@ -164,7 +164,7 @@ def case_at(
 
     Parameters
     ----------
-    kind : type
+    kind
         ValveCase, or Case of an impact.
     tree
         As written.

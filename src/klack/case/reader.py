@@ -112,7 +112,7 @@ def load_case(path: str | Path) -> Case:
 
     Parameters
     ----------
-    path : str or Path
+    path
         YAML file.  Files that it names are looked for relative to its own folder.
 
     Returns

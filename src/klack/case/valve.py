@@ -86,12 +86,7 @@ class ValveCase(ValveSections):
 
 
 def require_valve(data: Any, path: Path, lines: Lines) -> None:
-    """Refuse the parsed case of an impact where that of a whole valve is needed.
-
-    Raises
-    ------
-    InputError
-    """
+    """Refuse the parsed case of an impact where that of a whole valve is needed."""
     if "contact" in data and "network" not in data:
         raise InputError(
             f"{path}:{lines.find(('contact',), on_key=True)}: contact",

@@ -105,8 +105,8 @@ class AsperityLayer:
 
         Returns
         -------
-        pressure : array, shape (n,) [Pa]
-        slope : array, shape (n,) [Pa/m]
+        pressure (n,) [Pa]
+        slope (n,) [Pa/m]
             Over ``closure``.
         """
         moved = closure - before
@@ -155,13 +155,9 @@ def press(
 
     Returns
     -------
-    force : array, shape (n,) [N]
-    gap : array, shape (n,) [m]
+    force (n,) [N]
+    gap (n,) [m]
         Negative by the closure where the layer is pressed.
-
-    Raises
-    ------
-    ConvergenceError
     """
 
     def missed(gap: Floats) -> tuple[Floats, Floats, Floats]:

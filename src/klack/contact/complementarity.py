@@ -73,9 +73,9 @@ class ComplementaritySolver:
 
         Returns
         -------
-        lam : array, shape (n,) [N]
+        lam (n,) [N]
             Not below zero.
-        active : bool array, shape (n,)
+        active (n,)
             Points that carry, the guess for the next call.
         rounds : int
             Active sets tried.
@@ -196,8 +196,8 @@ def solve_lcp(
 
     Returns
     -------
-    lam : array, shape (n,) [N]
-    active : bool array, shape (n,)
+    lam (n,) [N]
+    active (n,)
     rounds : int
 
     Examples

@@ -20,7 +20,7 @@ class FaceFriction:
 
     Parameters
     ----------
-    T_a, T_b : sparse array, shape (ways nc, dofs of a), (ways nc, dofs of b) [-]
+    T_a, T_b (ways nc, dofs of a), (ways nc, dofs of b) [-]
         Displacement of a past b, ``T_a u_a + T_b u_b``: all points in the first direction, then in
         the second one (:func:`klack.contact.mortar.tangent_rows`).
     """
@@ -68,7 +68,7 @@ def lifted_offset(rows: csr_array, dimension: int) -> NDArray[np.float64]:
 
     Parameters
     ----------
-    rows : sparse array, shape (ways nc, dofs of the body)
+    rows (ways nc, dofs of the body)
         ``T_a`` or ``T_b`` of :class:`FaceFriction`.
     """
     along = np.zeros(rows.shape[1])

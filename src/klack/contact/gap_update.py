@@ -195,12 +195,12 @@ class RingGaps:
 
         Parameters
         ----------
-        placement : array, shape (6,) [m], [rad]
+        placement (6,) [m], [rad]
             Translation of ``centre`` and rotation vector, from where the section was built.
 
         Returns
         -------
-        array, shape (nc, n) [m]
+        (nc, n) [m]
             Of every hat at every angle.
         """
         position, normal = (_around(x, self.angle) for x in (self.hats.position, self.hats.normal))
@@ -251,9 +251,9 @@ class RigidGaps:
 
     Parameters
     ----------
-    position, normal : array, shape (p, 3) [m], [-]
+    position, normal (p, 3) [m], [-]
         Integration points of the slave side.
-    weight : sparse array, shape (nc, p) [m^2]
+    weight (nc, p) [m^2]
     near
         Of the master side.
     centre (3,) [m]
@@ -325,16 +325,12 @@ class RigidGaps:
         )
 
     def __call__(self, placement: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Gaps at a rigid placement of body a.
+        """Gaps at a rigid placement of body a, shape (nc,) [m].
 
         Parameters
         ----------
-        placement : array, shape (6,) [m], [rad]
+        placement (6,) [m], [rad]
             Translation of ``centre`` and rotation vector, from where the space was built.
-
-        Returns
-        -------
-        array, shape (nc,) [m]
         """
         position, normal = carried(
             self.position, self.normal, placement, self.centre, slave_moves=self.slave_moves

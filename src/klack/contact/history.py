@@ -154,11 +154,11 @@ class ImpactHistory:
         Relative speed of approach at the start, above zero.
     mass_a, mass_b [kg]
         ``mass_b`` is ``inf`` for a supported body.
-    peak_force : array, shape (n,) [N], optional
+    peak_force (n,) [N], optional
         Largest force of any integration step within the interval; the mean where not given.
-    displacement_a, displacement_b : array, shape (n + 1,) [m], optional
+    displacement_a, displacement_b (n + 1,) [m], optional
         Of the contact ports along z; empty where not given.
-    external_force : array, shape (n,) [N], optional
+    external_force (n,) [N], optional
         Mean axial force on body a from outside the contact (springs, constant forces), + in z.
     longest_period [s]
         Of the elastic modes of body a; 0 for a rigid body.  Separates clusters of sub-contacts.

@@ -85,7 +85,7 @@ class ContactSpace:
 
     Parameters
     ----------
-    G_a, G_b : sparse array, shape (nc, dofs of a), (nc, dofs of b) [-]
+    G_a, G_b (nc, dofs of a), (nc, dofs of b) [-]
     gap (nc,) [m]
         Initial weighted gaps, positive when open.
     area (nc,) [m^2]
@@ -100,7 +100,7 @@ class ContactSpace:
         ``reach``.  None of them may ever carry a force.
     size (nc,) [m]
         Element size across the contact (mean shortest extent of the slave faces at the hat).
-    slave : "a" or "b"
+    slave
         Side that carries the hats, the finer one.
     nodes (nc,)
         Slave node of each hat.
@@ -213,7 +213,7 @@ def contact_space(
         largest expected approach, so that the contact never grows to the rim.  Without it the
         reach is set by cost: the faces with the smallest gaps, up to about 400 contact points
         (axisymmetric) or 1000 (solid).
-    slave : "a" or "b", optional
+    slave
         Side that carries the multipliers; without it the side with the smaller elements across
         the contact.
 
@@ -485,9 +485,9 @@ class HatQuadrature:
 
     Parameters
     ----------
-    position, normal : array, shape (p, d) [m], [-]
+    position, normal (p, d) [m], [-]
         Points of the slave faces and their outward normals.
-    weight : sparse array, shape (nc, p) [m^2]
+    weight (nc, p) [m^2]
         Hat times area, W.
     """
 
@@ -559,7 +559,7 @@ def tangent_rows(
 
     Returns
     -------
-    T_a, T_b : sparse array, shape (ways nc, dofs of a), (ways nc, dofs of b) [-]
+    T_a, T_b (ways nc, dofs of a), (ways nc, dofs of b) [-]
         All points in the first direction, then in the second one.
     """
     sides = {"a": (mesh_a, surface_a), "b": (mesh_b, surface_b)}

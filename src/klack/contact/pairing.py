@@ -175,7 +175,7 @@ def project_to_surface(
 
     Parameters
     ----------
-    points, normals : array, shape (p, d) [m], [-]
+    points, normals (p, d) [m], [-]
     mesh, surface : the master side
     deepest [m]
         Deepest penetration that counts as one; a tenth of the extent of the master surface unless

@@ -125,10 +125,10 @@ def cut_nearest(
 
     Returns
     -------
-    face : int array, shape (p,)
+    face (p,)
         -1 where nothing is cut.
-    xi : array, shape (p, 2)
-    gap : array, shape (p,)
+    xi (p, 2)
+    gap (p,)
     """
     count = len(points)
     face = np.full(count, -1, dtype=np.int64)
@@ -153,7 +153,7 @@ def cut_listed(
 
     Returns
     -------
-    gap : array, shape (p,)
+    gap (p,)
         nan where nothing is cut.
     """
     gap = np.full(len(points), np.nan)
@@ -176,7 +176,7 @@ def list_near(
 
     Returns
     -------
-    first : int array, shape (p + 1,)
+    first (p + 1,)
     listed : int array
         Faces ``listed[first[p]:first[p + 1]]`` are near line p.
     """

@@ -85,7 +85,7 @@ def contact_compliance(
 
     Returns
     -------
-    array, shape (nc, nc) [m/N]
+    (nc, nc) [m/N]
         Symmetric; with faces of all rows.
     """
     rows = space.G_a, space.G_b
@@ -108,12 +108,12 @@ def compliances_of(
 
     Parameters
     ----------
-    groups : sequence of int arrays
+    groups
         Of points, see :func:`klack.bodies.elasticity.condensation.condensed_inverse`.
 
     Returns
     -------
-    C_a, C_b : array, shape (nc, nc) [m/N]
+    C_a, C_b (nc, nc) [m/N]
         Symmetric; their sum is :func:`contact_compliance`.
     """
     _require_memory(space.G_a, space.G_b)
@@ -132,11 +132,11 @@ def condensed_compliance(
 
     Parameters
     ----------
-    rows_a, rows_b : sparse array, shape (n, dofs of a), (n, dofs of b) [-]
+    rows_a, rows_b (n, dofs of a), (n, dofs of b) [-]
 
     Returns
     -------
-    array, shape (n, n) [m/N]
+    (n, n) [m/N]
         Symmetric.
     """
     _require_memory(rows_a, rows_b)
@@ -548,10 +548,6 @@ def check_state(
         That is asked for.
     deepest [m]
         Approach that is asked for.
-
-    Raises
-    ------
-    ReachError
     """
     touched = bool(np.any(lam[space.rim] > 0))
     if not touched or space.complete_at(approach + min(space.clearance, space.touch)):

@@ -53,7 +53,7 @@ def relative_curvatures(
 
     Returns
     -------
-    array, shape (d - 1,)
+    (d - 1,)
         Convex positive: about 1/R for a sphere on a plane, 0 for flat on flat.  nan where too
         little of the faces around that point has something to face.
     """

@@ -115,12 +115,7 @@ class YieldingLaw:
         return float(max(opening.max(), closing.max()))
 
     def require(self, reached: float) -> None:
-        """Refuse an indentation [m] beyond the last state.
-
-        Raises
-        ------
-        InputError
-        """
+        """Refuse an indentation [m] beyond the last state."""
         if reached > self.largest[-1] * (1.0 + 1e-9):
             raise InputError(
                 "law of faces that yield",

@@ -54,7 +54,7 @@ class CalculixResult:
         Axial contact force, pressing the bodies apart above zero.
     sideways (n,) [N]
         Magnitude of the resultant normal to the axis.
-    contact_energy : array, shape (n,) [J] or empty
+    contact_energy (n,) [J] or empty
         Stored in the penalty.
     internal, kinetic : mapping of set name to array, shape (n,) [J]
         Strain and kinetic energy of the element sets that were printed.

@@ -90,7 +90,7 @@ class ModelOutput:
     quantity : "displacement" [m] or "velocity" [m/s]
     shape (m,) [1/sqrt(kg)]
         Times the modal displacements or velocities.
-    offset : float [m] or [m/s]
+    offset [m] or [m/s]
         Value at ``q = 0``.
     """
 
@@ -111,7 +111,7 @@ class ModelContact:
         ``gamma`` of the gap.
     gap [m]
         At ``q = 0``.
-    law : contact law or None
+    law
         None: only a film.
     series_compliance [m/N]
     """
@@ -132,12 +132,11 @@ class ModalModel:
     ----------
     name
         An identifier: letters, digits and underscores.
-    kind : "body" or "pair"
-    omega, damping : array, shape (m,) [rad/s], [-]
+    omega, damping (m,) [rad/s], [-]
         Of all modes of all bodies; rigid modes have 0.
     mode_names
         ``needle_1``, ``needle_2``, ..., body by body.
-    start, start_velocity : array, shape (m,) [m sqrt(kg)], [m/s sqrt(kg)]
+    start, start_velocity (m,) [m sqrt(kg)], [m/s sqrt(kg)]
         Modal state at the start.
     rise (m,) [sqrt(kg)]
         Modal displacements of a rigid motion of the moving body of a pair by 1 m along +z.

@@ -89,10 +89,10 @@ class SecondOrder:
 
     Parameters
     ----------
-    M, D, K : sparse array, shape (m, m)
+    M, D, K (m, m)
         Identity, ``2 zeta omega``, ``omega^2``.
-    B : sparse array, shape (m, n_inputs)
-    C, G : sparse array, shape (n_outputs, m)
+    B (m, n_inputs)
+    C, G (n_outputs, m)
         Of modal displacements and velocities.
     """
 

@@ -49,8 +49,6 @@ def require_entry(where: str, name: str, library: Mapping[str, _Entry], otherwis
 
     Parameters
     ----------
-    where
-        For the error.
     library : mapping of str to entry
     otherwise
         What to try where no entry has a similar name.

@@ -86,8 +86,8 @@ def velocity_of(
     ----------
     time (n,) [s]
         Uniform.
-    lift : array, shape (n,) or (strokes, n) [m]
-    bandwidth : float [Hz], optional
+    lift (n,) or (strokes, n) [m]
+    bandwidth [Hz]
         Frequency at which 3 dB may be lost; the nearest window that loses no more is used.  Chosen
         by the noise without.
 
@@ -150,7 +150,7 @@ def noise_floor(records: NDArray[np.float64], step: float) -> tuple[NDArray[np.f
 
     Returns
     -------
-    power : array, shape (n // 2,) [m^2]
+    power (n // 2,) [m^2]
         Mean squared value of one sample per line, at the frequencies ``1 .. n // 2`` of the record
         of second differences; white noise of standard deviation s gives s^2 at every line.
     noise : float [m]

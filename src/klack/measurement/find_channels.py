@@ -67,9 +67,9 @@ def find_channels(
     ----------
     channels : mapping of role to ChannelChoice, optional
         From the section ``measurement``; patterns may match several channels.
-    needed : collection of roles
+    needed
         What the recording must have.
-    roles : collection of roles
+    roles
         What is looked for; others are left alone, even if they are named.
 
     Returns

@@ -185,19 +185,19 @@ def fit_flight(
 
     Parameters
     ----------
-    time, lift : array, shape (n,) [s], [m]
+    time, lift (n,) [s], [m]
         More samples than terms.
     degree
         Of the polynomial of a flight that does not turn.
     sensor [s^i]
         :func:`klack.measurement.lift_sensor.sensor_polynomial`.
-    turning_point : float [s], optional
+    turning_point [s]
         Of a flight that turns.
     correlation [-]
         See :func:`correlation_factor`.
     floor [m]
         Least standard deviation of a sample.
-    noise : float [m], optional
+    noise [m]
         Standard deviation about other flights; helps where there are few samples.
     """
     turns = turning_point is not None

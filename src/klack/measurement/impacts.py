@@ -100,7 +100,7 @@ def measure_stroke(
         Uniform.
     lift (n,) [m]
         Rising while the valve opens; as the sensor shows it if there is a sensor.
-    seat, opening : float [m], optional
+    seat, opening [m]
         True lift at which the needle touches the seat and the opening stop; found from where it
         rests without.  ``nan`` for a stop that does not exist.
     sensor

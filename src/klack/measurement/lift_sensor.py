@@ -43,7 +43,7 @@ def sense(
     ----------
     time (n,) [s]
         Uniform.
-    lift : array, shape (n,) or (strokes, n) [m]
+    lift (n,) or (strokes, n) [m]
         True lift at the place of the sensor.
 
     Returns
@@ -152,7 +152,7 @@ def trigger_instant(time: Vector, values: Vector, trigger: Trigger, step: float)
 
     Parameters
     ----------
-    time, values : array, shape (n,) [s], [SI]
+    time, values (n,) [s], [SI]
     step [s]
         Between two samples of the recorder.
     """

@@ -157,7 +157,7 @@ def load_stroke_set(
         is one stroke in its own time.
     progress
         Called with the share of the files that is done, 0 to 1.
-    roles : collection of roles
+    roles
         Channels that are read beside that of the trigger; of them the recording must have the lift.
         A bench that records less than another can so share its description.
 

@@ -80,8 +80,6 @@ def measure_pulse(time: Floats, values: Floats, where: str) -> Pulse:
     Parameters
     ----------
     time, values (n,)
-    where
-        For errors.
 
     Raises
     ------

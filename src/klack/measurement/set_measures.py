@@ -74,7 +74,6 @@ class Column:
 
     Parameters
     ----------
-    stop : "opening" or "seat"
     quantity, unit
         Among :data:`QUANTITIES`.
     values, errors (strokes,)
@@ -195,7 +194,6 @@ def first_impact_column(
 
     Parameters
     ----------
-    stop : "opening" or "seat"
     quantity
         Among :data:`QUANTITIES`.
     """
@@ -221,7 +219,7 @@ def measure_set(
     ----------
     strokes
         With the channel ``lift``.
-    seat, opening : float [m], optional
+    seat, opening [m]
     sensor
         See :func:`klack.measurement.impacts.measure_stroke`.
 

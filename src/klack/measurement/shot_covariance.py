@@ -106,7 +106,7 @@ def shot_estimates(jacobian: Matrix, weights: Vector, residuals: Matrix) -> Matr
 
     Returns
     -------
-    array, shape (n, p)
+    (n, p)
         nan for parameters that the data do not see.
     """
     root = np.sqrt(weights)

@@ -28,10 +28,10 @@ class SmoothLift:
 
     Parameters
     ----------
-    lift, velocity : array, shape (n,) [m], [m/s]
+    lift, velocity (n,) [m], [m/s]
     noise [m]
         White noise of one raw sample.
-    lift_noise, velocity_noise : float [m], [m/s]
+    lift_noise, velocity_noise [m], [m/s]
         Standard deviation that is left in the smoothed ones.
     half
         Half window [samples].
@@ -169,7 +169,6 @@ class Touch:
 
     Parameters
     ----------
-    stop : "opening" or "seat"
     index
         Sample of the turn, or of the arrival if it does not turn.
     rebounds

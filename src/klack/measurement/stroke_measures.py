@@ -52,7 +52,6 @@ class MeasuredImpact:
 
     Parameters
     ----------
-    stop : "opening" or "seat"
     time, time_se [s]
         First touch: the approaching flight reaches the level of the stop.
     release, release_se [s]

@@ -76,8 +76,6 @@ def survey_time(
     ----------
     read
         Times [s] of samples first to before last.
-    where
-        File and channel, for errors.
     place
         What a sample is called there, counted from 0.
 

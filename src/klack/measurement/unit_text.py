@@ -133,7 +133,7 @@ def unit_factor(text: str, quantity: Role | Kind, where: str) -> UnitFactor:
     ----------
     text
         As the file has it, with or without brackets.
-    quantity : role or Kind
+    quantity
         What the channel is; ``klack.units.TIME`` for a time.
     where
         File and channel, for the error.

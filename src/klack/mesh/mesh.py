@@ -88,7 +88,7 @@ class Mesh:
 
     Parameters
     ----------
-    points : array, shape (n, 3) or (n, 2) [m]
+    points (n, 3) or (n, 2) [m]
         Three columns x, y, z for a solid; two columns r, z for an axisymmetric body (axis r = 0).
     node_sets : mapping of str to int array
     """

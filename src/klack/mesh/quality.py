@@ -114,7 +114,7 @@ def scaled_jacobians(points: NDArray[np.float64], block: ElementBlock) -> NDArra
 
     Parameters
     ----------
-    points : array, shape (n, 2) or (n, 3) [m]
+    points (n, 2) or (n, 3) [m]
     """
     family = block.topology
     x = points[block.connectivity]
@@ -230,7 +230,7 @@ def require_positive_jacobians(
         Start of the error text: what made or read the mesh.
     smallest [-]
         Every scaled Jacobian must be above it.
-    numbers : sequence of int arrays, or None
+    numbers
         Element numbers for the text, one array per block; None counts from 0.
     """
     quality, number, block, place = _worst(mesh)

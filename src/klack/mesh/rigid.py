@@ -83,7 +83,7 @@ def rigid_placement(
 
     Parameters
     ----------
-    aside, lean : array, shape (2,) [m], [rad]
+    aside, lean (2,) [m], [rad]
         Position of its axis at the height of ``about``, and slope of the axis.
     about, centre (3,) [m]
     """

@@ -180,7 +180,7 @@ def element_count(
     ----------
     dimension
         3 for tetrahedra, 2 for triangles of the half section.
-    measure : float [m^3] or [m^2]
+    measure [m^3] or [m^2]
         Volume of the body, area of its half section.
     surfaces : mapping of str to float [m^2] or [m]
         Area of each named surface, length of each named edge.

@@ -35,7 +35,7 @@ class Skin:
 
     Parameters
     ----------
-    points, normals : array, shape (v, 3) [m], [-]
+    points, normals (v, 3) [m], [-]
         Of each vertex.
     node (v,)
         Node of the mesh.

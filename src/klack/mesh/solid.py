@@ -42,7 +42,7 @@ def mesh_step(path: str | Path, sizing: MeshSizing) -> Mesh:
 
     Parameters
     ----------
-    path : path
+    path
         STEP file (AP203, AP214 or AP242); its declared unit of length is respected.  Names of
         solids and faces are kept; those without get ``solid1``, ``face1`` and so on.
     sizing

@@ -26,7 +26,7 @@ class StepPart:
         Whether the file says the name; otherwise it is a number of the list of faces.
     count
         Solids or faces of this name.
-    size : float [m^3] or [m^2]
+    size [m^3] or [m^2]
         Volume or area of all of them.
     low, high (3,) [m]
         Corners of the box around all of them.

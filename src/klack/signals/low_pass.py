@@ -33,7 +33,6 @@ class LowPass:
         Where 3 dB are lost.
     order
         Poles.
-    kind : {"bessel", "butterworth"}
     """
 
     cut_off: float

@@ -88,7 +88,7 @@ def half_spaces(
     profile : function of distances [m] to gaps [m]
     contact [m]
         Expected half width of the contact.
-    cells : pair of int
+    cells
         Cells of a and of b per ``contact``.
     ring [m]
         Radius of the contact ring, 0 for a contact on the axis.
@@ -150,7 +150,7 @@ def uniform_compression(
     ----------
     family_a, family_b
         Solid element families.
-    cells : pair of int
+    cells
         Cells per edge of a and of b; unequal ones do not match.
     skew [m]
         Amplitude by which inner nodes of a are displaced sideways.
@@ -186,7 +186,7 @@ def sphere_on_cone(
     ----------
     family
         Solid element family.
-    layers : pair of int
+    layers
         Element borders around the third of the circle, for the sphere and the cone.
     h [m]
         Element size along the meridian.

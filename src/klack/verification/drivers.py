@@ -38,9 +38,9 @@ class CoilRun:
     ----------
     time (n + 1,) [s]
         Ends of the steps, from 0.
-    current, flux : array, shape (n + 1,) [A], [Wb]
+    current, flux (n + 1,) [A], [Wb]
         At those ends; flux of the main branch (linkage of a map).
-    voltage, force : array, shape (n,) [V], [N]
+    voltage, force (n,) [V], [N]
         Means over the steps; the force on the armature along +z.
     state (n + 1,)
         Number of the driver's state.

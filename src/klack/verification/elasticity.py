@@ -378,7 +378,7 @@ def free_bar_frequencies(
 
     Returns
     -------
-    euler, timoshenko : array, shape (3,) [Hz]
+    euler, timoshenko (3,) [Hz]
     """
     nu = material.poisson
     shear = 6.0 * (1.0 + nu) ** 2 / (7.0 + 12.0 * nu + 4.0 * nu**2)

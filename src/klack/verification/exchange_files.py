@@ -77,7 +77,7 @@ def write_matrices(
     ----------
     form
         Key of :data:`MATRIX_WRITERS`.
-    K, M : csr_array, shape (n, n)
+    K, M (n, n)
         Both triangles.
     node, direction : int arrays, shape (n,)
         Of each row; directions are 1, 2, 3.

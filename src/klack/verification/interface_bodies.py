@@ -136,7 +136,7 @@ def rigid_body(
         About x, y, z through the centre of mass.
     points (nc, 3) [m]
         From the centre of mass.
-    stiffness, gap : float [N/m], [m]
+    stiffness, gap [N/m], [m]
     """
     J = np.asarray(inertia, dtype=float)
     points = np.asarray(points, dtype=float)
@@ -220,9 +220,9 @@ def lateral_guide(
 
     Parameters
     ----------
-    clearance, stiffness : float [m], [N/m]
+    clearance, stiffness [m], [N/m]
     heights, offset : sequence of float, of (x, y) [m]
-    friction, viscous : float [-], [N s/m]
+    friction, viscous [-], [N s/m]
         At each height.
     radius [m]
         Of the shaft, which friction turns.
@@ -351,9 +351,9 @@ class BeamImpact:
     ----------
     mass [kg]
         Of the sphere.
-    omega, shapes : array, shape (m,) [rad/s], [1/sqrt(kg)]
+    omega, shapes (m,) [rad/s], [1/sqrt(kg)]
         Frequencies of the beam and its modes at the middle.
-    gaps, stiffness : array, shape (n,) [m], [N/m]
+    gaps, stiffness (n,) [m], [N/m]
     hertz [N/m^1.5]
         K of the law that the springs follow.
     """
@@ -388,7 +388,7 @@ class BeamImpact:
 
         Parameters
         ----------
-        speed, duration : float [m/s], [s]
+        speed, duration [m/s], [s]
         smooth
             Take Hertz' law itself instead of the springs.
         samples
@@ -630,7 +630,7 @@ class PointImpact:
     friction [-]
     tangential, approach [m/s]
         Velocity of the point before, along the face and into it.
-    spring, stiffer : float [N/m], [-]
+    spring, stiffer [N/m], [-]
         Normal spring, and the tangential one over it.
     """
 

@@ -248,7 +248,7 @@ def film_by_ode(
     ----------
     upper, lower
         Ports ``bottom`` and ``top`` meet.
-    series, gap, speed, duration : float [m/N], [m], [m/s], [s]
+    series, gap, speed, duration [m/N], [m], [m/s], [s]
     relative [-]
         Tolerance.
     """

@@ -48,7 +48,7 @@ def one_contact(
 
     Parameters
     ----------
-    gap, series, press : float [m], [m/N], [N]
+    gap, series, press [m], [m/N], [N]
     """
     pair = ContactPair(
         body_a=a.name,

@@ -51,7 +51,7 @@ class StageRun:
     Parameters
     ----------
     time (n + 1,) [s]
-    current, capacitor : array, shape (n + 1,) [A], [V]
+    current, capacitor (n + 1,) [A], [V]
     state, entered (n + 1,)
         State of the driver, and when it was entered [s].
     energies [J]
@@ -90,12 +90,7 @@ def run_stage(
     lift: ArrayLike = 0.0,
     current: float = 0.0,
 ) -> StageRun:
-    """Run a coil behind a stage; ``lift`` [m] at the ends of all steps, or constant.
-
-    Raises
-    ------
-    ConvergenceError
-    """
+    """Run a coil behind a stage; ``lift`` [m] at the ends of all steps, or constant."""
     steps = round(duration / step)
     y = np.broadcast_to(np.asarray(lift, dtype=float), (steps + 1,))
     par = flux_numbers(plant, resistance=resistance, driver=driver.program(), gap=_GAP)

@@ -65,7 +65,7 @@ class NeedleOnRing:
         Elements at the ring and far away.
     reach [m]
         Largest gap of a contact point of the centred bodies.
-    slave : "a" or "b", optional
+    slave
         Side of the hats, needle or seat.
     """
 
@@ -230,7 +230,7 @@ class RingStroke:
 
     Parameters
     ----------
-    placement : array, shape (6,) [m], [rad]
+    placement (6,) [m], [rad]
         Of the needle; it is moved along z to ``gap``.
     count
         Angles of every ring.
@@ -313,7 +313,7 @@ class RingStroke:
         speed [m/s]
             Downwards.
         duration, step [s]
-        velocity : array, shape (6,), optional [m/s], [rad/s]
+        velocity (6,), optional [m/s], [rad/s]
             Beside it.
         """
         needle, seat = self.bodies

@@ -73,7 +73,7 @@ class LineRun:
     ----------
     time (n,) [s]
         Start of each step.
-    pressure, flow : array, shape (n, 2) [Pa], [m^3/s]
+    pressure, flow (n, 2) [Pa], [m^3/s]
         At both ends, means over each step; flow into the line.
     cavity (n,) [m^3]
         Vapour in the line after each step.
@@ -253,11 +253,11 @@ class CellRun:
     ----------
     time (n,) [s]
         Middle of each step.
-    total, flow : array, shape (n, 2) [J/kg], [kg/s]
+    total, flow (n, 2) [J/kg], [kg/s]
         At both ends, means over each step; flow into the line.
     losses (n, 3) [J]
         Of each step: friction, waves, outflow.
-    pressure, velocity : array, shape (cells,) [Pa], [m/s]
+    pressure, velocity (cells,) [Pa], [m/s]
         At the end.
     energy_residual, mass_residual [-]
         What does not balance, over what passed the ends and over what is held.

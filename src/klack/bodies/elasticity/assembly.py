@@ -42,9 +42,9 @@ def assemble(mesh: Mesh, materials: Mapping[str, Material]) -> tuple[csr_array, 
 
     Returns
     -------
-    K : csr_array, shape (n_dof, n_dof) [N/m]
+    K (n_dof, n_dof) [N/m]
         Symmetric, full storage, 32-bit indices, sorted.
-    M : csr_array, shape (n_dof, n_dof) [kg]
+    M (n_dof, n_dof) [kg]
         Consistent mass; no coupling between directions, so ``M[::d, ::d]`` is the scalar matrix.
 
     Raises
@@ -61,7 +61,7 @@ def assemble(mesh: Mesh, materials: Mapping[str, Material]) -> tuple[csr_array, 
 def assemble_order(
     mesh: Mesh, materials: Mapping[str, Material], order: int
 ) -> tuple[csr_array, csr_array]:
-    r"""Stiffness and mass of a body of revolution in one Fourier order around its axis.
+    """Stiffness and mass of a body of revolution in one Fourier order around its axis.
 
     Three amplitudes a, b, w per node, see :mod:`klack.bodies.elasticity.fourier_body`.
 
@@ -69,15 +69,13 @@ def assemble_order(
     ----------
     mesh
         Of dimension 2.
-    materials
-        By name of the solid.
     order
         0 or more; 0 has the axisymmetric motion and the torsion.
 
     Returns
     -------
-    K : csr_array, shape (3 n_nodes, 3 n_nodes) [N/m]
-    M : csr_array, shape (3 n_nodes, 3 n_nodes) [kg]
+    K (3 n_nodes, 3 n_nodes) [N/m]
+    M (3 n_nodes, 3 n_nodes) [kg]
         No coupling between amplitudes; for a and b twice the scalar matrix of w.
 
     Raises

@@ -38,9 +38,9 @@ class ElasticBody:
 
     Parameters
     ----------
-    K : csr_array, shape (n_dof, n_dof) [N/m]
+    K (n_dof, n_dof) [N/m]
         Stiffness of all degrees of freedom, supports not applied.
-    M : csr_array, shape (n_dof, n_dof) [kg]
+    M (n_dof, n_dof) [kg]
     fixed
         Sorted degrees of freedom that are held at zero.
     """
@@ -144,8 +144,6 @@ def elastic_body(
 
     Parameters
     ----------
-    materials
-        By name of the solid.
     fixed_nodes : node numbers
         Held in all directions.  None: the body is free.  On the axis of a body of revolution
         the radial displacement is always fixed.

@@ -49,10 +49,6 @@ class Budget:
             Of the factorisation.
         precision
             Of the factor.
-
-        Raises
-        ------
-        FactorMemoryError
         """
         beside = f"{in_words(self.later)} for {self.reason}" if self.later > 0.0 else ""
         require_factor_memory(

@@ -75,9 +75,9 @@ def condensed_inverse(
     ----------
     factor
         Of A, shape (n, n).
-    G : csr_array, shape (m, n)
+    G (m, n)
         One load per row.
-    groups : sequence of int arrays
+    groups
         Rows of G, each in one group; one group of all of them without.  What is found for two
         groups does not depend on later ones, to the last bit: loads can be added.
     largest [byte]
@@ -85,7 +85,7 @@ def condensed_inverse(
 
     Returns
     -------
-    array, shape (m, m)
+    (m, m)
         Symmetric.
     """
     if not groups:

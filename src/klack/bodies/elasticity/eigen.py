@@ -97,7 +97,7 @@ def block_lanczos(
     ----------
     operator
         X (n, b) to A X (n, b).
-    M : csr_array, shape (n, n)
+    M (n, n)
     start (n, b)
         Start block, in the range of A.
     enough
@@ -113,9 +113,9 @@ def block_lanczos(
 
     Returns
     -------
-    values : array, shape (m,)
+    values (m,)
         Descending.
-    vectors : array, shape (n, m)
+    vectors (n, m)
         Orthonormal in M.
     """
     b = start.shape[1]

@@ -105,12 +105,12 @@ def factorize(
     ----------
     A : sparse matrix or array, shape (n, n)
         Full symmetric storage.
-    backend : {"auto", "pardiso", "ngsolve", "superlu"}
+    backend
         ``"auto"`` takes the first of these that is installed.
     threads
         Threads of the factorisation and of each solve (pardiso only); the default is that of MKL.
         One thread is best for many single solves, two for the factorisation.
-    precision : {"double", "single"}
+    precision
         Of the factor; ``"single"`` (pardiso only, the others stay double) takes half the memory and
         0.6 of the time, with relative residuals of some 1e-6.
     budget

@@ -50,9 +50,9 @@ class FourierBody:
     ----------
     mesh
         The half section.
-    K : csr_array, shape (n_dof, n_dof) [N/m]
+    K (n_dof, n_dof) [N/m]
         Stiffness of a, b, W of all nodes, supports not applied.
-    M : csr_array, shape (n_dof, n_dof) [kg]
+    M (n_dof, n_dof) [kg]
     fixed
         Sorted degrees of freedom that are held at zero, those on the axis among them.
     """
@@ -129,16 +129,12 @@ class FourierBody:
         return np.sort(held_best(self.rigid_modes, self.free))
 
     def amplitudes(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Amplitudes U, V, W at the nodes.
+        """Amplitudes U, V, W at the nodes, shape (n_nodes, 3) or (n_nodes, 3, m).
 
         Parameters
         ----------
-        u : array, shape (n_dof,) or (n_dof, m)
+        u (n_dof,) or (n_dof, m)
             Values of the degrees of freedom, for example the shapes of modes.
-
-        Returns
-        -------
-        array, shape (n_nodes, 3) or (n_nodes, 3, m)
         """
         a, b, w = np.moveaxis(np.reshape(u, (-1, 3, *np.shape(u)[1:])), 1, 0)
         return np.stack([a + b, b - a, w], axis=1)
@@ -158,8 +154,6 @@ def fourier_body(
     ----------
     mesh
         Half section, of dimension 2.
-    materials
-        By name of the solid.
     order
         n, 0 or more; 1 is bending.
     fixed_nodes : node numbers
@@ -218,7 +212,7 @@ def rows_around(rows: csr_array, order: int, angles: Floats, *, towards: float =
 
     Parameters
     ----------
-    rows : csr_array, shape (m, 2 n_nodes)
+    rows (m, 2 n_nodes)
         On u_r and u_z of the nodes.
     order
         n.
@@ -228,7 +222,7 @@ def rows_around(rows: csr_array, order: int, angles: Floats, *, towards: float =
 
     Returns
     -------
-    csr_array, shape (m k, 3 n_nodes)
+    (m k, 3 n_nodes)
         All angles of the first ring, then those of the next.
 
     Examples
@@ -249,11 +243,11 @@ def rows_around(rows: csr_array, order: int, angles: Floats, *, towards: float =
 def displacement_rows(
     weights: csr_array, order: int, angles: Floats, *, towards: float = 0.0
 ) -> csr_array:
-    r"""Read the displacement along x, y and z of points, from their place in the half section.
+    """Read the displacement along x, y and z of points, from their place in the half section.
 
     Parameters
     ----------
-    weights : csr_array, shape (m, n_nodes) [-]
+    weights (m, n_nodes) [-]
         Shape functions at the points; the identity reads the nodes.
     order
         n.
@@ -263,7 +257,7 @@ def displacement_rows(
 
     Returns
     -------
-    csr_array, shape (3 m, 3 n_nodes)
+    (3 m, 3 n_nodes)
         x, y, z of the first point, then those of the next.
     """
     turned = np.broadcast_to(angles, weights.shape[:1]) - towards

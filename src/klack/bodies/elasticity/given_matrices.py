@@ -154,10 +154,8 @@ def check_matrices(
 
     Parameters
     ----------
-    where
-        Files, for errors.
-    K : csr_array, shape (n_dof, n_dof) [N/m]
-    M : csr_array, shape (n_dof, n_dof) [kg]
+    K (n_dof, n_dof) [N/m]
+    M (n_dof, n_dof) [kg]
     mesh
         Points [m]; elements and faces may be missing.
     fixed
@@ -233,7 +231,7 @@ def checked_body(
     ----------
     mesh
         With or without elements.
-    K, M : csr_array, shape (n_dof, n_dof) [N/m], [kg]
+    K, M (n_dof, n_dof) [N/m], [kg]
     fixed_nodes : node indices
         Held in all directions; degrees of freedom in ``absent`` are held as well.
     absent, where, numbers, units

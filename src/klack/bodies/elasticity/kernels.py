@@ -33,8 +33,8 @@ def node_graph(
 
     Returns
     -------
-    start : int array, shape (node_count + 1,)
-    neighbours : int array, shape (start[-1],)
+    start (node_count + 1,)
+    neighbours (start[-1],)
     """
     n_elements = offsets.size - 1
     first = np.zeros(node_count + 1, np.int64)
@@ -194,14 +194,14 @@ def add_elements(
     order
         Fourier order of a body of revolution with three displacements per node; -1 without.
     start, neighbours : result of :func:`node_graph`
-    K : array, shape (start[-1] * c * c,) [N/m], c displacements per node
+    K (start[-1] * c * c,) [N/m], c displacements per node
         Values in the order of the full CSR matrix; changed in place.
     M (start[-1],) [kg]
         Values of the scalar mass matrix; changed in place.
 
     Returns
     -------
-    array, shape (n_elements, 2) [m^d]
+    (n_elements, 2) [m^d]
         Smallest and largest Jacobian determinant at the integration points.
     """
     n_elements, n = connectivity.shape

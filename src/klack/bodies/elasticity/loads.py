@@ -22,16 +22,12 @@ Traction = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float
 
 
 def traction_load(mesh: Mesh, surface: Surface, traction: Traction) -> NDArray[np.float64]:
-    """Nodal forces of a traction.
+    """Nodal forces of a traction, shape (n_dof,) [N].
 
     Parameters
     ----------
     traction : function (points (q, d) [m], outward normals (q, d)) -> (q, d) [Pa]
         For example ``lambda x, n: -pressure * n``.
-
-    Returns
-    -------
-    array, shape (n_dof,) [N]
     """
     load = np.zeros((mesh.node_count, mesh.dimension))
     for block in surface.blocks:
@@ -75,7 +71,7 @@ def order_load(mesh: Mesh, surface: Surface, traction: Traction, order: int) -> 
 
 
 def face_dashpots(mesh: Mesh, surface: Surface, resistance: float) -> csr_array:
-    r"""Matrix of dashpots spread over a surface, along its normals.
+    r"""Matrix of dashpots spread over a surface, along its normals, shape (n_dof, n_dof) [N s/m].
 
     .. math:: C_{ij} = \int_\Gamma z \, (N_i n)(N_j n)^T \, dA
 
@@ -88,10 +84,6 @@ def face_dashpots(mesh: Mesh, surface: Surface, resistance: float) -> csr_array:
     ----------
     resistance [Pa s/m]
         z.
-
-    Returns
-    -------
-    csr_array, shape (n_dof, n_dof) [N s/m]
     """
     d = mesh.dimension
     rows, columns, values = [], [], []

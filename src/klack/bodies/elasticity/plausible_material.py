@@ -82,7 +82,7 @@ def estimate_material(K: csr_array, mesh: Mesh, mass: float) -> MaterialEstimate
 
     Parameters
     ----------
-    K : csr_array, shape (n_dof, n_dof) [N/m]
+    K (n_dof, n_dof) [N/m]
     mesh
         With blocks for the volume; without, the box around the nodes is taken.
     mass [kg]

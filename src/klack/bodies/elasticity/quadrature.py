@@ -31,13 +31,13 @@ def quadrature(family: str, purpose: Purpose) -> Rule:
     ----------
     family
         Key of :data:`klack.mesh.families.FAMILIES`.
-    purpose : {"stiffness", "mass"}
+    purpose
         ``"mass"`` also serves for surface integrals of products of shape functions.
 
     Returns
     -------
-    xi : array, shape (q, d) [-]
-    w : array, shape (q,) [-]
+    xi (q, d) [-]
+    w (q,) [-]
         They add up to the measure of the reference element.
 
     Examples

@@ -45,11 +45,11 @@ class RingRows:
 
     Parameters
     ----------
-    along : csr_array, shape (m, 2 n_nodes)
+    along (m, 2 n_nodes)
         On u_r and u_z: they read in the plane of the section, with the cosine of the angle.
-    around : csr_array, shape (k, n_nodes)
+    around (k, n_nodes)
         On u_theta: they read along the ring, with the sine.
-    turned : csr_array, shape (k, 2 n_nodes)
+    turned (k, 2 n_nodes)
         What the latter read besides of u_r and u_z, times the order.
     """
 
@@ -141,7 +141,7 @@ class RingPoints:
 
         Returns
         -------
-        array, shape (p, p) [m/N]
+        (p, p) [m/N]
             Symmetric.
         """
         table = _by_difference(spectrum, self.is_sine, self.count)
@@ -185,7 +185,7 @@ class RingSections:
     Parameters
     ----------
     heights (k,) [m]
-    weights : csr_array, shape (k, n_nodes) [-]
+    weights (k, n_nodes) [-]
         Of the rings of each section: their sum is 1, their mean height that of the section.
     points (n_nodes, 2) [m]
         (r, z) of all nodes.

@@ -37,8 +37,8 @@ def shape_functions(family: str, xi: NDArray[np.float64]) -> Table:
 
     Returns
     -------
-    N : array, shape (q, n) [-]
-    dN : array, shape (q, n, d) [-]
+    N (q, n) [-]
+    dN (q, n, d) [-]
         Derivative of each function with respect to each reference coordinate.
 
     Examples

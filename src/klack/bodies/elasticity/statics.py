@@ -60,7 +60,7 @@ class RefinedFactorization(Closing):
 
     Parameters
     ----------
-    A : sparse array, shape (n, n)
+    A (n, n)
         Symmetric positive definite.
     rough
         Of A, in single precision; closed with this one.
@@ -230,7 +230,7 @@ class Flexibility(Closing):
 
         Parameters
         ----------
-        F : array, shape (n_dof,) or (n_dof, m) [N]
+        F (n_dof,) or (n_dof, m) [N]
             Entries at fixed degrees of freedom are taken by the support.
 
         Returns
@@ -257,7 +257,7 @@ class Flexibility(Closing):
     def condensed(
         self, G: csr_array, groups: Sequence[NDArray[np.int64]] = ()
     ) -> NDArray[np.float64]:
-        r"""Static compliance seen by given loads, G F G^T: half the work of solving for them.
+        """Static compliance seen by given loads, G F G^T: half the work of solving for them.
 
         Of a free body, with :math:`A = G R` and :math:`Z = K^+ M R` (six columns),
 
@@ -265,14 +265,14 @@ class Flexibility(Closing):
 
         Parameters
         ----------
-        G : csr_array, shape (m, n_dof)
+        G (m, n_dof)
             One load per row.
-        groups : sequence of int arrays
+        groups
             Of rows, see :func:`klack.bodies.elasticity.condensation.condensed_inverse`.
 
         Returns
         -------
-        array, shape (m, m) [m/N]
+        (m, m) [m/N]
             Symmetric.
         """
         kept = csr_array(G)[:, self._kept]

@@ -42,14 +42,12 @@ class StressField:
     ----------
     mesh
         Solid, or axisymmetric with columns r and z.
-    materials
-        By name of the solid.
 
     Attributes
     ----------
     mesh
         The mesh with nodes of its own for every solid, without surfaces and sets.
-    nodes : int array, shape (n_points,)
+    nodes (n_points,)
         Node of the given mesh that each point of that mesh is.
 
     Examples
@@ -89,12 +87,12 @@ class StressField:
 
         Parameters
         ----------
-        displacement : array, shape (n_dof,) or (n_nodes, dimension) [m]
+        displacement (n_dof,) or (n_nodes, dimension) [m]
             Of the given mesh.
 
         Returns
         -------
-        array, shape (n_points, 6) [Pa]
+        (n_points, 6) [Pa]
             In the order of :data:`COMPONENTS`, at the points of :attr:`mesh`.
         """
         u = np.asarray(displacement, dtype=float).reshape(-1, self.mesh.dimension)[self.nodes]
@@ -103,7 +101,7 @@ class StressField:
 
 
 def von_mises(stress: NDArray[np.float64]) -> NDArray[np.float64]:
-    r"""Equivalent stress after von Mises.
+    r"""Equivalent stress after von Mises, shape (...,) [Pa].
 
     .. math:: \sigma_v = \sqrt{\tfrac12 \left[(\sigma_{xx} - \sigma_{yy})^2 + (\sigma_{yy} -
         \sigma_{zz})^2 + (\sigma_{zz} - \sigma_{xx})^2\right] + 3\,(\tau_{xy}^2 + \tau_{yz}^2 +
@@ -113,10 +111,6 @@ def von_mises(stress: NDArray[np.float64]) -> NDArray[np.float64]:
     ----------
     stress (..., 6) [Pa]
         In the order of :data:`COMPONENTS`.
-
-    Returns
-    -------
-    array, shape (...,) [Pa]
 
     Examples
     --------

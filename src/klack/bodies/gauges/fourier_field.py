@@ -29,7 +29,7 @@ def field_rows(body: FourierBody, points: Floats, *, where: str, towards: float 
 
     Returns
     -------
-    csr_array, shape (3 m, n_dof)
+    (3 m, n_dof)
         x, y, z of the first point, then those of the next.
 
     Raises

@@ -29,7 +29,6 @@ class Gauge:
 
     Parameters
     ----------
-    kind : {"displacement", "velocity", "strain", "stress"}
     row (n_dof,)
         Of a velocity the row of the displacement.
     place

@@ -47,12 +47,10 @@ class Line:
     ----------
     at (dimension,) [m]
         Its middle.
-    direction : array, shape (dimension,) [-], or ``"around"``
+    direction (dimension,) [-], or ``"around"``
         Of length one.
     length [m]
         0 for a point.
-    where
-        For errors.
     pose
         How the body came there from its drawing, in whose coordinates errors tell.
     """
@@ -145,13 +143,7 @@ def strain_row(mesh: Mesh, line: Line) -> Floats:
 
 
 def stress_row(mesh: Mesh, line: Line, materials: Mapping[str, Material]) -> Floats:
-    """Mean normal stress along a line, positive in tension, shape (n_dof,) [Pa/m].
-
-    Parameters
-    ----------
-    materials
-        By name of the solid.
-    """
+    """Mean normal stress along a line, positive in tension, shape (n_dof,) [Pa/m]."""
     row = np.zeros(mesh.dof_count)
     for weight, place in line.places():
         found = line.found(mesh, place)

@@ -77,7 +77,7 @@ def read_ansys_full(path: Path, name: str | None, role: Role | None) -> SystemMa
     Parameters
     ----------
     name : {"K", "M"} or None
-    role : {"stiffness", "mass"} or None
+    role
         Says which one without a name.
 
     Raises

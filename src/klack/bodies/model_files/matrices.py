@@ -56,11 +56,11 @@ def read_matrix(
 
     Parameters
     ----------
-    path : path
+    path
         With one of the endings of :data:`MATRIX_FORMATS`.
     name
         Of the matrix in a file of several.
-    role : {"stiffness", "mass"}, optional
+    role
         Finds the usual names (K, KAA, ...) without ``name``.
 
     Raises

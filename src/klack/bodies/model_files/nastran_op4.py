@@ -82,8 +82,7 @@ class Op4Strings:
 
     Parameters
     ----------
-    header : Op4Header
-    data : array of bytes
+    data
         The file.
     order : {"<", ">"}
         Of bytes.

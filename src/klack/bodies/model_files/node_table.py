@@ -36,8 +36,8 @@ def read_node_table(
 
     Returns
     -------
-    numbers : int array, shape (n,)
-    points : array, shape (n, dimension) [m]
+    numbers (n,)
+    points (n, dimension) [m]
 
     Raises
     ------

@@ -38,22 +38,16 @@ def numbers_in(text: bytes) -> NDArray[np.float64] | None:
 def number_rows(
     stream: BinaryIO, columns: int, *, where: str, line: int = 1, comments: bytes = b""
 ) -> NDArray[np.float64]:
-    """Read the rest of a file, lines of ``columns`` numbers each.
+    """Read the rest of a file, lines of ``columns`` numbers each, shape (n, columns).
 
     Parameters
     ----------
-    stream : binary file
+    stream
         At the start of a line.
-    where
-        File, for errors.
     line
         Number of that line.
     comments
         Lines that start with one of these are left out; so are empty ones.
-
-    Returns
-    -------
-    array, shape (n, columns)
 
     Raises
     ------

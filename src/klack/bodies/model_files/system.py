@@ -21,9 +21,7 @@ class FileSystem:
 
     Parameters
     ----------
-    where
-        Files, for errors.
-    K, M : csr_array, shape (n, n)
+    K, M (n, n)
     rows
         Node and direction of each row; None where no file says it.
     held
@@ -54,7 +52,7 @@ class NodeSystem:
 
     Parameters
     ----------
-    K, M : csr_array, shape (n_dof, n_dof)
+    K, M (n_dof, n_dof)
         Row ``dimension * i + d`` belongs to node i and direction d.
     absent
         Sorted degrees of freedom that the files leave out: their program holds them at zero.

@@ -59,7 +59,7 @@ class SystemMatrix:
     ----------
     name
         In the file; empty where the file holds one matrix without name.
-    matrix : csr_array, shape (n, n)
+    matrix (n, n)
         Both triangles.
     rows
         None where the file does not say.
@@ -131,8 +131,6 @@ def symmetric_matrix(
 
     Parameters
     ----------
-    where
-        File, for errors.
     row, column
         From zero.
     size
@@ -140,7 +138,7 @@ def symmetric_matrix(
 
     Returns
     -------
-    matrix : csr_array, shape (size, size)
+    matrix (size, size)
     notes : tuple of str
 
     Raises

@@ -180,18 +180,18 @@ class FileModalData:
     Parameters
     ----------
     frequency (m,) [Hz]
-    damping : array, shape (m,) [-], or None
+    damping (m,) [-], or None
         None where the file gives none.
     modal_mass (m,)
         1 for mass-normalised shapes.
     shapes (m, n)
     labels
         Of the columns of ``shapes``: names, or ``"17 z"`` for node and direction.
-    residual : array, shape (n, n), or None
+    residual (n, n), or None
         Residual compliance between the columns.
     by_node
         True where columns are nodes and directions.
-    length, force : float or None [m], [N]
+    length, force [m], [N]
         Units that the file itself claims.
     responses
         Between nodes; they tell what the modes miss.

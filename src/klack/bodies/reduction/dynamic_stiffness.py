@@ -25,7 +25,7 @@ def solve_symmetric(A: csr_array, B: NDArray[np.float64]) -> NDArray[np.float64]
 
     Parameters
     ----------
-    A : csr_array, shape (n, n)
+    A (n, n)
         Full storage.
     B (n, m)
 
@@ -45,7 +45,7 @@ def factorized_symmetric(A: csr_array) -> Iterator[Solver]:
 
     Parameters
     ----------
-    A : csr_array, shape (n, n)
+    A (n, n)
         Full storage, symmetric, definite or not.
     """
     if "pardiso" not in available_backends():

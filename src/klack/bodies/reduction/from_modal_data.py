@@ -29,13 +29,11 @@ def body_of_modal_data(
 
     Parameters
     ----------
-    frequency, damping : array, shape (m,) [Hz], [-]
+    frequency, damping (m,) [Hz], [-]
     shapes (m, n_ports) [1/sqrt(kg)]
         The mean displacement of each port along +z, weighted as its force.
     residual (n_ports, n_ports) [m/N]
         Compliance of the modes that are left out.
-    where
-        File, for messages.
     mass [kg]
 
     Raises
@@ -94,11 +92,9 @@ def body_of_craig_bampton(
 
     Parameters
     ----------
-    K, M : array, shape (n, n) [N/m], [kg]
+    K, M (n, n) [N/m], [kg]
     rows
         Row of the boundary displacement of each port, from 0.
-    where
-        File, for messages.
     mass [kg]
 
     Raises
@@ -191,10 +187,8 @@ def fit_residual(
 
     Parameters
     ----------
-    where
-        File and places, for messages.
-    frequency, response : array, shape (n,) [Hz], [m/N]
-    omega, damping, product : array, shape (m,) [rad/s], [-], [1/kg]
+    frequency, response (n,) [Hz], [m/N]
+    omega, damping, product (m,) [rad/s], [-], [1/kg]
         Modes, rigid ones included, and the product of their shapes at both places.
 
     Raises

@@ -73,8 +73,6 @@ def body_of_state_space(
     ----------
     model
         Forces [N] in, displacements [m] out, ``input_names`` being those of the ports.
-    where
-        File, for messages.
     mass [kg]
 
     Raises

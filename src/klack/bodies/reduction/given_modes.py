@@ -34,7 +34,7 @@ class ModesAtPorts:
 
     Parameters
     ----------
-    omega, damping : array, shape (m,) [rad/s], [-]
+    omega, damping (m,) [rad/s], [-]
         Elastic modes, any order.
     shapes (m, n_ports) [1/sqrt(kg)]
     rigid_gram (n_ports, n_ports) [1/kg]
@@ -61,8 +61,6 @@ def body_of_modes(
 
     Parameters
     ----------
-    where
-        File and model, for messages.
     mass [kg]
         A free body is checked against it; needed if its ports tell translation and rotation apart.
         The mass of a held body without it is unknown (nan).

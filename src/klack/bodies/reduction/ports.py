@@ -142,7 +142,6 @@ def surface_port(mesh: Mesh, surface: str | Surface, direction: Direction, *, na
 
     Parameters
     ----------
-    surface : str or Surface
     direction : "x", "y", "z", or array, shape (dimension,)
         An axisymmetric body takes ``"z"`` only: radial tractions have no resultant.
     """
@@ -171,7 +170,7 @@ def pressure_port(mesh: Mesh, surface: str | Surface, *, name: str) -> Port:
 
     Parameters
     ----------
-    surface : str or Surface
+    surface
         A closed surface has no resultant and is refused.
     """
     surface = mesh.surface(surface) if isinstance(surface, str) else surface

@@ -62,7 +62,7 @@ def reduced_receptance(
     with_residual
         Add the residual compliance ``R``, which is what the consistent contact law does in the
         time domain; with attachment modes it is zero already.
-    loss_factor : float [-], optional
+    loss_factor [-]
         Replace the viscous damping by the structural one, ``omega_i^2 (1 + i eta)``, as the full
         order has it; equal at each resonance if ``eta = 2 zeta``.
     label
@@ -93,7 +93,7 @@ def observed_receptance(
 
     Returns
     -------
-    complex array, shape (n, n_observers, n_ports) [m/N]
+    (n, n_observers, n_ports) [m/N]
         Of the modes alone.
     """
     axis = frequency_axis("observed_receptance: frequencies", frequencies)
@@ -117,16 +117,12 @@ def _denominator(
 def modal_sum(
     shapes: NDArray[np.float64], denominator: NDArray[np.complexfloating]
 ) -> NDArray[np.complex128]:
-    """Sum over modes of ``phi phi^T / denominator``.
+    """Sum over modes of ``phi phi^T / denominator``, shape (n, p, p) [m/N].
 
     Parameters
     ----------
     shapes (m, p) [1/sqrt(kg)]
     denominator (n, m) [(rad/s)^2]
-
-    Returns
-    -------
-    complex array, shape (n, p, p) [m/N]
     """
     products = np.einsum("mp,mq->mpq", shapes, shapes)
     return np.tensordot(1.0 / denominator, products, axes=(1, 0))

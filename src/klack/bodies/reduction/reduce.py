@@ -55,10 +55,9 @@ def reduce_body(
     ----------
     ports
         At least one.
-    modes : ByCount, ByFrequency or ByParticipation
-    correction : "consistent", "attachment" or "none"
+    correction
         See the module text.
-    damping : ModalDamping, RayleighDamping or LossFactor
+    damping
         For the elastic and attachment modes; rigid modes stay undamped.
     modes_pool
         Elastic modes computed before, lowest first without gaps; saves the eigenvalue solution.
@@ -128,7 +127,6 @@ def kept_modes(selection: ModeSelection, pool: Modes, patterns: NDArray[np.float
 
     Parameters
     ----------
-    selection : ByCount, ByFrequency or ByParticipation
     patterns (n_dof, n_ports) [-]
         Load patterns of the ports.
     """

@@ -117,7 +117,7 @@ class Recovery:
     points (n, dimension) [m]
     shapes (n * dimension, m) [1/sqrt(kg)]
         ``u = shapes @ q``, ordered node by node like the degrees of freedom of the mesh.
-    faces : int array, shape (f, 3) or (f, 2)
+    faces (f, 3) or (f, 2)
         Triangles (solid) or line segments (axisymmetric) in local numbers ``0 .. n-1``, through all
         nodes, oriented outwards; none when nodes were given instead of surfaces.
     """

@@ -76,7 +76,7 @@ def participation(
 
     Returns
     -------
-    array, shape (m,) [-]
+    (m,) [-]
         Sums to the number of ports that any mode moves.
 
     Examples
@@ -96,7 +96,6 @@ def select(
 
     Parameters
     ----------
-    selection : ByCount, ByFrequency or ByParticipation
     omega (m,) [rad/s]
         Of the pool, ascending.
     port_shapes (m, n_ports) [1/sqrt(kg)]

@@ -75,7 +75,7 @@ class Structure:
         ``int n . u_i dA``: volume displaced per displacement of a field.
     points (k, dimension) [m]
         Corners of the faces; (r, z) or (x, y, z).
-    faces : int array, shape (f, 2), (f, 3) or (f, 4)
+    faces (f, 2), (f, 3) or (f, 4)
         Element faces by their corners; a triangle repeats its last corner among quadrangles.
     face_group (f,)
     face_area (f,) [m^2]

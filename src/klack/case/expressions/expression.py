@@ -71,8 +71,6 @@ class Expression:
     ----------
     names
         Parameters in it, each once, in the order of the text.
-    where
-        Key that it stands at, for errors.
     """
 
     text: str
@@ -88,8 +86,6 @@ class Expression:
         ----------
         text
             At most 500 characters, 200 parts, 100 levels of nesting.
-        where
-            Key that it stands at, for errors.
 
         Raises
         ------

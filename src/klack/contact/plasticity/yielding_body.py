@@ -104,7 +104,7 @@ class YieldingBody:
 
     Parameters
     ----------
-    rows : csr_array, shape (nc, n_dof) [-]
+    rows (nc, n_dof) [-]
         Gaps of the contact points per displacement.
     place (2,) [m]
         Middle of the contact.

@@ -181,7 +181,7 @@ class PlasticZone:
     ----------
     dofs (nz,)
         Sorted degrees of freedom of the body that are free and belong to the zone.
-    K : csr_array, shape (nz, nz) [N/m]
+    K (nz, nz) [N/m]
         With the rest condensed onto the border; of a free body one is held (``kept``).
     kept
         Positions in ``dofs`` that are solved for.

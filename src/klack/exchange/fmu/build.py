@@ -200,7 +200,7 @@ def build_fmu(
         Its name is the model identifier.
     path
         Of the FMU; a file there is replaced.
-    fmi : 2 or 3
+    fmi
         Version of the standard.
     platforms
         Of the binaries, see :data:`klack.exchange.fmu.compiler.PLATFORMS`; that of this program by

@@ -193,7 +193,7 @@ def documentation_files(model: ModalModel, *, fmi: Literal[2, 3] = 2) -> dict[st
 
     Parameters
     ----------
-    fmi : 2 or 3
+    fmi
         Version of the standard.
     """
     outputs = [v.name for v in fmu_variables(model) if v.causality == "output"]

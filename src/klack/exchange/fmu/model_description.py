@@ -139,7 +139,7 @@ def model_description(model: ModalModel, *, fmi: Literal[2, 3], guid: str) -> st
 
     Parameters
     ----------
-    fmi : 2 or 3
+    fmi
         Version of the standard.
     guid
         What the binary compares at its instantiation.

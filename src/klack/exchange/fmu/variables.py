@@ -38,8 +38,6 @@ class FmuVariable:
 
     Parameters
     ----------
-    causality : "input", "output", "parameter" or "local"
-    variability : "continuous" or "fixed"
     start
         For inputs, parameters and states.
     derivative_of

@@ -50,7 +50,6 @@ def write_impact_series(
     ----------
     folder
         What stands there under the same names is replaced when everything is complete.
-    level : "full" or "reduced"
     frames
         Instants, evenly spaced over ``run.duration``; fewer if the run has fewer steps.
 

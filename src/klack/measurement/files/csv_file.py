@@ -51,7 +51,7 @@ class NumberTable:
     ----------
     path
         For errors.
-    data : array of bytes
+    data
         Text of the whole file, in an encoding that agrees with ASCII.
     start
         First byte of the rows.

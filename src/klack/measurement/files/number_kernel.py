@@ -144,7 +144,7 @@ def parse_rows(
         First byte of a line.
     separator, decimal
         Bytes; separator 0 stands for runs of blanks.
-    comments : array of bytes
+    comments
         Lines that begin with one of them are left out, as are empty ones.
     place (width,)
         Row of ``out`` that takes each column of the text; -1 leaves the column out.

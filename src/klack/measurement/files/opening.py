@@ -21,7 +21,7 @@ def open_recording(path: str | Path, *, time_step: float | None = None) -> Recor
 
     Parameters
     ----------
-    path : str or Path
+    path
         CSV and other text tables, MDF 3 and 4, TDMS, UFF (sets 58 and 58b), HDF5, netCDF, MATLAB.
     time_step [s]
         Sampling step, used where the file has no time of its own.

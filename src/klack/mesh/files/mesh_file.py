@@ -50,9 +50,9 @@ def read_mesh_file(
 
     Parameters
     ----------
-    path : path
+    path
         With one of the endings of :data:`~klack.mesh.files.catalogue.MESH_FORMATS`.
-    unit_length : float [m] or None
+    unit_length [m]
         Unit of the coordinates: 1e-3 for millimetres.  None where the file names it.
     solids
         Keep these solids only; None keeps all.

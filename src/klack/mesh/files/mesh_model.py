@@ -36,7 +36,7 @@ class MeshModel:
     ----------
     node_numbers (n_nodes,)
         Number in the file of every node of the mesh.
-    element_numbers : tuple of int arrays
+    element_numbers
         The same for the elements, one array per block.
     materials : mapping of name to FileMaterial
     sections : mapping of solid name to material name

@@ -143,13 +143,13 @@ def integers(cells: Cells) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
 
     Parameters
     ----------
-    cells : uint8 array, shape (..., width)
+    cells (..., width)
 
     Returns
     -------
-    values : int array, shape (...)
+    values (...)
         A blank field is 0.
-    good : bool array, shape (...)
+    good (...)
         False where a field is no whole number (of at most 18 digits).
     """
     columns = np.ascontiguousarray(np.moveaxis(cells, -1, 0))  # short axes are slow at the end
@@ -180,9 +180,9 @@ def reals(cells: Cells) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
 
     Returns
     -------
-    values : array, shape (...)
+    values (...)
         A blank field is 0.
-    good : bool array, shape (...)
+    good (...)
         False where a field is no finite number.
     """
     shape, width = cells.shape[:-1], cells.shape[-1]

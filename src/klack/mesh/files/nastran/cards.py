@@ -249,8 +249,8 @@ class BulkData:
 
         Yields
         ------
-        rows : int array, shape (n,)
-        cells : uint8 array, shape (n, most, width)
+        rows (n,)
+        cells (n, most, width)
         """
         numbers = self.numbers_of(name)
         for begin in range(0, len(numbers), _CHUNK):
