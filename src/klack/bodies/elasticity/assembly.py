@@ -4,9 +4,8 @@ r"""Stiffness and mass matrices of linear elasticity.
 
     K_{ij} = \int B_i^T D B_j \, dV, \qquad M_{ij} = \int \varrho N_i N_j \, dV \; 1
 
-Solids have three displacements per node; bodies of revolution (two columns of points) have u_r and
-u_z, the hoop strain u_r / r, and are integrated over the full circle of 2 pi.  What else they can
-do goes by Fourier orders around the axis (:mod:`klack.bodies.elasticity.fourier_body`).
+Bodies of revolution (points with two columns) have u_r, u_z and the hoop strain u_r / r, and are
+integrated over the full circle; Fourier orders: :mod:`klack.bodies.elasticity.fourier_body`.
 """
 
 from collections.abc import Mapping
@@ -35,6 +34,8 @@ SMALLEST_JACOBIAN_RATIO = 1e-3
 def assemble(mesh: Mesh, materials: Mapping[str, Material]) -> tuple[csr_array, csr_array]:
     """Stiffness and mass matrix of all degrees of freedom.
 
+    Rejects a solid without material and an element that is inverted or too distorted.
+
     Parameters
     ----------
     materials
@@ -43,14 +44,9 @@ def assemble(mesh: Mesh, materials: Mapping[str, Material]) -> tuple[csr_array, 
     Returns
     -------
     K (n_dof, n_dof) [N/m]
-        Symmetric, full storage, 32-bit indices, sorted.
+        Full symmetric storage, 32-bit indices, sorted.
     M (n_dof, n_dof) [kg]
-        Consistent mass; no coupling between directions, so ``M[::d, ::d]`` is the scalar matrix.
-
-    Raises
-    ------
-    InputError
-        If a solid has no material, or an element is inverted or too distorted.
+        Consistent; no coupling between directions, so ``M[::d, ::d]`` is the scalar matrix.
     """
     d = mesh.dimension
     K, start, neighbours, m_values = _integrated(mesh, materials, d, _NO_ORDER)
@@ -61,9 +57,11 @@ def assemble(mesh: Mesh, materials: Mapping[str, Material]) -> tuple[csr_array, 
 def assemble_order(
     mesh: Mesh, materials: Mapping[str, Material], order: int
 ) -> tuple[csr_array, csr_array]:
-    """Stiffness and mass of a body of revolution in one Fourier order around its axis.
+    """Stiffness [N/m] and mass [kg] of a body of revolution in one Fourier order around its axis.
 
-    Three amplitudes a, b, w per node, see :mod:`klack.bodies.elasticity.fourier_body`.
+    Three amplitudes a, b, w per node, see :mod:`klack.bodies.elasticity.fourier_body`; the mass
+    does
+    not couple them, and is for a and b twice that of w.
 
     Parameters
     ----------
@@ -71,17 +69,6 @@ def assemble_order(
         Of dimension 2.
     order
         0 or more; 0 has the axisymmetric motion and the torsion.
-
-    Returns
-    -------
-    K (3 n_nodes, 3 n_nodes) [N/m]
-    M (3 n_nodes, 3 n_nodes) [kg]
-        No coupling between amplitudes; for a and b twice the scalar matrix of w.
-
-    Raises
-    ------
-    InputError
-        As :func:`assemble`.
     """
     K, start, neighbours, m_values = _integrated(mesh, materials, 3, order)
     M = csr_array(diagonal_blocks(start, neighbours, m_values, 3), shape=K.shape)
@@ -93,7 +80,7 @@ def assemble_order(
 def _integrated(
     mesh: Mesh, materials: Mapping[str, Material], per_node: int, order: int
 ) -> tuple[csr_array, NDArray[np.int64], NDArray[np.int32], NDArray[np.float64]]:
-    """K, the graph of the nodes, and the values of the scalar mass matrix on it."""
+    """K, the graph of the nodes, and the scalar mass matrix on it."""
     points = np.ascontiguousarray(mesh.points, dtype=np.float64)
     _check_input(mesh, materials)
     start, neighbours = _graph(mesh, per_node)

@@ -1,8 +1,7 @@
-"""An elastic body: its mesh, its matrices, its supports and its rigid-body modes.
+"""Elastic bodies: mesh, matrices, supports and rigid-body modes.
 
-Rigid modes are built exactly from the coordinates (translations, rotations about the centre of
-mass) and then made orthonormal in the mass, :math:`R^T M R = 1`.  A body of revolution can only
-move along its axis.
+Rigid modes are built exactly from the coordinates, then made orthonormal in the mass,
+:math:`R^T M R = 1`.  A body of revolution can only move along its axis.
 """
 
 from collections.abc import Iterable, Mapping
@@ -39,7 +38,7 @@ class ElasticBody:
     Parameters
     ----------
     K (n_dof, n_dof) [N/m]
-        Stiffness of all degrees of freedom, supports not applied.
+        Supports not applied.
     M (n_dof, n_dof) [kg]
     fixed
         Sorted degrees of freedom that are held at zero.
@@ -53,7 +52,7 @@ class ElasticBody:
 
     @property
     def dimension(self) -> int:
-        """3 for a solid, 2 for a body of revolution; as many displacements has each node."""
+        """3, or 2 for a body of revolution; also the displacements of a node."""
         return self.mesh.dimension
 
     @property
@@ -70,17 +69,14 @@ class ElasticBody:
 
     @cached_property
     def axial_momentum(self) -> NDArray[np.float64]:
-        """Momentum of all degrees of freedom at unit velocity along z, M e_z, shape (n_dof,) [kg].
-
-        z is the last component, in space and in the meridian plane.
-        """
+        """Momentum M e_z of all nodes at unit velocity along z, shape (n_dof,) [kg]."""
         along = np.zeros(self.dof_count)
         along[self.dimension - 1 :: self.dimension] = 1.0
         return np.asarray(self.M @ along)
 
     @cached_property
     def nodal_mass(self) -> NDArray[np.float64]:
-        """Row sums of the scalar mass matrix, shape (n_nodes,) [kg]; they add up to the mass."""
+        """Row sums of the scalar mass matrix, shape (n_nodes,) [kg]."""
         return self.axial_momentum[self.dimension - 1 :: self.dimension]
 
     @cached_property
@@ -98,12 +94,12 @@ class ElasticBody:
 
     @property
     def centre_in_space(self) -> NDArray[np.float64]:
-        """Centre of mass (x, y, z) [m], of a body of revolution on its axis."""
+        """Centre of mass (x, y, z) [m]."""
         return np.array([0.0, 0.0, *self.centre_of_mass])[-3:]
 
     @cached_property
     def inertia(self) -> NDArray[np.float64]:
-        """Tensor of inertia about the centre of mass, shape (3, 3) [kg m^2]; the axis is z."""
+        """Tensor of inertia about the centre of mass, shape (3, 3) [kg m^2]."""
         x = self.mesh.points - self.centre_of_mass
         d = self.dimension
         moments = x.T @ (self.M[::d, ::d] @ x)
@@ -142,16 +138,13 @@ def elastic_body(
 ) -> ElasticBody:
     """Assemble a body and check its supports.
 
+    Rejects a mesh that is not in one piece, and supports that leave a rigid motion free.
+
     Parameters
     ----------
-    fixed_nodes : node numbers
-        Held in all directions.  None: the body is free.  On the axis of a body of revolution
+    fixed_nodes
+        Held in all directions; none: the body is free.  On the axis of a body of revolution
         the radial displacement is always fixed.
-
-    Raises
-    ------
-    InputError
-        If the mesh is not in one piece, or the supports leave a rigid motion free.
     """
     nodes = checked_nodes(name, mesh, fixed_nodes)
     K, M = assemble(mesh, materials)
@@ -162,13 +155,7 @@ def elastic_body(
 
 
 def checked_nodes(name: str, mesh: Mesh, fixed_nodes: Iterable[int]) -> NDArray[np.int64]:
-    """Sorted numbers of the held nodes of a mesh that is in one piece.
-
-    Raises
-    ------
-    InputError
-        If it is not, or does not have such nodes.
-    """
+    """Sorted numbers of the held nodes of a mesh; rejects one that is not in one piece."""
     _check_one_piece(name, mesh)
     nodes = np.unique(np.fromiter(fixed_nodes, dtype=np.int64))
     if nodes.size and not (nodes[0] >= 0 and nodes[-1] < mesh.node_count):
@@ -188,7 +175,7 @@ def require_support(
     what: str = "supports",
     hint: str = "do not lie on one line, for example those of a whole surface.",
 ) -> None:
-    """Refuse a support that leaves rigid motions free, from their values at what it holds."""
+    """Reject a support that leaves rigid motions free, by their values where it holds."""
     left = motions_left_free(held)
     if left:
         raise InputError(
@@ -200,7 +187,6 @@ def require_support(
 
 
 def _check_one_piece(name: str, mesh: Mesh) -> None:
-    """Every node must be tied to every other one through elements."""
     pairs = [
         np.stack([np.repeat(b.connectivity[:, 0], b.connectivity.shape[1]), b.connectivity.ravel()])
         for b in mesh.blocks
@@ -225,10 +211,9 @@ def _check_one_piece(name: str, mesh: Mesh) -> None:
 
 
 class VibratingBody(Protocol):
-    """A body with every freedom it has, or of revolution in one Fourier order around its axis.
+    """An :class:`ElasticBody`, or a body of revolution in one Fourier order.
 
-    :class:`~klack.bodies.elasticity.body.ElasticBody` and
-    :class:`~klack.bodies.elasticity.fourier_body.FourierBody`.
+    See :class:`~klack.bodies.elasticity.fourier_body.FourierBody`.
     """
 
     @property
@@ -245,7 +230,7 @@ class VibratingBody(Protocol):
 
     @property
     def K(self) -> csr_array:
-        """Stiffness of all degrees of freedom, supports not applied."""
+        """Stiffness, supports not applied."""
 
     @property
     def M(self) -> csr_array:
@@ -253,15 +238,15 @@ class VibratingBody(Protocol):
 
     @property
     def fixed(self) -> NDArray[int64]:
-        """Sorted degrees of freedom that are held at zero."""
+        """As of :class:`ElasticBody`."""
 
     @property
     def free(self) -> NDArray[int64]:
-        """Sorted degrees of freedom that are not fixed."""
+        """As of :class:`ElasticBody`."""
 
     @property
     def dof_count(self) -> int:
-        """Number of degrees of freedom, fixed ones included."""
+        """As of :class:`ElasticBody`."""
 
     @property
     def rigid_modes(self) -> NDArray[float64]:
@@ -269,4 +254,4 @@ class VibratingBody(Protocol):
 
     @property
     def isostatic_support(self) -> NDArray[int64]:
-        """Degrees of freedom, one per rigid mode, that prevent every rigid motion when fixed."""
+        """As of :class:`ElasticBody`."""

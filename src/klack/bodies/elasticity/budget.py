@@ -1,4 +1,4 @@
-"""Memory of a factorisation against what is there, and the lines that say so before it begins."""
+"""Memory of a factorisation against what is there."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,14 +17,12 @@ def untold(line: str) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Budget:
-    """What has to fit beside the factor of one matrix, and who wants to know the plan.
+    """What has to fit beside the factor of one matrix, and who is told the plan.
 
     Parameters
     ----------
-    name
-        Of the body.
     later [byte]
-        Memory of the stages that follow while the factor is held.
+        Of the stages that follow while the factor is held.
     reason
         What takes it, such as ``50 modes``.
     tell
@@ -39,7 +37,7 @@ class Budget:
     def require(
         self, backend: str, size: int, nonzeros: int, needed: float, precision: str = "double"
     ) -> None:
-        """Refuse a factor that does not fit together with what follows, and tell one that does.
+        """Reject a factor that does not fit together with what follows, and tell one that does.
 
         Parameters
         ----------
@@ -47,8 +45,6 @@ class Budget:
             Rows and entries of the matrix.
         needed [byte]
             Of the factorisation.
-        precision
-            Of the factor.
         """
         beside = f"{in_words(self.later)} for {self.reason}" if self.later > 0.0 else ""
         require_factor_memory(
@@ -65,4 +61,4 @@ class Budget:
 
 
 WITHOUT = Budget()
-"""Nothing else to fit, and no plan to show."""
+"""Nothing else to fit, no plan to show."""

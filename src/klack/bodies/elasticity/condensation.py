@@ -4,8 +4,8 @@ With a Cholesky factor :math:`A = L L^T` the forward substitution alone is enoug
 
 .. math:: \hat Y = L^{-1} G^T, \qquad C = \hat Y^T \hat Y,
 
-half the work of whole solves.  Loads that lie close together reach only a part of the rows of
-:math:`\hat Y` (a path through the elimination tree); the others are not kept.
+half the work of whole solves. Loads close together reach only some rows of :math:`\hat Y` (a path
+through the elimination tree); only those are kept.
 """
 
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ _REACHED = 0.4
 """Share of the unknowns that loads on a contact face reach at most (0.06 to 0.34 measured)."""
 
 _LARGEST_HALF = 2**29
-"""Memory [byte] of the kept rows up to which the forward substitution is taken."""
+"""Memory [byte] of kept rows up to which the forward substitution is used."""
 
 
 @runtime_checkable
@@ -54,7 +54,7 @@ def reached_rows(factor: Halves, G: csr_array) -> NDArray[np.int64]:
 
 
 def _reached(factor: Halves, groups: Sequence[csr_array]) -> list[NDArray[np.int64]]:
-    """Rows of L^-1 G^T that are not zero, of every group of loads; one substitution for all."""
+    """The same for groups of loads; one substitution for all."""
     # random weights leave no entry zero by chance
     rng = np.random.default_rng(1)
     loads = [G.T @ rng.uniform(1.0, 2.0, G.shape[0]) for G in groups]
@@ -69,24 +69,17 @@ def condensed_inverse(
     groups: Sequence[NDArray[np.int64]] = (),
     largest: int = _LARGEST_HALF,
 ) -> NDArray[np.float64]:
-    """Condense the inverse of a factorised matrix.
+    """Condense the inverse of a factorised matrix A; symmetric, shape (m, m).
 
     Parameters
     ----------
-    factor
-        Of A, shape (n, n).
     G (m, n)
         One load per row.
     groups
-        Rows of G, each in one group; one group of all of them without.  What is found for two
-        groups does not depend on later ones, to the last bit: loads can be added.
+        Rows of G, each in one group; by default one group of all.  What is found for two groups
+        does not depend on later ones, to the last bit: loads can be added.
     largest [byte]
         Memory up to which the cheaper way is taken.
-
-    Returns
-    -------
-    (m, m)
-        Symmetric.
     """
     if not groups:
         return _of_groups(factor, [G], largest)
@@ -135,9 +128,9 @@ def _within(outer: slice, inner: slice) -> slice:
 
 
 def condensation_memory(loads: int, unknowns: int) -> float:
-    """Memory [byte] that :func:`condensed_inverse` takes besides the factor and its result.
+    """Memory [byte] that :func:`condensed_inverse` takes beside factor and result.
 
-    The kept rows and three blocks of right-hand sides, for loads that lie close together.
+    Kept rows and three blocks of right-hand sides, for loads close together.
 
     Examples
     --------

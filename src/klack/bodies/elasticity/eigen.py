@@ -2,9 +2,9 @@ r"""Elastic eigenmodes of a fixed or of a free body, mass-normalised.
 
 .. math:: K \varphi = \omega^2 M \varphi, \qquad \varphi_i^T M \varphi_j = \delta_{ij}
 
-The inverse iteration runs on the static flexibility of the body: of a free body that is
-:math:`P^T K^+ P`, in which rigid motions have the eigenvalue zero.  They can therefore not mix
-with the elastic modes, no shift has to be chosen, and statics and modes share one factorisation.
+The inverse iteration runs on the static flexibility, of a free body :math:`P^T K^+ P`, in which
+rigid motions have the eigenvalue zero: they cannot mix with the elastic modes, no shift is
+needed, and statics and modes share one factorisation.
 """
 
 from collections.abc import Callable
@@ -86,30 +86,27 @@ def block_lanczos(
 ) -> tuple[Array, Array]:
     """Largest eigenvalues and vectors of an operator A that is symmetric in M.
 
-    Full reorthogonalisation, no restart.  A block of 8 vectors costs only 2-3 times one vector in
-    the triangular solves, and finds double modes (bending) without luck.  Grimes, Lewis & Simon
-    1994.
+    Full reorthogonalisation, no restart (Grimes, Lewis & Simon 1994). A block of 8 vectors costs
+    only 2-3 times one vector in the triangular solves, and finds double modes (bending) surely.
 
-    Written by hand, not ``scipy.sparse.linalg.eigsh``: that takes one vector at a time, and with it
-    50 modes of 134 000 degrees of freedom take 19.4 s instead of 13.8 s on the same factor.
+    ``scipy.sparse.linalg.eigsh`` takes one vector at a time: 50 modes of 134 000 degrees of
+    freedom take 19.4 s instead of 13.8 s on the same factor.
 
     Parameters
     ----------
     operator
         X (n, b) to A X (n, b).
-    M (n, n)
     start (n, b)
         Start block, in the range of A.
     enough
-        Told the converged leading eigenvalues, descending; says whether they suffice.
+        Says whether the converged leading eigenvalues, descending, suffice.
     largest_subspace
         Most basis vectors.
     exact
-        Leading values whose vectors shall leave a residual of 1e-8 of them, 1e-2 those after; all
-        1e-8 by default.  Their own relative error is of the order of its square.
+        Leading values whose vectors leave a relative residual of 1e-8, later ones 1e-2; all 1e-8
+        by default. The relative error of a value is of the order of its square.
     expected
-        Basis vectors to make room for, so that the basis is not copied while it grows; memory is
-        taken when they are there.
+        Basis vectors to make room for; avoids copies while the basis grows.
 
     Returns
     -------
@@ -149,7 +146,6 @@ def block_lanczos(
 
 
 def _bordered(T: Array, C: Array) -> Array:
-    """Projection with its new last columns, made symmetric."""
     size, b = C.shape
     grown = np.zeros((size, size))
     grown[: size - b, : size - b] = T
@@ -186,7 +182,7 @@ class Modes:
     ----------
     omega (m,) [rad/s]
     shapes (n_dof, m) [1/sqrt(kg)]
-        Mass-normalised, zero at fixed degrees of freedom, free of rigid motion.  The first
+        Mass-normalised, zero at fixed degrees of freedom, without rigid motion. The first
         component of (nearly) the largest magnitude is positive.
     richer
         These and further ones that are not converged, for an estimate.
@@ -202,7 +198,7 @@ class Modes:
         return self.omega / (2.0 * np.pi)
 
     def kept(self, numbers: NDArray[np.int64]) -> "Modes":
-        """Some of them, by ascending numbers; the lowest without gaps are not copied."""
+        """Some of them, by ascending numbers; the lowest ones are not copied."""
         if np.array_equal(numbers, np.arange(len(numbers))):
             return Modes(self.omega[: len(numbers)], self.shapes[:, : len(numbers)])
         return Modes(self.omega[numbers], self.shapes[:, numbers])
@@ -220,25 +216,20 @@ def eigenmodes(
 ) -> Modes:
     """Lowest elastic eigenmodes; the rigid ones are ``body.rigid_modes``.
 
+    Rejects missing ``count`` and ``max_frequency``, fewer modes than requested, and rigid modes of
+    a free body at 0.1 Hz or more.
+
     Parameters
     ----------
-    count
-        Number of modes.
     max_frequency [Hz]
-        All modes up to this frequency; with ``count`` as well, at most so many.
+        All modes up to it; with ``count``, at most so many.
     rough
-        Find so many where that is more than ``count``, those beyond it in the iteration only as
-        far as their frequencies are right to some 1e-4: ``richer`` of the result.
+        Find so many where that is more than ``count``; the frequencies of those beyond are right
+        to some 1e-4: ``richer`` of the result.
     flexibility
-        That of this body, if it is there already: saves its factorisation.
+        Of this body; saves its factorisation.
     backend, threads
-        See :func:`klack.bodies.elasticity.factorization.factorize`; unused with ``flexibility``.
-
-    Raises
-    ------
-    InputError
-        If neither number is given, if there are fewer modes than asked for, or if the rigid
-        modes of a free body do not lie below 0.1 Hz.
+        See :func:`klack.bodies.elasticity.factorization.factorize`.
     """
     _check_request(body, count, max_frequency)
     total = count if count is None else max(count, rough)
@@ -270,7 +261,7 @@ def eigenmodes(
 
 
 def mode_memory(body: VibratingBody, count: int) -> float:
-    """Memory [byte] that the computation of so many modes takes beside the factor."""
+    """Memory [byte] of an eigenvalue solution beside the factor."""
     return 8.0 * body.dof_count * (_VECTORS_PER_MODE * count + _WORKING_BLOCKS * _BLOCK)
 
 
@@ -300,11 +291,8 @@ def _lowest(
 def rigid_frequencies(body: VibratingBody) -> NDArray[np.float64]:
     """Frequencies of the rigid modes [Hz]: zero but for round-off.
 
-    Raises
-    ------
-    InputError
-        If one is neither below 0.1 Hz nor within the round-off of R^T K R (some Hz for a fine mesh
-        of 0.1 g): the stiffness matrix does not belong to a free body.
+    Rejects one that is neither below 0.1 Hz nor within the round-off of R^T K R (some Hz for a
+    fine mesh of 0.1 g): the stiffness is not that of a free body.
     """
     R = body.rigid_modes
     if not R.shape[1]:
@@ -384,7 +372,7 @@ def _iterated(
 
 
 def _rayleigh_ritz(body: VibratingBody, shapes: NDArray[np.float64]) -> Modes:
-    """Clean the shapes of rigid motion, and take frequencies from K and M themselves."""
+    """Remove rigid motion from the shapes; take frequencies from K and M themselves."""
     R = body.rigid_modes
     shapes = shapes - R @ (R.T @ (body.M @ shapes))
     K = shapes.T @ (body.K @ shapes)

@@ -1,9 +1,10 @@
 r"""Memory of a factorisation before it is made.
 
-MKL counts the entries of the factor in its analysis and tells.  SuperLU and NGSolve do not; for
-them the growth of nested dissection is taken (George 1973: :math:`n \log n` entries in the plane,
-Lipton, Rose & Tarjan 1979: :math:`n^{4/3}` in space) with a factor that was measured on bodies of
-valves: bulky ones in space, since slim ones fill less.
+MKL counts the entries of the factor in its analysis.  For SuperLU and NGSolve the growth of nested
+dissection is taken (George 1973: :math:`n \log n` entries in the plane, Lipton, Rose & Tarjan
+1979:
+:math:`n^{4/3}` in space) with a factor measured on bodies of valves: bulky ones in space, since
+slim ones fill less.
 """
 
 from math import log2
@@ -25,7 +26,7 @@ class FactorMemoryError(InputError):
 
 
 def fill_memory(backend: str, size: int, nonzeros: int) -> float:
-    """Estimate the memory of a factorisation [byte] from rows and entries of the matrix alone."""
+    """Estimated memory of a factorisation [byte], from the matrix alone."""
     row = nonzeros / size
     if row > _SPATIAL:
         return _SPACE[backend] * size ** (4.0 / 3.0)
@@ -41,7 +42,11 @@ def require_factor_memory(
     beside: str = "",
     precision: str = "double",
 ) -> None:
-    """Refuse a factorisation that does not fit.
+    """Reject a factorisation that does not fit.
+
+    The error names the element size that would fit: memory grows with h^-4 in space and with h^-2
+    in
+    the plane.
 
     Parameters
     ----------
@@ -49,15 +54,7 @@ def require_factor_memory(
         Rows and entries of the matrix.
     needed [byte]
     beside
-        What of it is for other things than the factor.
-    precision
-        Of the factor.
-
-    Raises
-    ------
-    FactorMemoryError
-        With the element size that would fit: the memory grows with h^-4 in space and with h^-2 in
-        the plane.
+        What of it is not for the factor.
     """
     if fits(needed):  # the words take longer than a small factorisation
         return
@@ -75,7 +72,7 @@ def require_factor_memory(
 
 
 def out_of_memory(backend: str, size: int, nonzeros: int, needed: float) -> FactorMemoryError:
-    """Build the error of a factorisation that ran out of memory."""
+    """Error of a factorisation that ran out of memory."""
     what, hint = _words(backend, size, nonzeros, needed)
     there = available_memory()
     return FactorMemoryError(

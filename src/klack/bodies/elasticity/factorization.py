@@ -44,8 +44,8 @@ _ROUNDING = 1e-11
 class Factorization(Protocol):
     """A factorised matrix A, ready to solve A X = B many times.
 
-    Holds memory outside Python until :meth:`close`; it is also a context manager.  One object must
-    not be used by two threads at once; two objects may.
+    Holds memory outside Python until :meth:`close`; also a context manager. Two threads must not
+    use one object at once.
     """
 
     @property
@@ -60,16 +60,16 @@ class Factorization(Protocol):
 
     @property
     def nonzeros(self) -> int | None:
-        """Entries of the factor, where the solver reports them."""
+        """Entries of the factor; None where the solver does not report them."""
         ...
 
     @property
     def memory(self) -> int | None:
-        """Peak memory of the factorisation [byte], where the solver reports it."""
+        """Peak memory [byte]; None where the solver does not report it."""
         ...
 
     def solve(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Solve A X = B; B has shape (n,) or (n, m), X the same; 2-D results are column-major."""
+        """Solve A X = B, B of shape (n,) or (n, m); 2-D results are column-major."""
         ...
 
     def close(self) -> None:
@@ -87,7 +87,7 @@ class Factorization(Protocol):
 
 
 def available_backends() -> tuple[str, ...]:
-    """Names of the solvers that can be loaded here, the fastest first."""
+    """Solvers that can be loaded here, the fastest first."""
     return tuple(name for name in _BACKENDS if _loadable(name))
 
 
@@ -101,27 +101,20 @@ def factorize(
 ) -> Factorization:
     """Factorise a sparse symmetric positive definite matrix.
 
+    Rejects a matrix that is not positive definite, or singular to working precision.
+
     Parameters
     ----------
-    A : sparse matrix or array, shape (n, n)
+    A (n, n)
         Full symmetric storage.
     backend
-        ``"auto"`` takes the first of these that is installed.
+        ``"auto"`` takes the first that is installed.
     threads
-        Threads of the factorisation and of each solve (pardiso only); the default is that of MKL.
-        One thread is best for many single solves, two for the factorisation.
+        Of the factorisation and of each solve (pardiso only); default: that of MKL. One is best
+        for many single solves, two for the factorisation.
     precision
-        Of the factor; ``"single"`` (pardiso only, the others stay double) takes half the memory and
-        0.6 of the time, with relative residuals of some 1e-6.
-    budget
-        What has to fit beside the factor, and who is told its memory before it is computed.
-
-    Raises
-    ------
-    FactorMemoryError
-        If it does not fit.
-    InputError
-        If the matrix is not positive definite, or singular to working precision.
+        ``"single"`` (pardiso only, the others stay double) takes half the memory and 0.6 of the
+        time, with relative residuals of some 1e-6.
 
     Examples
     --------
@@ -158,7 +151,7 @@ def factorize(
 
 
 def not_positive_definite(symptom: str) -> InputError:
-    """Build the one text for every solver that meets a singular or indefinite matrix."""
+    """The error of every solver that meets a singular or indefinite matrix."""
     return InputError(
         "factorize: A",
         got=f"a matrix that is not positive definite ({symptom})",
@@ -188,7 +181,7 @@ def _load(name: str) -> Callable[..., Factorization]:
 
 
 def chosen_backend(backend: str) -> str:
-    """Name of the solver that a choice means here; refuses one that is not installed."""
+    """Solver that a choice means here; rejects one that is not installed."""
     names = available_backends()
     if backend == "auto":
         return names[0]
@@ -226,11 +219,11 @@ def _largest_row(A: Any) -> float:
 
 
 def _check_definite(factor: Factorization) -> None:
-    """Lanczos steps with the inverse: a factor of any sign solves an indefinite matrix as well.
+    """Lanczos steps with the inverse, since a factor of any sign solves an indefinite matrix too.
 
     Eigenvalues of the tridiagonal matrix lie within those of the inverse (Parlett 1998, chapter
-    10), so that a negative one is proof.  One that is far from zero among many may stay unseen.  So
-    many steps and no more: ARPACK would look for the end of the cluster at zero of a sound matrix.
+    10), so a negative one is proof; one far from zero among many may stay unseen. Not ARPACK: of a
+    sound matrix it would look for the end of the cluster at zero.
     """
     rng = np.random.default_rng(2)
     size = min(_DEFINITE_STEPS, factor.size)

@@ -4,21 +4,19 @@ With the angle :math:`\theta` from the direction in which the body bends,
 
 .. math:: u_r = U \cos n\theta, \qquad u_\theta = V \sin n\theta, \qquad u_z = W \cos n\theta,
 
-U, V, W over the half section.  Orders do not couple, so each is a plane problem with its own
-stiffness and mass, integrated over the full circle (Wilson 1965).  The same turned by a right angle
-is the second motion of order 1, and so on.  In order 0 the factor of V is 1: the axisymmetric
-motion and the torsion.
+U, V, W over the half section. Orders do not couple: each is a plane problem, integrated over the
+full circle (Wilson 1965). Turned by a right angle it is the second motion of order 1, and so on.
+In order 0 the factor of V is 1: axisymmetric motion and torsion.
 
 The degrees of freedom of a node are a, b, W with :math:`U = a + b` and :math:`V = b - a`, because
 
 .. math:: u_x + \mathrm i u_y = a \, e^{\mathrm i (1-n) \theta} + b \, e^{\mathrm i (1+n) \theta}.
 
-In order 1, *a* moves the ring of the node as a whole, and *b* deforms it.  On the axis a motion has
-one value for all angles: what depends on the angle there is zero.  Of order 1 only *a* is left, of
-order 0 only *W*, of others nothing.
+In order 1, *a* moves the ring of the node as a whole, and *b* deforms it. On the axis, what
+depends on the angle is zero: of order 1 only *a* is left, of order 0 only *W*, of others nothing.
 
-Order 1 has two rigid modes, a shift across the axis and a rotation about the centre of mass.  Order
-0 has a shift along the axis and a rotation around it; others have none.
+Rigid modes of order 1: a shift across the axis and a rotation about the centre of mass; of order
+0: a shift along the axis and a rotation around it; others have none.
 """
 
 from collections.abc import Iterable, Mapping
@@ -43,18 +41,15 @@ __all__ = ["FourierBody", "displacement_rows", "fourier_body", "rows_around"]
 class FourierBody:
     """A body of revolution in one Fourier order; made by :func:`fourier_body`.
 
-    For :class:`~klack.bodies.elasticity.statics.Flexibility` and
-    :func:`~klack.bodies.elasticity.eigen.eigenmodes` it is a body like any other.
-
     Parameters
     ----------
     mesh
         The half section.
     K (n_dof, n_dof) [N/m]
-        Stiffness of a, b, W of all nodes, supports not applied.
+        Of a, b, W of all nodes, supports not applied.
     M (n_dof, n_dof) [kg]
     fixed
-        Sorted degrees of freedom that are held at zero, those on the axis among them.
+        Sorted degrees of freedom held at zero, those on the axis included.
     """
 
     name: str
@@ -71,7 +66,7 @@ class FourierBody:
 
     @property
     def dof_count(self) -> int:
-        """Number of degrees of freedom, fixed ones included."""
+        """Degrees of freedom, fixed ones included."""
         return 3 * self.mesh.node_count
 
     @cached_property
@@ -81,7 +76,7 @@ class FourierBody:
 
     @cached_property
     def nodal_mass(self) -> NDArray[np.float64]:
-        """Share of each node in the mass of the full circle, shape (n_nodes,) [kg]."""
+        """Mass of each node, full circle, shape (n_nodes,) [kg]."""
         full_circle = 2.0 if self.order > 0 else 1.0
         return np.asarray(full_circle * self.M[2::3, 2::3].sum(axis=1))
 
@@ -92,15 +87,15 @@ class FourierBody:
 
     @cached_property
     def centre_of_mass(self) -> float:
-        """Height of the centre of mass on the axis, z [m]."""
+        """Height z of the centre of mass [m]."""
         return float(self.nodal_mass @ self.mesh.points[:, 1] / self.mass)
 
     @cached_property
     def rigid_motions(self) -> NDArray[np.float64]:
         """Motions without strain, supports left out, shape (n_dof, 2 | 0).
 
-        The first is a shift by 1; the second a rotation, about the centre of mass in order 1, that
-        moves the farthest node by 1.
+        A shift by 1, and a rotation, about the centre of mass in order 1, that moves the farthest
+        node by 1.
         """
         motion = np.zeros((self.mesh.node_count, 3, 2 if self.order < 2 else 0))
         r, z = self.mesh.points.T
@@ -125,7 +120,7 @@ class FourierBody:
 
     @cached_property
     def isostatic_support(self) -> NDArray[np.int64]:
-        """Degrees of freedom, one per rigid mode, that prevent every rigid motion when fixed."""
+        """As of :class:`~klack.bodies.elasticity.body.ElasticBody`."""
         return np.sort(held_best(self.rigid_modes, self.free))
 
     def amplitudes(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -134,7 +129,7 @@ class FourierBody:
         Parameters
         ----------
         u (n_dof,) or (n_dof, m)
-            Values of the degrees of freedom, for example the shapes of modes.
+            For example the shapes of modes.
         """
         a, b, w = np.moveaxis(np.reshape(u, (-1, 3, *np.shape(u)[1:])), 1, 0)
         return np.stack([a + b, b - a, w], axis=1)
@@ -150,20 +145,17 @@ def fourier_body(
 ) -> FourierBody:
     """Assemble a body of revolution in one Fourier order and check its supports.
 
+    Rejects supports that leave a rigid motion free: a held point of the axis does not keep a body
+    from turning.
+
     Parameters
     ----------
     mesh
-        Half section, of dimension 2.
+        Half section, in one piece.
     order
         n, 0 or more; 1 is bending.
-    fixed_nodes : node numbers
-        Held in all directions, all round.  None: the body is free.
-
-    Raises
-    ------
-    InputError
-        If the mesh is a solid or not in one piece, for a negative order, and for supports that
-        leave a rigid motion free: a held point of the axis does not keep a body from turning.
+    fixed_nodes
+        Held in all directions, all round; none: the body is free.
     """
     where = f"body '{name}': Fourier order {order}"
     if mesh.dimension != 2:
@@ -201,24 +193,21 @@ _TO_MERIDIAN = np.array([[1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])  # U = a + b, W
 def rows_around(rows: csr_array, order: int, angles: Floats, *, towards: float = 0.0) -> csr_array:
     r"""Read at given angles what rows read from the half section: traces on rings.
 
-    They act on the degrees of freedom of :class:`klack.bodies.elasticity.fourier_body.FourierBody`;
-    their transposes give the forces that do the same work.  ``towards`` is the angle of the
-    direction in which the body bends, from the x axis: with 0° and 90° both motions of an order are
-    there.
+    They act on the degrees of freedom of :class:`FourierBody`; their transposes give the forces
+    that do the same work.
 
-    A row :math:`g` that reads :math:`g_r u_r + g_z u_z`, such as the normal displacement of a
-    contact point of axisymmetric bodies (``ContactSpace.G_a``), reads
-    :math:`(g_r U + g_z W) \cos n (\theta - \theta_0)` at the angle :math:`\theta`.
+    A row :math:`g` that reads :math:`g_r u_r + g_z u_z`, such as a normal displacement
+    (``ContactSpace.G_a``), reads :math:`(g_r U + g_z W) \cos n (\theta - \theta_0)` at the angle
+    :math:`\theta`.
 
     Parameters
     ----------
     rows (m, 2 n_nodes)
         On u_r and u_z of the nodes.
-    order
-        n.
     angles (k,) [rad]
     towards [rad]
-        :math:`\theta_0`.
+        :math:`\theta_0`, the direction in which the body bends, from the x axis; 0° and 90° give
+        both motions of an order.
 
     Returns
     -------
@@ -243,17 +232,15 @@ def rows_around(rows: csr_array, order: int, angles: Floats, *, towards: float =
 def displacement_rows(
     weights: csr_array, order: int, angles: Floats, *, towards: float = 0.0
 ) -> csr_array:
-    """Read the displacement along x, y and z of points, from their place in the half section.
+    """Read the displacement along x, y and z of points of the half section.
 
     Parameters
     ----------
     weights (m, n_nodes) [-]
         Shape functions at the points; the identity reads the nodes.
-    order
-        n.
     angles (m,) [rad]
-        Of the points.
     towards [rad]
+        As of :func:`rows_around`.
 
     Returns
     -------

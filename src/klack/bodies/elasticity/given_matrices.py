@@ -1,7 +1,7 @@
 r"""Elastic bodies whose stiffness and mass another program has assembled, checked before use.
 
-What a wrong file would do is hard to see in an impact, so the matrices must first pass what every
-elastic body obeys:
+A wrong file is hard to see in an impact, so the matrices must first pass what every elastic body
+obeys:
 
 - diagonals are positive, M is positive definite, and K has no negative eigenvalue;
 - a rigid motion causes no force, :math:`K R = 0`, in every row that is not tied to a held node;
@@ -49,14 +49,9 @@ _DENSE = 400
 
 
 def require_positive_mass(where: str, M: csr_array, free: NDArray[np.int64]) -> None:
-    """Check that the mass matrix is positive definite, by the smallest eigenvalue (Lanczos).
+    """Check that the mass matrix is positive definite, by its smallest eigenvalue (Lanczos).
 
     Scaled to a unit diagonal, a consistent mass matrix has eigenvalues of the order of 0.1.
-
-    Raises
-    ------
-    InputError
-        With the smallest scaled eigenvalue.
     """
     A = M[free][:, free]
     scale = dia_array((1.0 / np.sqrt(A.diagonal())[None], [0]), shape=A.shape)
@@ -80,16 +75,11 @@ def require_positive_mass(where: str, M: csr_array, free: NDArray[np.int64]) -> 
 
 
 def first_frequency(where: str, body: ElasticBody) -> float:
-    r"""Lowest elastic eigenfrequency [Hz], after the check that nothing else is below it.
+    """Lowest elastic eigenfrequency [Hz], and the check that nothing else is below it.
 
     With K R = 0, and with as many degrees of freedom held as there are rigid motions, K has a
     Cholesky factor exactly if it has no negative eigenvalue and no motions without strain but the
     rigid ones.
-
-    Raises
-    ------
-    InputError
-        For a stiffness with a negative eigenvalue or further motions without strain.
     """
     try:
         with Flexibility(body) as flexibility:
@@ -114,19 +104,17 @@ class MatrixReport:
 
     Parameters
     ----------
-    rows : tuple of (str, str)
+    rows
         What, and its value in words.
     mass [kg]
-        Without the share of degrees of freedom that are missing in the files.
+        Without the degrees of freedom that are missing in the files.
     centre_of_mass [m]
     strain [-]
         Largest force of a rigid motion, relative to the forces that cancel in it.
-    first_frequency [Hz]
-        Lowest elastic eigenfrequency.
     rigid
         Number of motions without strain.
     held
-        Degrees of freedom at zero.
+        Number of degrees of freedom at zero.
     """
 
     rows: tuple[tuple[str, str], ...]
@@ -154,23 +142,16 @@ def check_matrices(
 
     Parameters
     ----------
-    K (n_dof, n_dof) [N/m]
-    M (n_dof, n_dof) [kg]
     mesh
-        Points [m]; elements and faces may be missing.
+        Elements and faces may be missing.
     fixed
-        Sorted degrees of freedom at zero, absent ones among them.
+        Degrees of freedom at zero, absent ones included.
     absent
         Those without rows in the files.
     numbers
-        Number of each node in its program, for the texts.
+        Of each node in its program, for messages.
     units
-        In which the files were read; with it, a text names the system that would fit.
-
-    Raises
-    ------
-    InputError
-        With the number that is wrong and what to try.
+        Of the files; with it, a message names the system that would fit.
     """
     absent = np.empty(0, dtype=np.int64) if absent is None else absent
     numbers = np.arange(1, mesh.node_count + 1) if numbers is None else numbers
@@ -225,23 +206,14 @@ def checked_body(
     numbers: NDArray[np.int64] | None = None,
     units: UnitSystem | None = None,
 ) -> tuple[ElasticBody, MatrixReport]:
-    """Make a body from given matrices, with a report on them.
+    """Make a body from given matrices, with a report on them; parameters as :func:`check_matrices`.
 
     Parameters
     ----------
     mesh
         With or without elements.
-    K, M (n_dof, n_dof) [N/m], [kg]
-    fixed_nodes : node indices
+    fixed_nodes
         Held in all directions; degrees of freedom in ``absent`` are held as well.
-    absent, where, numbers, units
-        See :func:`check_matrices`.
-
-    Raises
-    ------
-    InputError
-        If the matrices are not those of an elastic body with these nodes, or the supports leave a
-        rigid motion free.
     """
     where = f"body '{name}': matrices" if where is None else where
     fixed = held_dofs(mesh, np.unique(np.fromiter(fixed_nodes, dtype=np.int64)))

@@ -5,10 +5,7 @@ Every isotropic stiffness follows from one small tensor per pair of nodes,
 .. math:: G_{ab} = \int g_a(N_i)\, g_b(N_j)\, dV,
 
 where ``g`` holds the three gradient components of a solid, or (d/dr, d/dz, 1/r) of a body of
-revolution.  With it the 3 x 3 block of a solid is ``lambda G + mu (G^T + tr G 1)``.
-
-A body of revolution that moves in one Fourier order n has three displacements per node; see
-:mod:`klack.bodies.elasticity.fourier_body`.
+revolution: the 3 x 3 block of a solid is ``lambda G + mu (G^T + tr G 1)``.
 """
 
 import numpy as np
@@ -23,18 +20,13 @@ __all__ = ["add_elements", "block_pattern", "diagonal_blocks", "node_graph"]
 def node_graph(
     elements: NDArray[np.int32], offsets: NDArray[np.int64], node_count: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
-    """Sorted neighbours of each node (itself included) as compressed rows.
+    """Sorted neighbours of each node (itself included): starts (node_count + 1,), and neighbours.
 
     Parameters
     ----------
     elements (sum of nodes per element,)
-        Node numbers of all elements, one after the other.
+        Nodes of all elements, one after the other.
     offsets (n_elements + 1,)
-
-    Returns
-    -------
-    start (node_count + 1,)
-    neighbours (start[-1],)
     """
     n_elements = offsets.size - 1
     first = np.zeros(node_count + 1, np.int64)
@@ -192,17 +184,18 @@ def add_elements(
     lame_lambda, shear_modulus [Pa]
     density [kg/m^3]
     order
-        Fourier order of a body of revolution with three displacements per node; -1 without.
-    start, neighbours : result of :func:`node_graph`
+        Of a body of revolution with three displacements per node; else -1.
+    start, neighbours
+        Of :func:`node_graph`.
     K (start[-1] * c * c,) [N/m], c displacements per node
-        Values in the order of the full CSR matrix; changed in place.
+        In the order of the full CSR matrix; changed in place.
     M (start[-1],) [kg]
-        Values of the scalar mass matrix; changed in place.
+        Scalar mass matrix; changed in place.
 
     Returns
     -------
     (n_elements, 2) [m^d]
-        Smallest and largest Jacobian determinant at the integration points.
+        Smallest and largest Jacobian determinant.
     """
     n_elements, n = connectivity.shape
     d = points.shape[1]
@@ -271,7 +264,6 @@ def add_elements(
 
 @inner(nogil=True)
 def _stiffness_block(G, lame_lambda, mu, axisymmetric, block):  # type: ignore[no-untyped-def]
-    """Fill the (d, d) block of one pair of nodes."""
     if axisymmetric:  # components r, z, hoop
         volume_r = G[0, 0] + G[0, 2] + G[2, 0] + G[2, 2]
         block[0, 0] = lame_lambda * volume_r + mu * (2 * (G[0, 0] + G[2, 2]) + G[1, 1])

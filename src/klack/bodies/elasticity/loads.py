@@ -39,24 +39,16 @@ def traction_load(mesh: Mesh, surface: Surface, traction: Traction) -> NDArray[n
 
 
 def order_load(mesh: Mesh, surface: Surface, traction: Traction, order: int) -> NDArray[np.float64]:
-    r"""Forces of a traction in one Fourier order around a body of revolution.
+    r"""Forces (3 n_nodes,) [N] of a traction in one Fourier order around a body of revolution.
 
     The traction :math:`t_r \cos n\theta,\; t_\theta \sin n\theta,\; t_z \cos n\theta` does the
-    work of these forces on the degrees of freedom a, b, W of
+    work of these forces on the degrees of freedom of
     :class:`klack.bodies.elasticity.fourier_body.FourierBody`.
 
     Parameters
     ----------
-    mesh
-        Half section.
     traction : function (points (q, 2) [m], outward normals (q, 2)) -> (q, 3) [Pa]
         Amplitudes along the radius, around, and along the axis.
-    order
-        n.
-
-    Returns
-    -------
-    array, shape (3 n_nodes,) [N]
     """
     circle = 0.5 if order > 0 else 1.0
     load = np.zeros((mesh.node_count, 3))
@@ -75,9 +67,9 @@ def face_dashpots(mesh: Mesh, surface: Surface, resistance: float) -> csr_array:
 
     .. math:: C_{ij} = \int_\Gamma z \, (N_i n)(N_j n)^T \, dA
 
-    With :math:`z = \sqrt{E \varrho}`, density times the speed of waves in bars, the traction on the
-    end of a bar is :math:`-z v`, that of the outgoing wave alone: the bar seems to have no end
-    (Lysmer & Kuhlemeyer 1969).  Exact for axial waves that are long against the thickness; shorter
+    With :math:`z = \sqrt{E \varrho}`, density times the speed of waves in bars, the traction on
+    the end of a bar is that of the outgoing wave alone, :math:`-z v`: the bar seems endless
+    (Lysmer & Kuhlemeyer 1969). Exact for axial waves that are long against the thickness; shorter
     ones and bending are reflected in part.
 
     Parameters
@@ -129,18 +121,18 @@ Floats = NDArray[np.float64]
 class NearLoads:
     r"""Loads of one body with their answers.
 
-    Of a body with flexibility F, loads :math:`f_i` and their answers :math:`u_i = F f_i`, the
-    combination :math:`u = \sum_i c_i u_i` with
+    With flexibility F, loads :math:`f_i` and answers :math:`u_i = F f_i`, the combination :math:`u
+    = \sum_i c_i u_i` with
 
     .. math:: \sum_j (f_i^T u_j)\, c_j = u_i^T f, \qquad
         e^2 = \frac{f^T F f - \sum_i c_i\, u_i^T f}{f^T F f}
 
     is the nearest answer to a further load f in the norm of the strain energy (Galerkin's method;
-    Strang & Fix 1973, ch. 1), and e its relative error in that norm.  The energy :math:`f^T F f /
-    2` is known beforehand where the body is condensed to the places that the load acts on.
+    Strang & Fix 1973, ch. 1), and e its relative error. The energy :math:`f^T F f / 2` is known
+    where the body is condensed to the places of the load.
 
-    It is meant for pressures that widen with the force, seen from a distance: their difference is
-    in balance, and its answer decays away from where it acts (Saint-Venant).
+    Meant for pressures that widen with the force, seen from a distance: their difference is in
+    balance, and its answer decays (Saint-Venant).
 
     Examples
     --------
@@ -169,7 +161,7 @@ class NearLoads:
         energy [J]
             Twice the strain energy, ``f^T F f``.
         solve
-            For a load that is not close to those before.
+            For a load that is not close to earlier ones.
         """
         for known, found in zip(self._forces, self._answers, strict=True):
             if np.array_equal(known, force):

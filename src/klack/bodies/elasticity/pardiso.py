@@ -1,11 +1,9 @@
 """PARDISO of Intel MKL, called directly in the library of the installed mkl package.
 
-pypardiso's own ``solve`` compares (or hashes) the matrix and copies its indices at every call;
-a transient run solves thousands of times, so the library is called here without that.
-Cholesky (matrix type 2) is as fast as the symmetric indefinite type -2, takes the same memory, and
-notices a matrix that is not positive definite.  A factor in single precision takes half the memory
-and 0.6 of the time per solve; it is for time steps that solve for a small increment, never for
-statics.
+pypardiso's own ``solve`` compares (or hashes) the matrix and copies its indices at every call, of
+which a transient run makes thousands.  Cholesky (matrix type 2) is as fast as the symmetric
+indefinite type -2, takes the same memory, and notices a matrix that is not positive definite.  A
+factor in single precision is for time steps that solve for a small increment, never for statics.
 """
 
 import ctypes
@@ -79,7 +77,7 @@ class PardisoFactorization(Closing):
         self.memory: int | None = self._told_memory()
 
     def _factorise(self, entries: int, precision: Precision, budget: Budget) -> None:
-        """Order the matrix and count the entries of its factor; then, if they fit, compute them."""
+        """Order the matrix and count the entries of its factor; if they fit, compute them."""
         empty = np.zeros(self.size, dtype=self._type)
         for phase in (_ANALYSE, _FACTOR):
             error = self._call(phase, empty, empty, 1)
@@ -106,7 +104,7 @@ class PardisoFactorization(Closing):
         return self._substitute(_SOLVE, B)
 
     def forward(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
-        """First half of a solve, L Y = B with A = L L^T (rows of Y in an order of its own)."""
+        """First half of a solve, L Y = B with A = L L^T (Y in an order of its own)."""
         return self._substitute(_FORWARD, B)
 
     def backward(self, Y: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -157,7 +155,7 @@ def _library() -> ctypes.CDLL:
 
 
 def _files_of_mkl() -> list[PackagePath]:
-    """Files of the mkl package anywhere on the path; none if installed otherwise."""
+    """Files of the mkl package on the path; none if installed otherwise."""
     try:
         return files("mkl") or []
     except PackageNotFoundError:

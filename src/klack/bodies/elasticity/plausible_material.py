@@ -39,7 +39,7 @@ class MaterialEstimate:
         lambda + 2 mu.
     wave_speed [m/s]
     exact_volume
-        False where density and modulus are lower bounds, from the box around the nodes.
+        False where the box around the nodes makes density and modulus lower bounds.
     """
 
     density: float
@@ -82,10 +82,8 @@ def estimate_material(K: csr_array, mesh: Mesh, mass: float) -> MaterialEstimate
 
     Parameters
     ----------
-    K (n_dof, n_dof) [N/m]
     mesh
-        With blocks for the volume; without, the box around the nodes is taken.
-    mass [kg]
+        Without blocks, the box around the nodes is taken for the volume.
     """
     d, x = mesh.dimension, mesh.points - mesh.points.mean(axis=0)
     energies = []
@@ -115,13 +113,7 @@ def _box(mesh: Mesh) -> float:
 def require_plausible_material(
     where: str, material: MaterialEstimate, units: UnitSystem | None
 ) -> None:
-    """Refuse matrices of no material, and name the units in which they would be of one.
-
-    Raises
-    ------
-    InputError
-        With the values, and the unit system that would fit.
-    """
+    """Reject matrices of no material, and name the units in which they would be of one."""
     faults = material.faults
     if not faults:
         return
@@ -145,7 +137,7 @@ def require_plausible_material(
 
 
 def _fitting(material: MaterialEstimate, units: UnitSystem) -> list[tuple[str, MaterialEstimate]]:
-    """Unit systems in which the same numbers belong to a material, the most usual one first.
+    """Unit systems in which the numbers belong to a material, the most usual one first.
 
     Only mass and stiffness scale: the coordinates have a unit of their own.
     """

@@ -1,9 +1,8 @@
 """Integration points of every element family, for stiffness and for mass.
 
-The rules are exact for the mass of straight-sided elements and for their stiffness, except where
-1/r enters (axisymmetric hoop strain) and for distorted hexes, wedges and quads; those converge.
-A 10-node tetrahedron needs 4 points for its stiffness and 14 for its mass.  All weights are
-positive: the mass matrix is positive definite on any valid element.
+Exact for mass and stiffness of straight-sided elements, except where 1/r enters (axisymmetric hoop
+strain) and for distorted hexes, wedges and quads; those converge. All weights are positive: the
+mass matrix is positive definite on any valid element.
 
 Triangle rules: Dunavant 1985.  Tetrahedron, 14 points, degree 5: Walkington 2000.
 """
@@ -25,7 +24,7 @@ Choice = tuple[Callable[[], Rule], Callable[[], Rule]]
 
 
 def quadrature(family: str, purpose: Purpose) -> Rule:
-    """Points and weights on the reference element.
+    """Points (q, d) and weights (q,) on the reference element, whose measure they add up to.
 
     Parameters
     ----------
@@ -33,12 +32,6 @@ def quadrature(family: str, purpose: Purpose) -> Rule:
         Key of :data:`klack.mesh.families.FAMILIES`.
     purpose
         ``"mass"`` also serves for surface integrals of products of shape functions.
-
-    Returns
-    -------
-    xi (q, d) [-]
-    w (q,) [-]
-        They add up to the measure of the reference element.
 
     Examples
     --------

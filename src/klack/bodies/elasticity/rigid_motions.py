@@ -1,4 +1,4 @@
-r"""Rigid motions of the nodes of a body, and the forces that given matrices answer them with."""
+"""Rigid motions of the nodes of a body, and the forces they cause in given matrices."""
 
 import numpy as np
 import scipy
@@ -30,7 +30,7 @@ _QUIET = 0.05  # [Hz] rigid frequency that needs no cure
 
 
 def held_dofs(mesh: Mesh, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Degrees of freedom of held nodes; on the axis of a body of revolution r is held as well."""
+    """Degrees of freedom of held nodes; r on the axis is always held."""
     d = mesh.dimension
     held = (d * nodes[:, None] + np.arange(d)).ravel()
     if d == 2:
@@ -52,26 +52,24 @@ def orthonormal_in_mass(R: NDArray[np.float64], M: csr_array) -> NDArray[np.floa
 
 
 def held_best(R: NDArray[np.float64], candidates: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Those of the candidates, as many as motions, that hold the rigid motions best."""
+    """The candidates, one per motion, that hold the rigid motions best."""
     _, _, order = scipy.linalg.qr(R[candidates].T, mode="economic", pivoting=True)
     return np.asarray(candidates[order[: R.shape[1]]])
 
 
 def motions_left_free(held: NDArray[np.float64]) -> int:
-    """Number of rigid motions left free by a support, from their values at its nodes."""
+    """Rigid motions left free by a support, from their values at its nodes."""
     sizes = np.linalg.svd(held, compute_uv=False)
     return held.shape[1] - int(np.sum(sizes > _SUPPORT * sizes[0]))
 
 
 def rigid_motions(mesh: Mesh, about: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
-    """Translations, and rotations about a place, shape (n_dof, 6 | 1).
-
-    Rotations move the farthest node by 1.
+    """Translations, and rotations that move the farthest node by 1, shape (n_dof, 6 | 1).
 
     Parameters
     ----------
     about (dimension,) [m]
-        The middle of the nodes without.
+        Default: the middle of the nodes.
     """
     x = mesh.points - (mesh.points.mean(axis=0) if about is None else about)
     if mesh.dimension == 2:
@@ -95,14 +93,12 @@ def require_rigid_motions(
 ) -> float:
     """Check that rigid motions cause no forces; returns the largest relative one.
 
-    In row i the sum of ``K_ij R_j`` is compared with the sum of the magnitudes.  Rows of nodes that
-    share an element with one that is missing in the files cannot cancel and are left out; without
-    elements, at most half of the rows may be tied to missing ones.
-
-    Raises
-    ------
-    InputError
-        Says whether the order of the rows, the coordinates or a support within K is to blame.
+    In row i the sum of ``K_ij R_j`` is compared with the sum of the magnitudes.  Rows of nodes
+    that
+    share an element with one missing in the files cannot cancel and are left out; without
+    elements,
+    at most half of the rows may be tied to missing ones.  The error says whether the order of the
+    rows, the coordinates or a support within K is to blame.
     """
     R = rigid_motions(mesh)
     size = abs(K) @ np.abs(R)
@@ -177,12 +173,12 @@ def _fault(
 
 
 def without_rigid_strain(K: csr_array, M: csr_array, mesh: Mesh) -> csr_array:
-    r"""Take the rounding of its file out of the stiffness of a free body, so that K R = 0.
+    """Remove the rounding of its file from the stiffness of a free body, so that K R = 0.
 
-    Numbers of 7 to 10 digits leave forces of a rigid motion, :math:`E = K R`, that are small
-    against K but give rigid motions a frequency.  Those of shifts are taken out of the diagonal
-    blocks, node by node.  For what is left, with a support :math:`G` of three nodes,
-    :math:`G^T R = 1`,
+    Numbers of 7 to 10 digits leave forces :math:`E = K R`, small against K, that give rigid
+    motions a
+    frequency.  Those of shifts are taken out of the diagonal blocks.  For what is left, with a
+    support :math:`G` of three nodes, :math:`G^T R = 1`,
 
     .. math:: K' = K - E G^T - G E^T + G (R^T E) G^T
 
@@ -207,7 +203,7 @@ def without_rigid_strain(K: csr_array, M: csr_array, mesh: Mesh) -> csr_array:
 
 
 def _without_shifts(K: csr_array, d: int) -> csr_array:
-    """Change the block of each node with itself so that a rigid shift causes almost no force."""
+    """Change the diagonal blocks so that a rigid shift causes almost no force."""
     n = K.shape[0] // d
     blocks = np.empty((n, d, d))
     for way in range(d):
@@ -232,7 +228,7 @@ def _support(mesh: Mesh) -> NDArray[np.int64]:
 
 
 def at_distant_nodes(x: NDArray[np.float64], centre: NDArray[np.float64]) -> NDArray[np.int64]:
-    """All directions of three nodes that are far from a centre, and from each other's line."""
+    """All directions of three nodes far from a centre, and not on one line."""
     first = int(np.argmax(np.linalg.norm(x - centre, axis=1)))
     second = int(np.argmax(np.linalg.norm(x - x[first], axis=1)))
     along = (x[second] - x[first]) / np.linalg.norm(x[second] - x[first])

@@ -1,15 +1,14 @@
 r"""Points on rings of a body of revolution: what a Fourier order moves there, and their compliance.
 
-N points at equal angles :math:`\theta_j = 2 \pi j / N` on every ring.  Forces at them, read as a
-trigonometric polynomial, have the orders 0 to N/2, and each order is a problem of its own.  With
-the static compliance :math:`c_n` of the rows of the half section in order *n*,
+N points at equal angles :math:`\theta_j = 2 \pi j / N` on every ring resolve the orders 0 to N/2.
+With the static compliance :math:`c_n` of the rows of the half section in order *n*,
 
 .. math:: C_{ki,lj} = \sum_{n=0}^{N/2} w_n \, c_{n,kl} \cos n (\theta_i - \theta_j), \qquad
     w_n = 1, \quad w_{N/2} = \tfrac12 ,
 
-block-circulant: one matrix for each difference of angles.  Of the last order, N/2, the points see
-:math:`(-1)^j` alone: this pattern is one motion where every other order has two, and so counts
-half.  A row that reads along the ring has the sine of an angle where others have the cosine.
+block-circulant: one matrix for each difference of angles. Order N/2 is at the points
+:math:`(-1)^j` alone, one motion where other orders have two, and so counts half. A row that reads
+along the ring has the sine of an angle where others have the cosine.
 """
 
 from dataclasses import dataclass
@@ -30,12 +29,12 @@ _CHUNK = 256
 
 
 def resolved_orders(count: int) -> range:
-    """Orders that so many points on a ring resolve: 0 to half of them."""
+    """Orders that so many points on a ring resolve."""
     return range(count // 2 + 1)
 
 
 def share_of_order(order: int, count: int) -> float:
-    """Weight of an order in the compliance: a half for that of alternating points, else 1."""
+    """Weight :math:`w_n` of an order in the compliance."""
     return 0.5 if 2 * order == count else 1.0
 
 
@@ -46,9 +45,9 @@ class RingRows:
     Parameters
     ----------
     along (m, 2 n_nodes)
-        On u_r and u_z: they read in the plane of the section, with the cosine of the angle.
+        In the plane of the section (u_r, u_z), with the cosine of the angle.
     around (k, n_nodes)
-        On u_theta: they read along the ring, with the sine.
+        Along the ring (u_theta), with the sine.
     turned (k, 2 n_nodes)
         What the latter read besides of u_r and u_z, times the order.
     """
@@ -59,7 +58,7 @@ class RingRows:
 
     @classmethod
     def in_plane(cls, along: csr_array) -> "RingRows":
-        """Rows in the plane of the section alone, such as gaps."""
+        """Rows in the plane of the section alone."""
         nodes = along.shape[1] // 2
         return cls(along=along, around=csr_array((0, nodes)), turned=csr_array((0, 2 * nodes)))
 
@@ -89,11 +88,11 @@ class RingPoints:
     Parameters
     ----------
     row (p,)
-        Row of :class:`RingRows`.
+        Of :class:`RingRows`.
     turn (p,)
-        Number of the angle, 0 to ``count - 1``.
+        Number of the angle.
     count
-        N, equal angles of every ring.
+        N.
     is_sine (rows,)
         Of :class:`RingRows`.
     """
@@ -111,8 +110,7 @@ class RingPoints:
     def factors(self, order: int) -> tuple[Floats, Floats]:
         r"""What a unit amplitude of the two motions of an order moves each point, shape (p,) each.
 
-        The first bends towards x, the second is the same turned by :math:`\pi / 2 n`; order 0 has
-        one motion, and the second factor is 0.
+        The first bends towards x, the second is turned by :math:`\pi / 2 n`, and 0 for order 0.
         """
         sine = self.is_sine[self.row]
         if order == 0:
@@ -132,17 +130,12 @@ class RingPoints:
         return out[0], out[1]
 
     def compliance(self, spectrum: Floats) -> Floats:
-        """Static compliance of all points from that of each order.
+        """Static compliance of all points from that of each order, symmetric, shape (p, p) [m/N].
 
         Parameters
         ----------
         spectrum (orders, rows, rows) [m/N]
-            Of the rows in the orders 0 to N/2.
-
-        Returns
-        -------
-        (p, p) [m/N]
-            Symmetric.
+            Orders 0 to N/2.
         """
         table = _by_difference(spectrum, self.is_sine, self.count)
         C = np.empty((len(self.row),) * 2)
@@ -168,9 +161,8 @@ class RingSections:
     r"""Sections of a shaft of revolution.
 
     A section is one or two rings of nodes around a height *h*, with weights *w* whose sum is 1 and
-    whose mean height is *h*.  Its displacement is the weighted mean round the rings; its rotation
-    is that of the rigid motion which is nearest to the displacement of the rings with the same
-    weights. Of the amplitudes U, V, W of a Fourier order
+    whose mean height is *h*. Its displacement is the weighted mean round the rings, its rotation
+    that of the rigid motion nearest to theirs. Of the amplitudes U, V, W of a Fourier order
     (:mod:`klack.bodies.elasticity.fourier_body`) the mean leaves
 
     .. math:: u_z = \sum w W, \quad \varphi_z = \frac{\sum w r V}{\sum w r^2} \quad (n = 0), \qquad
@@ -179,16 +171,15 @@ class RingSections:
         (n = 1),
 
     with the height :math:`\zeta` above *h*, for a body that bends towards *x*, and nothing of
-    higher orders.  The transposes are the forces and moments, spread evenly round the rings, that
-    do work on them.
+    higher orders. The transposes are forces and moments, spread evenly round the rings.
 
     Parameters
     ----------
     heights (k,) [m]
     weights (k, n_nodes) [-]
-        Of the rings of each section: their sum is 1, their mean height that of the section.
+        Of the rings of each section.
     points (n_nodes, 2) [m]
-        (r, z) of all nodes.
+        (r, z).
     """
 
     heights: Floats
@@ -208,8 +199,9 @@ class RingSections:
     def of_order(self, order: int) -> csr_array:
         """Displacement of each section, then rotation of each, shape (2 k, 3 n_nodes).
 
-        In order 0 along and about the axis; in order 1 towards the direction of bending, and about
-        the one across it; nothing of higher orders.
+        In order 0 along and about the axis; in order 1 towards the direction of bending and about
+        the
+        one across it; zero for higher orders.
         """
         k, nodes = self.count, len(self.points)
         if order > 1:

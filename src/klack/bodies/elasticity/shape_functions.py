@@ -23,23 +23,15 @@ _SIGNS = {
 
 
 def shape_functions(family: str, xi: NDArray[np.float64]) -> Table:
-    """Values and derivatives of the shape functions.
+    """Values (q, n) and derivatives (q, n, d) of the shape functions at reference coordinates xi.
 
-    Reference domains: line [-1, 1]; triangle and tetrahedron with one corner in the origin and
-    the others at distance 1 along the axes; quad and hex [-1, 1]^d; wedge triangle x [-1, 1].
+    Reference domains: line [-1, 1]; triangle and tetrahedron with corners in the origin and at
+    distance 1 along the axes; quad and hex [-1, 1]^d; wedge triangle x [-1, 1].
 
     Parameters
     ----------
     family
         Key of :data:`klack.mesh.families.FAMILIES`.
-    xi (q, d) [-]
-        Reference coordinates.
-
-    Returns
-    -------
-    N (q, n) [-]
-    dN (q, n, d) [-]
-        Derivative of each function with respect to each reference coordinate.
 
     Examples
     --------
@@ -57,7 +49,7 @@ def shape_functions(family: str, xi: NDArray[np.float64]) -> Table:
 
 
 def reference_nodes(family: str) -> NDArray[np.float64]:
-    """Return the reference coordinates of the nodes, shape (n_nodes, d)."""
+    """Reference coordinates of the nodes, shape (n_nodes, d)."""
     topology = FAMILIES[family]
     triangle = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)])
     match family.rstrip("0123456789"):

@@ -6,13 +6,13 @@ ch. 17)
 
 .. math:: u = P^T K^+ P f, \qquad P = 1 - M R R^T,
 
-where P removes the resultant of the load by the inertia forces of the rigid motion, and P^T the
-rigid motion from the answer.  K^+ may be any generalised inverse: here six degrees of freedom of
-three distant nodes (one of a body of revolution, two in Fourier order 1) are held, which costs no
-reaction force because the load is in balance.
+where P balances the load by the inertia forces of the rigid motion, and P^T takes the rigid motion
+from the answer. K^+ may be any generalised inverse: here six degrees of freedom of three distant
+nodes (one of a body of revolution, two in Fourier order 1) are held, without reaction since the
+load is in balance.
 
-A factorisation cannot be stored, but what was solved with it can.  With a cache, a body that was
-factorised before is factorised again only when something is asked for that the cache does not have.
+A factorisation cannot be stored, but its answers can: with a cache, a body is factorised again
+only for what the cache does not have.
 """
 
 from collections.abc import Callable, Sequence
@@ -49,21 +49,18 @@ _COLUMNS = 16  # at once: five blocks of them are held
 class RefinedFactorization(Closing):
     r"""A :class:`~klack.bodies.elasticity.factorization.Factorization` that corrects a rough one.
 
-    A factor :math:`\tilde L \tilde L^T \approx A` in single precision takes half the memory.  For
-    statics its solutions are too rough: the smallest eigenvalues of a fine mesh are of the size of
-    what rounding leaves.  As a preconditioner of conjugate gradients, with residuals of the true A,
-    it gives all digits in a few rounds, so that one solve takes the time of two to three in double
-    precision. It therefore pays where memory decides, not otherwise.
+    A factor :math:`\tilde L \tilde L^T \approx A` in single precision takes half the memory. For
+    statics it is too rough: the smallest eigenvalues of a fine mesh are of the size of round-off.
+    As a preconditioner of conjugate gradients it gives all digits, in the time of two to three
+    solves in double precision: it pays only where memory decides.
 
-    The iteration stops by the error in the energy, :math:`r^T A^{-1} r \approx r^T \tilde A^{-1} r`
-    over :math:`x^T A x`, which counts for compliances and modes alike.
+    The iteration stops by the error in the energy, :math:`r^T A^{-1} r \approx r^T \tilde A^{-1}
+    r` over :math:`x^T A x`.
 
     Parameters
     ----------
-    A (n, n)
-        Symmetric positive definite.
     rough
-        Of A, in single precision; closed with this one.
+        In single precision; closed with this one.
     """
 
     def __init__(self, A: Any, rough: Factorization) -> None:
@@ -76,10 +73,7 @@ class RefinedFactorization(Closing):
     def solve(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
         """Solve A X = B for one or several columns.
 
-        Raises
-        ------
-        ConvergenceError
-            If the factor is too rough for this matrix.
+        Raises :class:`~klack.errors.ConvergenceError` if the factor is too rough.
         """
         B = np.asarray(B, dtype=np.float64)
         columns = B[:, None] if B.ndim == 1 else B
@@ -141,17 +135,13 @@ class Flexibility(Closing):
 
     Parameters
     ----------
-    backend : {"auto", "pardiso", "ngsolve", "superlu"}
-    threads
-        See :func:`klack.bodies.elasticity.factorization.factorize`.
     cache
-        Keeps what :meth:`deflections` and :meth:`remembered` compute, for later runs.
+        Keeps what :meth:`deflections` and :meth:`remembered` compute.
     budget
-        What has to fit beside the factor.  Where a factor in double precision does not, one in
-        single precision is taken and its solutions are refined (pardiso only;
-        :mod:`klack.bodies.elasticity.statics`).
+        What has to fit beside the factor. Where double precision does not, pardiso factors in
+        single precision and solutions are refined (:class:`RefinedFactorization`).
     at_once
-        Other bodies may be solved for at the same time: ``threads`` leaves them their cores.
+        Other bodies may be solved at the same time: ``threads`` leaves them their cores.
     """
 
     def __init__(
@@ -179,7 +169,7 @@ class Flexibility(Closing):
 
     @property
     def factorization(self) -> Factorization:
-        """The factorisation, made when it is first needed."""
+        """Made when first needed."""
         if self._closed:
             raise RuntimeError("this factorisation has been closed")
         if self._factor is None:
@@ -194,7 +184,7 @@ class Flexibility(Closing):
         return self._factor
 
     def factorised(self, K: csr_array) -> Factorization:
-        """Factor of a positive definite matrix by the solver of this body, as precise as fits."""
+        """Factor of a positive definite matrix, as precise as fits."""
         backend, threads, budget = self._backend, self._threads, self._budget
         try:
             return factorize(K, backend=backend, threads=threads, budget=budget)
@@ -226,17 +216,12 @@ class Flexibility(Closing):
         )
 
     def solve(self, F: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Displacements under loads.
+        """Displacements [m] under loads, column-major; of a free body without rigid motion.
 
         Parameters
         ----------
         F (n_dof,) or (n_dof, m) [N]
             Entries at fixed degrees of freedom are taken by the support.
-
-        Returns
-        -------
-        array of the same shape [m]
-            Column-major; of a free body without rigid motion, R^T M u = 0.
         """
         F = np.asarray(F, dtype=np.float64)
         if F.ndim not in (1, 2) or len(F) != self.body.dof_count:
@@ -257,7 +242,7 @@ class Flexibility(Closing):
     def condensed(
         self, G: csr_array, groups: Sequence[NDArray[np.int64]] = ()
     ) -> NDArray[np.float64]:
-        """Static compliance seen by given loads, G F G^T: half the work of solving for them.
+        """Static compliance seen by given loads, G F G^T (m, m) [m/N]: half the work of solving.
 
         Of a free body, with :math:`A = G R` and :math:`Z = K^+ M R` (six columns),
 
@@ -269,11 +254,6 @@ class Flexibility(Closing):
             One load per row.
         groups
             Of rows, see :func:`klack.bodies.elasticity.condensation.condensed_inverse`.
-
-        Returns
-        -------
-        (m, m) [m/N]
-            Symmetric.
         """
         kept = csr_array(G)[:, self._kept]
         C = condensed_inverse(self.factorization, kept, groups=groups)
@@ -290,7 +270,7 @@ class Flexibility(Closing):
     def compliance_at(
         self, G: csr_array, groups: Sequence[NDArray[np.int64]] = ()
     ) -> NDArray[np.float64]:
-        """Compliance as of :meth:`condensed`, kept in the cache: for the points of a contact."""
+        """As :meth:`condensed`, kept in the cache: for the points of a contact."""
         return self.remembered(
             "compliance of the contact",
             (G, *groups),
@@ -302,7 +282,7 @@ class Flexibility(Closing):
     def coupling(self, G: csr_array, H: csr_array) -> NDArray[np.float64]:
         """Opening of each row of G [m] per force [N] on each row of H, G F H^T; kept in the cache.
 
-        Solved for the fewer rows: by reciprocity H F G^T is its transpose.
+        Solved for the fewer rows, by reciprocity.
         """
         if G.shape[0] < H.shape[0]:
             return self.coupling(H, G).T
@@ -315,7 +295,7 @@ class Flexibility(Closing):
         )
 
     def deflections(self, F: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Displacements under loads as of :meth:`solve`, kept in the cache: for ports."""
+        """As :meth:`solve`, kept in the cache: for ports."""
         return self.remembered(
             "deflections",
             (F,),

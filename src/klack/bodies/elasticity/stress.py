@@ -4,10 +4,9 @@ In every element the stress
 
 .. math:: \sigma = \lambda\, \mathrm{tr}(\varepsilon)\, 1 + 2 \mu\, \varepsilon
 
-is taken where it is best, at the points of the reduced Gauss rule (Barlow 1976), carried to the
-nodes with the shape functions of the corners, and averaged over the elements that share a node.  A
-stress that is constant comes out exactly, with quadratic elements also one that is linear.  The
-mean is taken within a solid: where two materials meet, the stress may jump.
+is taken at the points of the reduced Gauss rule (Barlow 1976), carried to the nodes with the shape
+functions of the corners, and averaged over the elements of a solid that share a node; between
+solids it may jump. A constant stress comes out exactly, with quadratic elements also a linear one.
 """
 
 from collections.abc import Mapping
@@ -36,12 +35,7 @@ _CORNER = 1.0 / np.sqrt(3.0)
 
 
 class StressField:
-    """Stresses of one mesh, for any number of displacement fields.
-
-    Parameters
-    ----------
-    mesh
-        Solid, or axisymmetric with columns r and z.
+    """Stresses of one mesh, solid or axisymmetric, for any number of displacement fields.
 
     Attributes
     ----------
@@ -138,7 +132,7 @@ class _Block:
         self.to_nodes = _to_nodes(block.family, xi)
 
     def stress(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Stress at the nodes of every element, shape (n_elements, n_nodes, 6)."""
+        """Stress at the nodes, shape (n_elements, n_nodes, 6)."""
         of_element = u[self.connectivity]
         H = np.einsum("eni,eqna->eqia", of_element, self.gradients, optimize=True)
         strain = np.zeros((*H.shape[:2], 6))  # shear strains are halves, as in the tensor
@@ -157,7 +151,7 @@ class _Block:
 
 
 def stress_points(family: str) -> NDArray[np.float64]:
-    """Reference coordinates of the points where the stress is taken, shape (q, d)."""
+    """Reference coordinates where the stress is taken, shape (q, d)."""
     if family not in _LINEAR:
         return reference_nodes(family).mean(axis=0, keepdims=True)
     match _LINEAR[family]:
@@ -173,7 +167,7 @@ def stress_points(family: str) -> NDArray[np.float64]:
 
 
 def _to_nodes(family: str, xi: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Matrix from values at the stress points to values at the nodes, shape (n_nodes, q)."""
+    """Matrix from stress points to nodes, shape (n_nodes, q)."""
     nodes = reference_nodes(family)
     if len(xi) == 1:
         return np.ones((len(nodes), 1))

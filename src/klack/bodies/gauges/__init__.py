@@ -1,1 +1,1 @@
-"""What a sensor on a body reads: rows on its nodal displacements, and the record over time."""
+"""Sensors on a body: rows on its nodal displacements, and records over time."""

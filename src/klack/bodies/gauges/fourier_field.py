@@ -21,21 +21,14 @@ def field_rows(body: FourierBody, points: Floats, *, where: str, towards: float 
     Parameters
     ----------
     points (m, 3) [m]
-        Cylindrical coordinates of points of the body: radius, height z, angle [rad].
-    where
-        For the error, e.g. ``"probe"``.
+        Radius, height z, angle [rad]; rejected outside of the body.
     towards [rad]
-        Angle of the direction in which the body bends.
+        Direction in which the body bends.
 
     Returns
     -------
     (3 m, n_dof)
         x, y, z of the first point, then those of the next.
-
-    Raises
-    ------
-    InputError
-        For a point outside of the body, with its distance and the nearest point of the body.
     """
     points = np.atleast_2d(np.asarray(points, dtype=float))
     grain = _SAME * float(np.ptp(body.mesh.points))

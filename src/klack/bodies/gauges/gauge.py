@@ -33,8 +33,6 @@ class Gauge:
         Of a velocity the row of the displacement.
     place
         In words, for example ``"along z over 3 mm at (10, -1260) mm"``.
-    low_pass
-        Of the sensor.
     """
 
     name: str
@@ -45,7 +43,7 @@ class Gauge:
     low_pass: LowPass | None = None
 
     def record(self, start: float, step: float, values: Floats) -> "GaugeRecord":
-        """Record of this gauge from its exact values; see :class:`GaugeRecord`."""
+        """Record of this gauge from its exact values."""
         return GaugeRecord(
             name=self.name,
             body=self.body,
@@ -64,13 +62,10 @@ class GaugeRecord:
 
     Parameters
     ----------
-    name, body, kind, place
-        As of its :class:`Gauge`.
     start, step [s]
-        First instant and the time between two; the clock is that of the contact force.
+        The clock is that of the contact force.
     exact (n,)
-        On the body, before the low pass, in :attr:`unit`; tension and motion along the direction
-        are positive.
+        Before the low pass, in :attr:`unit`; tension and motion along the direction are positive.
     """
 
     name: str
@@ -94,7 +89,7 @@ class GaugeRecord:
 
     @property
     def values(self) -> Floats:
-        """What the sensor shows, shape (n,): behind its low pass."""
+        """What the sensor shows behind its low pass, shape (n,)."""
         return self.exact if self.low_pass is None else self.low_pass(self.exact, self.step)
 
     @property

@@ -1,11 +1,11 @@
 r"""Where a point lies in a mesh: its element, and its coordinates there.
 
-In every element near the point the reference coordinates are found by Gauss-Newton steps,
+In elements near the point the reference coordinates are found by Gauss-Newton steps,
 
 .. math:: J^T J \, \Delta\xi = J^T (x - x(\xi)),
 
-kept inside the element.  Where none holds the point, the nearest one of all is found by
-sequential quadratic programming.
+kept inside the element; where none holds the point, the nearest place by sequential quadratic
+programming.
 """
 
 from dataclasses import dataclass, replace
@@ -25,7 +25,7 @@ __all__ = ["LocatedPoint", "locate"]
 Floats = NDArray[np.float64]
 
 _SNAP = 0.05
-"""Of the element size: what a flat facet may lie below the curved face that was drawn."""
+"""Share of the element size that a flat facet may lie below the curved face."""
 
 _ROUNDS = 30
 _SHARED = 1e-6  # of the element size: elements that meet at the point all have it
@@ -43,7 +43,7 @@ class LocatedPoint:
     xi (dimension,) [-]
         Reference coordinates.
     distance [m]
-        From the point asked for.
+        From the wanted point.
     place (dimension,) [m]
     """
 
@@ -62,20 +62,13 @@ class LocatedPoint:
 def locate(
     mesh: Mesh, point: Floats, where: str, pose: Pose | None = None
 ) -> tuple[LocatedPoint, ...]:
-    """Find the elements that hold a point: one inside, several where they meet.
+    """Elements that hold a point, several where they meet; rejects one outside of the body.
 
     Parameters
     ----------
     point (dimension,) [m]
-    where
-        For the error, e.g. ``"outputs.front.at"``.
     pose
-        How the mesh came there from its drawing, in whose coordinates the error tells.
-
-    Raises
-    ------
-    InputError
-        For a point outside of the body, with its distance and the nearest point of the body.
+        How the mesh came there from its drawing, whose coordinates the error uses.
     """
     found = [
         _in_element(mesh, block, int(element), point)
@@ -118,7 +111,7 @@ def _candidates(mesh: Mesh, block: ElementBlock, point: Floats) -> NDArray[np.in
 
 
 def _in_element(mesh: Mesh, block: ElementBlock, element: int, point: Floats) -> LocatedPoint:
-    """Point of one element that is nearest to the point asked for."""
+    """Point of one element nearest to the wanted one."""
     family, x = block.family, mesh.points[block.connectivity[element]]
     xi = reference_nodes(family).mean(axis=0)
     for _ in range(_ROUNDS):
@@ -141,7 +134,7 @@ def _in_element(mesh: Mesh, block: ElementBlock, element: int, point: Floats) ->
 
 
 def _nearest(mesh: Mesh, near: LocatedPoint, point: Floats) -> LocatedPoint:
-    """Nearest point of an element that does not hold the point."""
+    """The same for an element that does not hold the point."""
     family, x = near.block.family, mesh.points[near.nodes]
     size = float(np.ptp(x, axis=0).max())
     corners = reference_nodes(family)

@@ -6,13 +6,12 @@ strain that is exact without any integration,
 .. math:: \frac1l \int_{-l/2}^{l/2} d \cdot \frac{\partial u}{\partial s} \, \mathrm ds =
     \frac{d \cdot \left[u(x + \tfrac l2 d) - u(x - \tfrac l2 d)\right]}{l},
 
-and without a length it is the gradient of the shape functions at the place.  Both give a uniform
-strain exactly on every mesh.  Around the axis of a body of revolution the strain is
-:math:`u_r / r`.  The stress along *d* is Hooke's
-:math:`\sigma_d = \lambda \, \mathrm{tr}\,\varepsilon + 2 \mu \, \varepsilon_d`.
+and without a length it is the gradient of the shape functions. Both give a uniform strain exactly.
+Around the axis the strain is :math:`u_r / r`. The stress along *d* is Hooke's :math:`\sigma_d =
+\lambda \, \mathrm{tr}\,\varepsilon + 2 \mu \, \varepsilon_d`.
 
-Where elements meet in the place, their mean is taken; on a face the values are those of the
-elements behind it, not those of the load on it.
+Where elements meet, their mean is taken; on a face the values are those of the elements behind it,
+not of the load on it.
 """
 
 from collections.abc import Mapping
@@ -48,11 +47,11 @@ class Line:
     at (dimension,) [m]
         Its middle.
     direction (dimension,) [-], or ``"around"``
-        Of length one.
+        Unit vector.
     length [m]
         0 for a point.
     pose
-        How the body came there from its drawing, in whose coordinates errors tell.
+        How the body came there from its drawing, whose coordinates errors use.
     """
 
     at: Floats
@@ -72,16 +71,13 @@ class Line:
             )
 
     def found(self, mesh: Mesh, place: Floats) -> tuple[LocatedPoint, ...]:
-        """Elements that hold one of its places.
-
-        See :func:`klack.bodies.gauges.located_point.locate`.
-        """
+        """See :func:`klack.bodies.gauges.located_point.locate`."""
         is_middle = np.array_equal(place, self.at)
         where = self.where if is_middle else f"{self.where}, within the gauge length"
         return locate(mesh, place, where, self.pose)
 
     def places(self) -> tuple[tuple[float, Floats], ...]:
-        """Places with their weights, whose sum is one; around the axis all places are the same."""
+        """Places with their weights; around the axis all places are the same."""
         if self.length == 0.0 or isinstance(self.direction, str):
             return ((1.0, self.at),)
         return tuple(
@@ -91,13 +87,7 @@ class Line:
 
 
 def displacement_row(mesh: Mesh, line: Line) -> Floats:
-    """Mean displacement along the direction of a line, shape (n_dof,) [-].
-
-    Raises
-    ------
-    InputError
-        For a place outside of the body, and for the displacement around the axis, which is zero.
-    """
+    """Mean displacement along a line, shape (n_dof,) [-]; rejected around the axis."""
     if isinstance(line.direction, str):
         raise InputError(
             f"{line.where}: direction",
@@ -115,13 +105,7 @@ def displacement_row(mesh: Mesh, line: Line) -> Floats:
 
 
 def strain_row(mesh: Mesh, line: Line) -> Floats:
-    """Mean strain along a line, positive in tension, shape (n_dof,) [1/m].
-
-    Raises
-    ------
-    InputError
-        For a line that leaves the body.
-    """
+    """Mean strain along a line, positive in tension, shape (n_dof,) [1/m]."""
     if line.length > 0.0 and not isinstance(line.direction, str):
         ahead, behind = (
             displacement_row(

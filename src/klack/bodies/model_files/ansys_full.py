@@ -1,10 +1,10 @@
 """The assembled matrices of ANSYS, ``.full``: K and M with the node and direction of each row.
 
-The file is a chain of records ``[length, flags, data, length]`` of 4-byte words.  Its second record
-holds the numbers of equations and entries and the places of all others.  K and M are stored row by
-row, upper triangle with the diagonal entry last.  Degrees of freedom with a negative mark are
-constrained; they are taken out.  The reader follows the description of fdfull.inc and is checked
-against the package ansys-mapdl-reader, which trusts the file more than a stranger deserves.
+A chain of records ``[length, flags, data, length]`` of 4-byte words (fdfull.inc). The second holds
+the numbers of equations and entries and the places of all others. K and M are stored row by row,
+upper triangle with the diagonal entry last. Degrees of freedom with a negative mark are
+constrained and taken out. Checked against the package ansys-mapdl-reader, which believes every
+count of a file.
 """
 
 from dataclasses import dataclass
@@ -41,14 +41,14 @@ class _Records:
     words: NDArray[np.int32]
 
     def integers(self, at: int) -> tuple[NDArray[np.int32], int]:
-        """Integers of the record at word ``at``, and the start of the next one."""
+        """Integers of the record at word ``at``, and the next record."""
         data, flags, behind = self._record(at)
         if not flags & _INTEGER:
             raise _damaged(self.path, f"numbers instead of integers at byte {4 * at}")
         return data, behind
 
     def numbers(self, at: int) -> tuple[NDArray[np.float64], int]:
-        """Double-precision numbers of the record at word ``at``, and the start of the next one."""
+        """Doubles of the record at word ``at``, and the next record."""
         data, flags, behind = self._record(at)
         if flags & (_INTEGER | _SINGLE) or len(data) % 2:
             raise _damaged(self.path, f"integers instead of numbers at byte {4 * at}")
@@ -72,19 +72,10 @@ class _Records:
 
 
 def read_ansys_full(path: Path, name: str | None, role: Role | None) -> SystemMatrix:
-    """Read K or M.
+    """Read K or M, by its name or its role.
 
-    Parameters
-    ----------
-    name : {"K", "M"} or None
-    role
-        Says which one without a name.
-
-    Raises
-    ------
-    InputError
-        For unsymmetric matrices, lumped mass, nodes with unlike degrees of freedom, compressed or
-        damaged files.
+    Rejects unsymmetric matrices, lumped mass, nodes with unlike degrees of freedom, compressed and
+    damaged files.
     """
     words = np.fromfile(path, dtype="<i4")
     if len(words) < 206 or words[0] not in (_STANDARD_HEADER, 4 * _STANDARD_HEADER):
@@ -169,7 +160,7 @@ def _places(
 def _entries(
     file: _Records, head: NDArray[np.int32], at: int, expected: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
-    """Entries of one matrix; the last column of each row is the row itself."""
+    """Entries of one matrix; the last column of a row is the row itself."""
     equations = int(head[_EQUATIONS])
     columns, values, lengths, read = [], [], [], 0
     for _ in range(equations):

@@ -32,12 +32,12 @@ _LEAST_BYTES = 2  # of a number and its separator
 def is_matrix_market(path: Path) -> bool:
     """True if the file starts like one.
 
-    The heading says ``%%MatrixMarket matrix coordinate real symmetric``; then comments (``%``),
-    sizes, and one entry per line, counted from one.  Array form lists all numbers column by column.
+    Heading ``%%MatrixMarket matrix coordinate real symmetric``, comments (``%``), sizes, and one
+    entry per line, counted from one. Array form lists all numbers column by column.
 
-    Read by hand, not by ``scipy.io.mmread``: SciPy 1.17 takes ``1.5D+03`` for 1.5 and ``2x`` for 2
-    without a word, and a truncated file within an exponent ends the process.  Of 300 damaged files
-    it takes 59, this reader 21.
+    ``scipy.io.mmread`` of SciPy 1.17 takes ``1.5D+03`` for 1.5 and ``2x`` for 2 without a word,
+    and a file truncated within an exponent ends the process. Of 300 damaged files it takes 59,
+    this reader 21.
     """
     with path.open("rb") as stream:
         return stream.read(len(_HEADING)).lower() == _HEADING
@@ -46,10 +46,7 @@ def is_matrix_market(path: Path) -> bool:
 def read_matrix_market(path: Path, name: str | None, role: Role | None) -> SystemMatrix:
     """Read the one matrix of a file.
 
-    Raises
-    ------
-    InputError
-        For complex, pattern, skew or rectangular matrices, and for damaged files.
+    Rejects complex, pattern, skew, rectangular and damaged ones.
     """
     with path.open("rb") as stream:
         heading = stream.readline(200).decode("ascii", "replace").lower().split()
@@ -93,7 +90,7 @@ def _check_heading(path: Path, heading: list[str]) -> None:
 
 
 def _sizes(path: Path, stream: BinaryIO) -> tuple[tuple[int, ...], int]:
-    """Numbers of the line of sizes, and the number of the line after it."""
+    """Numbers of the line of sizes, and the next line number."""
     number = 1
     while line := stream.readline(100_000):
         number += 1
@@ -140,11 +137,8 @@ def read_abaqus_mtx(path: Path, name: str | None, role: Role | None) -> SystemMa
     direction, value`` (FORMAT=MATRIX INPUT, the default, which also says what the rows are).
     Keyword and comment lines start with ``*``.
 
-    Raises
-    ------
-    InputError
-        For internal nodes (negative numbers), for labels instead of numbers, and for damaged files:
-        the format has neither head nor count, but each row has its entry on the diagonal.
+    Rejects internal nodes (negative numbers), labels instead of numbers, and damaged files: the
+    format has neither head nor count, but each row has its entry on the diagonal.
     """
     columns = _columns(path)
     with path.open("rb") as stream:
@@ -188,7 +182,7 @@ def _require_diagonal(
 def places_of_entries(
     where: str, nodes: NDArray[np.int64], ways: NDArray[np.int64]
 ) -> tuple[RowPlaces, NDArray[np.int64], NDArray[np.int64]]:
-    """Number the rows of entries that are given by node and direction, both of shape (n, 2)."""
+    """Number the rows of entries that are given by node and direction, both (n, 2)."""
     if nodes.size and (ways.max() > _TRANSLATIONS or nodes.max() > 1 << 50):
         raise InputError(
             where,
@@ -225,13 +219,8 @@ def _columns(path: Path) -> int:
 def read_calculix_storage(path: Path, name: str | None, role: Role | None) -> SystemMatrix:
     """Read one matrix, with the rows of the ``.dof`` file of the same name if there is one.
 
-    The matrices are lists of entries (row, column, value) of one triangle.  ``.dof`` says of each
-    row ``node.direction``.  Degrees of freedom of ``*BOUNDARY`` are missing in all of them.
-
-    Raises
-    ------
-    InputError
-        For damaged files, and where ``.dof`` has another number of rows.
+    Entries (row, column, value) of one triangle; ``.dof`` gives each row as ``node.direction``.
+    Degrees of freedom of ``*BOUNDARY`` are missing in all of them.
     """
     with path.open("rb") as stream:
         table = number_rows(stream, 3, where=str(path))

@@ -1,11 +1,11 @@
 """Harwell-Boeing and Rutherford-Boeing files (Duff, Grimes & Lewis 1992): ``.hb``, ``.rb``.
 
-Columns of the matrix are stored one after another: pointers, row numbers, values, each in a
-Fortran format that the heading names.  ``RSA`` is a real symmetric assembled matrix (its lower
-triangle), ``RUA`` an unsymmetric one, which must then hold both triangles.
+Columns one after another: pointers, row numbers, values, each in a Fortran format that the heading
+names. ``RSA`` is a real symmetric assembled matrix (lower triangle), ``RUA`` an unsymmetric one,
+which must hold both triangles.
 
-Read by hand, not by ``scipy.io.hb_read``: SciPy 1.17 refuses symmetric matrices, which is what
-HBMAT writes of K and M, right-hand sides, ``D`` exponents and numbers without a blank between.
+``scipy.io.hb_read`` of SciPy 1.17 rejects symmetric matrices, which HBMAT writes of K and M,
+right-hand sides, ``D`` exponents and numbers without a blank between.
 """
 
 from pathlib import Path
@@ -21,12 +21,9 @@ __all__ = ["read_harwell_boeing"]
 
 
 def read_harwell_boeing(path: Path, name: str | None, role: Role | None) -> SystemMatrix:
-    """Read the one matrix of a file; right-hand sides after it are left out.
+    """Read the one matrix of a file; right-hand sides after it are ignored.
 
-    Raises
-    ------
-    InputError
-        For complex, pattern, element-wise or rectangular matrices, and for damaged files.
+    Rejects complex, pattern, element-wise, rectangular and damaged ones.
     """
     lines = path.read_bytes().replace(b"\r", b"").split(b"\n")
     try:
@@ -59,7 +56,7 @@ def read_harwell_boeing(path: Path, name: str | None, role: Role | None) -> Syst
 
 
 def _formats(line: str) -> tuple[FixedFormat, FixedFormat, FixedFormat]:
-    """Formats of pointers, row numbers and values, in columns of 16, 16 and 20."""
+    """Formats of pointers, row numbers and values."""
     pointers, rows, values = line[:16], line[16:32], line[32:52]
     return FixedFormat(pointers), FixedFormat(rows), FixedFormat(values)
 

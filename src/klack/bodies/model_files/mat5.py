@@ -1,9 +1,8 @@
 """MATLAB files of version 5 to 7.2 (Octave ``save -v6`` and ``-v7``), read without trust.
 
-Read by hand, not by ``scipy.io.loadmat``: of 300 damaged files SciPy 1.17 takes 14 to 33 whose
-sparse matrix reaches, when it is used, for memory that is not its own, and ends the process.  Here
-every count is checked against the bytes that are there.  Read are full and sparse matrices,
-texts, cell arrays and structures; objects are ignored.
+Of 300 damaged files ``scipy.io.loadmat`` of SciPy 1.17 takes 14 to 33 whose sparse matrix, when
+used, reaches for foreign memory and ends the process. Here every count is checked against the
+bytes that are there. Objects are ignored.
 """
 
 import struct
@@ -77,21 +76,13 @@ def _damaged(path: Path, what: str) -> InputError:
 def read_mat5(path: Path, *, largest: int = _LARGEST) -> dict[str, MatValue]:
     """Read all variables of a file.
 
-    Parameters
-    ----------
-    largest
-        Bytes that the numbers may take in memory.
+    Rejects numbers of more than ``largest`` bytes in memory, and files of version 4 or 7.3.
 
     Returns
     -------
     dict of str to value
-        Numbers as float64 or complex128 arrays (sparse ones as csc_array), texts as tuples of str,
+        Numbers as float64 or complex128 arrays (sparse ones csc_array), texts as tuples of str,
         cell arrays as lists, structures as dicts, or lists of dicts where there are several.
-
-    Raises
-    ------
-    InputError
-        For damaged files, and files of version 4 or 7.3, which it names.
     """
     if path.stat().st_size > largest:
         raise InputError(
@@ -137,7 +128,7 @@ def _byte_order(path: Path, head: bytes) -> str:
 def _is_version_4(head: bytes) -> bool:
     """True for the header of a variable: type, rows, columns, imaginary or not, length of the name.
 
-    The digits of the type are machine (0 to 4), 0, precision (0 to 5) and kind (0 to 2).
+    Digits of the type: machine (0 to 4), 0, precision (0 to 5), kind (0 to 2).
     """
     for order in "<>":
         if len(head) < 21:
@@ -166,7 +157,7 @@ def _unpacked(budget: _Budget, data: memoryview) -> memoryview:
 def _elements(
     budget: _Budget, data: memoryview, order: str, *, aligned: bool = True
 ) -> Iterator[_Element]:
-    """Pieces in turn; inside a matrix each begins at a multiple of eight bytes."""
+    """Pieces in turn; inside a matrix each begins at a multiple of 8 bytes."""
     at = 0
     while at < len(data):
         if len(data) - at < 8:

@@ -1,4 +1,4 @@
-"""Stiffness and mass matrices from files of other programs, selected by suffix."""
+"""Stiffness and mass matrices from files of other programs, by suffix."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -54,20 +54,16 @@ def read_matrix(
 ) -> SystemMatrix:
     """Read one matrix of a file, in the units of that file.
 
+    Rejects complex, rectangular and unsymmetric ones (with the asymmetry).
+
     Parameters
     ----------
     path
         With one of the endings of :data:`MATRIX_FORMATS`.
     name
-        Of the matrix in a file of several.
+        In a file of several.
     role
         Finds the usual names (K, KAA, ...) without ``name``.
-
-    Raises
-    ------
-    InputError
-        With file and place, for files that cannot be read, and for complex, rectangular or
-        unsymmetric matrices (with the asymmetry).
 
     Examples
     --------

@@ -8,11 +8,11 @@ A line that names a matrix opens a block, the numbers below it fill the block ro
     inputs, tip
     outputs, tip
 
-Numbers are separated by commas, semicolons or blanks, and rows may be broken over lines.  A block
-may also be in Matrix Market form, as ``SPMWRITE`` does with its file format 1 (non-zeros only).
-Sizes after the name are optional: those of A, B, C and D, and of other square matrices, follow
-from their numbers.  The layout of the dense file is not laid down by its maker, so a line counts as
-a title when it has one such letter alone, with or without the word matrix.
+Numbers are separated by commas, semicolons or blanks; rows may be broken over lines. A block may
+be in Matrix Market form, as ``SPMWRITE`` writes in its file format 1 (non-zeros only). Sizes are
+optional: those of A, B, C and D, and of square matrices, follow from the count of numbers. The
+maker does not lay down the dense layout, so a line with one such letter alone, with or without the
+word matrix, is a title.
 """
 
 import io
@@ -87,19 +87,9 @@ class _Block:
 
 
 def read_listing(path: Path) -> tuple[Arrays, Texts]:
-    """Read the matrices of a text file, and the names of their inputs and outputs.
+    """Read the matrices ``A``, ``B``, ``C``, ``D``, ``K``, ``M`` of a text, and lists of names.
 
-    Returns
-    -------
-    arrays : dict of str to array
-        ``A``, ``B``, ``C``, ``D``, ``K``, ``M`` as far as they are there.
-    texts : dict of str to tuple of str
-        ``inputs``, ``outputs``, ``names``.
-
-    Raises
-    ------
-    InputError
-        With the line, for text that is not of this form.
+    The lists are ``inputs``, ``outputs``, ``names``; what is not there is missing.
     """
     size = path.stat().st_size
     if size > _LARGEST:
@@ -294,7 +284,7 @@ def _dense(path: Path, block: _Block, known: Arrays) -> NDArray[np.float64]:
 
 
 def _shape(block: _Block, count: int, known: Arrays) -> tuple[int, int] | None:
-    """Shape that follows from the number of states; else from the lines."""
+    """Shape by the number of states; else by the lines."""
     n = len(known["A"]) if "A" in known else 0
     if block.name in ("A", "K", "M"):
         side = round(count**0.5)

@@ -34,13 +34,7 @@ _LABELS = ("ports", "port_names", "labels", "names", "dofs")
 
 
 def read_modal_data(path: Path) -> FileModalData:
-    """Read modes from ``.uff``/``.unv``, ``.mat``, ``.npz`` or a CSV table.
-
-    Raises
-    ------
-    InputError
-        If something is missing, not finite or does not fit together.
-    """
+    """Read modes from ``.uff``/``.unv``, ``.mat``, ``.npz`` or a CSV table."""
     if not path.is_file():
         raise InputError(
             str(path), got="no such file", expected="a file of modal data", hint="check it."

@@ -1,6 +1,6 @@
 """Arrays by name from ``.mat``, ``.npz`` and text, as used for reduced models.
 
-Nothing in such a file is executed, and sizes are checked before memory is taken.
+Nothing in such a file is executed; sizes are checked before memory is taken.
 """
 
 import zipfile
@@ -27,12 +27,7 @@ _NUMBERS = "iufb"
 class NamedArrays:
     """Numbers and texts of a file.
 
-    Parameters
-    ----------
-    arrays
-        Two-dimensional; fields of a structure are called ``sys.A``.
-    texts : mapping of str to tuple of str
-        Lists of names.
+    Arrays are two-dimensional; fields of a structure are called ``sys.A``.
     """
 
     path: Path
@@ -40,23 +35,17 @@ class NamedArrays:
     texts: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def find(self, *names: str, group: str = "") -> NDArray[np.float64] | None:
-        """Return the array of the first of these names; upper and lower case are the same."""
+        """Array of the first of these names, in upper or lower case."""
         key = _find(self.arrays, names, group)
         return None if key is None else self.arrays[key]
 
     def find_text(self, *names: str, group: str = "") -> tuple[str, ...]:
-        """Return the texts of the first of these names, or none."""
+        """Texts of the first of these names."""
         key = _find(self.texts, names, group)
         return () if key is None else self.texts[key]
 
     def group_with(self, *sets: tuple[str, ...]) -> str:
-        """Name of the first structure ('' for the file itself) that holds one name of each set.
-
-        Raises
-        ------
-        InputError
-            If there is none.
-        """
+        """First structure ('' for the file itself) that holds one name of each set."""
         groups = ["", *dict.fromkeys(key.rpartition(".")[0] for key in self.arrays if "." in key)]
         for group in groups:
             if all(_find(self.arrays, names, group) is not None for names in sets):
@@ -88,18 +77,13 @@ def _listed(items: Mapping[str, object]) -> str:
 
 
 def read_named_arrays(path: Path) -> NamedArrays:
-    """Read all arrays of numbers and lists of names of a file.
+    """Read all arrays of numbers and lists of names of a file of 1 GB at most.
 
     Parameters
     ----------
     path
         ``.mat`` (MATLAB up to 7.2, Octave ``save -v6`` or ``-v7``), ``.npz``, or text: see
         :func:`klack.bodies.model_files.matrix_listing.read_listing`.
-
-    Raises
-    ------
-    InputError
-        For a file that is missing, damaged, of objects instead of numbers, or larger than 1 GB.
     """
     if not path.is_file():
         raise InputError(
@@ -145,7 +129,7 @@ def _collect(
     arrays: dict[str, NDArray[np.float64]],
     texts: dict[str, tuple[str, ...]],
 ) -> None:
-    """Sort one value of a MATLAB file into numbers and texts; what is neither is left out."""
+    """Sort one value of a MATLAB file into numbers and texts; ignore others."""
     if isinstance(value, np.ndarray | csc_array) and np.iscomplexobj(value):
         raise InputError(
             f"{path}: {key}",
@@ -213,7 +197,7 @@ def npy_array(
     room: int,
     refusal: Callable[[tuple[int, ...], np.dtype[Any]], InputError],
 ) -> NDArray[Any]:
-    """One array, its size checked against ``room`` [bytes] first; never a pickled object."""
+    """One array, its size checked against ``room`` [bytes] first; never a pickle."""
     with archive.open(item) as stream:
         version = np.lib.format.read_magic(stream)
         head = (

@@ -1,11 +1,10 @@
 """Matrices that Nastran writes with OUTPUT4 (``.op4``): ASCII or binary, of either byte order.
 
-Columns are stored one after another, each either whole from its first to its last non-zero row, or
-as strings of non-zeros.  The head of a string packs length and first row into one integer (up to
-65 535 rows), or holds them in two (BIGMAT).  Single and double precision are read.
-
-Read by hand: SciPy has no reader, and every count of a damaged file is checked against its bytes
-before memory is asked for.
+Columns are stored one after another, either whole from the first to the last non-zero row, or as
+strings of non-zeros.  The head of a string packs length and first row into one integer (up to
+65 535 rows), or holds them in two (BIGMAT).  Every count is checked against the bytes before
+memory
+is taken.
 """
 
 from dataclasses import dataclass, field
@@ -33,12 +32,10 @@ _SINGLE, _DOUBLE = 1, 2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Op4Header:
-    """Heading of a matrix.
+    """Heading of a square matrix.
 
     Parameters
     ----------
-    columns
-        And rows: it is square.
     double
         Double precision.
     big
@@ -52,13 +49,7 @@ class Op4Header:
 
     @classmethod
     def checked(cls, where: str, head: list[int], name: str) -> Self:
-        """Check columns, rows, form and type.
-
-        Raises
-        ------
-        InputError
-            For complex and for rectangular matrices.
-        """
+        """Check columns, rows, form and type: real and square."""
         columns, rows, _, kind = head
         name = name.strip(" \0")
         if kind not in (_SINGLE, _DOUBLE) or abs(rows) != columns or columns < 1:
@@ -82,10 +73,7 @@ class Op4Strings:
 
     Parameters
     ----------
-    data
-        The file.
     order : {"<", ">"}
-        Of bytes.
     word : {4, 8}
         Bytes of an integer and of a number in single precision.
     """
@@ -106,7 +94,7 @@ class Op4Strings:
         return 8 if self.header.double else self.word
 
     def add_column(self, where: str, column: int, row: int, first: int, words: int) -> None:
-        """Remember a column of ``words`` words from byte ``first``; ``row`` is 0 for strings."""
+        """Note a column of ``words`` words from byte ``first``; ``row`` is 0 for strings."""
         self.columns.append((where, column, row, first, words))
 
     def _cut_into_strings(self, where: str, column: int, row: int, first: int, words: int) -> None:
@@ -204,13 +192,7 @@ class _AsciiStrings(Op4Strings):
 
 
 def read_ascii_matrices(path: Path) -> list[Op4Strings]:
-    """Read all matrices of an ASCII file.
-
-    Raises
-    ------
-    InputError
-        With the line, for text that is not of this form.
-    """
+    """All matrices of an ASCII file."""
     lines = path.read_bytes().replace(b"\r", b"").split(b"\n")
     result: list[Op4Strings] = []
     at = 0
@@ -240,7 +222,7 @@ def _heading(path: Path, at: int, line: bytes) -> _AsciiStrings:
 
 
 def _columns(path: Path, lines: list[bytes], at: int, strings: _AsciiStrings) -> int:
-    """Go through the columns up to the closing one; returns the line behind it."""
+    """Walk the columns up to the closing one; returns the line after it."""
     header, per_line = strings.header, strings.form.per_line
     while True:
         column, row, words = _integers(path, lines, at, 3)
@@ -280,7 +262,7 @@ def _take(
     count: int,
     per_line: int,
 ) -> int:
-    """Take the lines of one string; returns the line behind."""
+    """Take the lines of one string; returns the line after it."""
     behind = at + -(-count // per_line)
     if behind > len(lines) or row < 1 or row - 1 + count > strings.header.columns:
         raise _damaged_text(place, f"{count} values from row {row}")
@@ -317,13 +299,7 @@ _WORD_OF_HEADER = {24: 4, 48: 8}
 
 
 def read_nastran_op4(path: Path, name: str | None, role: Role | None) -> SystemMatrix:
-    """Read one matrix of a file.
-
-    Raises
-    ------
-    InputError
-        For complex or rectangular matrices, and for damaged files.
-    """
+    """Read one matrix of a file; rejects complex and rectangular ones."""
     data = np.fromfile(path, dtype=np.uint8)
     order = _byte_order(data)
     found = read_ascii_matrices(path) if order is None else _binary(path, data, order)
@@ -341,7 +317,7 @@ def read_nastran_op4(path: Path, name: str | None, role: Role | None) -> SystemM
 
 
 def _byte_order(data: NDArray[np.uint8]) -> str | None:
-    """``<`` or ``>`` of a binary file; None for an ASCII one."""
+    """Of a binary file; None for an ASCII one."""
     if len(data) >= 4:
         for order in "<>":
             if int(data[:4].view(f"{order}i4")[0]) in _WORD_OF_HEADER:
@@ -350,7 +326,7 @@ def _byte_order(data: NDArray[np.uint8]) -> str | None:
 
 
 def _binary(path: Path, data: NDArray[np.uint8], order: str) -> list[Op4Strings]:
-    """Walk through the records; each is framed by its length."""
+    """Walk the records; each is framed by its length."""
     result: list[Op4Strings] = []
     at, end = 0, len(data)
     mark = f"{order}i4"
@@ -381,7 +357,7 @@ def _binary(path: Path, data: NDArray[np.uint8], order: str) -> list[Op4Strings]
 
 
 def _behind(path: Path, data: NDArray[np.uint8], at: int, mark: str) -> int:
-    """End of the record that starts at a byte; both of its lengths must agree."""
+    """End of the record at a byte; its two lengths must agree."""
     length = int(data[at : at + 4].view(mark)[0]) if at + 8 <= len(data) else -1
     behind = at + length + 8
     if length < 0 or behind > len(data) or data[behind - 4 : behind].view(mark)[0] != length:

@@ -1,8 +1,7 @@
 """DMIG entries of a Nastran punch file (``.pch``): matrices by grid and component.
 
-``DMIG, NAME, 0, IFO, TIN, ...`` opens a matrix; then ``DMIG*, NAME, GJ, CJ`` opens a column and
-the lines below it (``*``) hold ``GI, CI, value``.  Small fields (8 wide), large fields (16 wide)
-and fields between commas are read.
+``DMIG, NAME, 0, IFO, TIN, ...`` opens a matrix, ``DMIG*, NAME, GJ, CJ`` a column, and lines below
+it (``*``) hold ``GI, CI, value``. Fields may be small (8 wide), large (16) or between commas.
 """
 
 from dataclasses import dataclass, field
@@ -30,7 +29,7 @@ _MOST_WORDS = 200_000
 
 @dataclass
 class _Punched:
-    """One matrix while it is read: words of its entries, four numbers and a value each."""
+    """A matrix while it is read: words of its entries, four numbers and a value each."""
 
     kind: int
     words: list[bytes] = field(default_factory=list)
@@ -51,13 +50,7 @@ class _Punched:
 
 
 def read_nastran_pch(path: Path, name: str | None, role: Role | None) -> SystemMatrix:
-    """Read one matrix of a punch file.
-
-    Raises
-    ------
-    InputError
-        For complex or rectangular matrices, and for lines that cannot be understood.
-    """
+    """Read one matrix of a punch file; rejects complex and rectangular ones."""
     data = path.read_bytes()
     chosen = choose_matrix(str(path), _names(data), name, role)
     found = _read(path, data, chosen)
@@ -90,7 +83,7 @@ def _names(data: bytes) -> list[str]:
 
 
 def _read(path: Path, data: bytes, chosen: str) -> dict[str, _Punched]:
-    """Entries of the chosen matrix; those of the others are skipped."""
+    """Entries of the chosen matrix."""
     found: dict[str, _Punched] = {}
     open_matrix: _Punched | None = None
     column: tuple[bytes, bytes] | None = None
@@ -130,7 +123,7 @@ def _read(path: Path, data: bytes, chosen: str) -> dict[str, _Punched]:
 
 
 def _fields(line: bytes) -> list[bytes]:
-    """Fields of a line; the first is its name or its continuation mark."""
+    """Fields of a line; the first is its name or continuation mark."""
     if b"," in line:
         return line.split(b",")
     line = line.rstrip().expandtabs(8)
@@ -153,7 +146,7 @@ def _append(place: str, matrix: _Punched, column: tuple[bytes, bytes], fields: l
 
 
 def _check(place: str, name: str, again: bool, words: list[bytes]) -> None:
-    """Form and type of a matrix, from its heading."""
+    """Form and type of a matrix from its heading."""
     try:
         form, kind = int(words[2]), int(words[3])
     except (IndexError, ValueError):

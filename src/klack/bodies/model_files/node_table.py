@@ -1,7 +1,7 @@
 """Nodes without elements: a table of numbers and coordinates, and lists of node numbers.
 
-A table has one node per line: number, x, y, z (or r, z); comments start with ``#``, ``%``, ``!``
-or ``$``, a heading of words may come first.
+One node per line: number, x, y, z (or r, z); comments start with ``#``, ``%``, ``!`` or ``$``, a
+heading of words may come first.
 """
 
 from pathlib import Path
@@ -23,26 +23,15 @@ _LONGEST = 10_000
 def read_node_table(
     path: Path, unit_length: float, dimension: int
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Read nodes in the order of the file.
+    """Read numbers and points [m] of nodes in the order of the file; numbers must differ.
 
     Parameters
     ----------
     path
         A table, or a mesh file whose nodes are taken.
     unit_length [m]
-        Unit of the coordinates.
-    dimension : {3, 2}
-        Columns x, y, z, or r, z.
-
-    Returns
-    -------
-    numbers (n,)
-    points (n, dimension) [m]
-
-    Raises
-    ------
-    InputError
-        With the line that cannot be understood, and for numbers that come twice.
+    dimension
+        3 for x, y, z; 2 for r, z.
     """
     if path.suffix.lower() in MESH_FORMATS and not _is_table(path, dimension):
         model = read_mesh_file(path, unit_length)
@@ -64,13 +53,7 @@ def read_node_table(
 
 
 def read_node_numbers(path: Path) -> NDArray[np.int64]:
-    """Read a list of node numbers: blanks, commas or lines between them.
-
-    Raises
-    ------
-    InputError
-        For anything else.
-    """
+    """Read node numbers with blanks, commas or lines between them."""
     lines = [line for line in path.read_bytes().splitlines() if line.strip()[:1] not in _signs()]
     values = numbers_in(b"\n".join(lines))
     if values is None or not len(values):
@@ -88,7 +71,7 @@ def _signs() -> tuple[bytes, ...]:
 
 
 def _is_table(path: Path, dimension: int) -> bool:
-    """True if the first line is a row of numbers: a table under the ending of a mesh file."""
+    """True if the first line is a row of numbers, whatever the ending of the file."""
     with path.open("rb") as stream:
         values = numbers_in(stream.readline(_LONGEST))
     return values is not None and len(values) == dimension + 1

@@ -1,4 +1,4 @@
-"""Lines of numbers in a text file, parsed in blocks: entries of a matrix, or a table of nodes.
+"""Lines of numbers in a text file, parsed in blocks.
 
 Numbers stand between blanks, tabs, commas or semicolons; ``1.5D+03`` of Fortran is a number.
 """
@@ -31,7 +31,7 @@ _SHOWN = 40
 
 
 def numbers_in(text: bytes) -> NDArray[np.float64] | None:
-    """All numbers of a text, or None if there is anything else in it."""
+    """All numbers of a text; None if there is anything else in it."""
     return plain_numbers(text.translate(_PLAIN))
 
 
@@ -42,17 +42,10 @@ def number_rows(
 
     Parameters
     ----------
-    stream
-        At the start of a line.
     line
-        Number of that line.
+        Number of the current line.
     comments
-        Lines that start with one of these are left out; so are empty ones.
-
-    Raises
-    ------
-    InputError
-        With the line that is something else.
+        First characters of lines to ignore; empty ones are ignored too.
     """
     parts = [np.empty((0, columns))]
     rest = b""
@@ -87,7 +80,7 @@ def _rows(
 
 
 def _even(text: bytes, columns: int, count: int) -> bool:
-    """True if every line has either no word or one per column."""
+    """True if every line has no word or one per column."""
     letters = np.frombuffer(text.translate(_PLAIN) + b"\n", np.uint8)
     blank = letters <= _BLANK
     begins = ~blank
@@ -108,13 +101,7 @@ def _not_numbers(where: str, line: int, row: bytes, columns: int) -> InputError:
 
 
 def whole_numbers(where: str, values: NDArray[np.float64], what: str) -> NDArray[np.int64]:
-    """Make integers of numbers that must be whole and at least 1.
-
-    Raises
-    ------
-    InputError
-        If one is not.
-    """
+    """Integers of numbers that must be whole and at least 1."""
     wrong = ~((values >= 1) & (values < 2**53) & (values == np.floor(values)))
     if np.any(wrong):
         raise InputError(
@@ -135,16 +122,12 @@ _LINES = 20_000
 
 
 class FixedFormat:
-    """Format such as ``(1P,4E20.12)`` or ``(10I8)``.
-
-    Attributes
-    ----------
-    per_line, width : int
+    """Format such as ``(1P,4E20.12)`` or ``(10I8)``: numbers per line, and their width.
 
     Raises
     ------
     ValueError
-        For formats of another form.
+        For others.
     """
 
     def __init__(self, text: str) -> None:
@@ -158,12 +141,12 @@ class FixedFormat:
 
 
 def free_numbers(lines: Sequence[bytes]) -> NDArray[np.float64] | None:
-    """Numbers of lines with blanks between them; None if there is anything else."""
+    """Numbers between blanks; None if there is anything else."""
     return _by_parts(lines, lambda part: numbers_in(b" ".join(part)))
 
 
 def fixed_numbers(lines: Sequence[bytes], width: int) -> NDArray[np.float64] | None:
-    """Numbers of lines whose columns are ``width`` wide; None if there is anything else.
+    """Numbers in columns of ``width``; None if there is anything else.
 
     A line may end early, after any of its columns.
     """

@@ -19,7 +19,7 @@ class FileStateSpace:
 
     Parameters
     ----------
-    A, B, C, D : array, shapes (n, n), (n, n_inputs), (n_outputs, n), (n_outputs, n_inputs)
+    A, B, C, D (n, n), (n, n_inputs), (n_outputs, n), (n_outputs, n_inputs)
     input_names, output_names
         Empty where the file gives none.
     """
@@ -34,18 +34,13 @@ class FileStateSpace:
 
 
 def read_state_space(path: Path) -> FileStateSpace:
-    """Read A, B, C and D; a D that is not there is zero.
+    """Read A, B, C and D; a missing D is zero.
 
     Parameters
     ----------
     path
         ``.mat`` (plain arrays, or one structure such as ``sys``), ``.npz``, or text with named
         blocks: CSV and ANSYS ``SPMWRITE``.
-
-    Raises
-    ------
-    InputError
-        If a matrix is missing, not finite, or of the wrong shape.
     """
     held = read_named_arrays(path)
     group = held.group_with(("A",), ("B",), ("C",))
@@ -99,7 +94,7 @@ class FileReducedMatrices:
     K, M (n, n)
         Rows are boundary displacements and modal coordinates in any order.
     names
-        Of the rows; empty where the file gives none.
+        Of the rows; empty where the file has none.
     """
 
     path: Path
@@ -115,11 +110,6 @@ def read_reduced_matrices(path: Path) -> FileReducedMatrices:
     ----------
     path
         ``.mat``, ``.npz``, text with the blocks K and M, or Nastran ``.op4``.
-
-    Raises
-    ------
-    InputError
-        If one is missing, or they are not square, of one size and finite.
     """
     if path.suffix.lower() == _NASTRAN:
         return _of_nastran(path)
@@ -143,7 +133,7 @@ def read_reduced_matrices(path: Path) -> FileReducedMatrices:
 
 
 def _of_nastran(path: Path) -> FileReducedMatrices:
-    """KAA and MAA of a superelement; such files number their rows and do not name them."""
+    """KAA and MAA of a superelement; their rows have no names."""
     K, M = (read_matrix(path, role=role) for role in ("stiffness", "mass"))
     rows = K.matrix.shape[0]
     if rows > _MOST_ROWS or M.matrix.shape != K.matrix.shape:

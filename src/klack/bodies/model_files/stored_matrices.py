@@ -30,13 +30,7 @@ Checked = tuple[csr_array, tuple[str, ...]]
 def compressed_matrix(
     where: str, pointer: Any, index: Any, value: Any, shape: tuple[int, int]
 ) -> Checked:
-    """Build a matrix of compressed columns; as it is symmetric, rows do as well.
-
-    Raises
-    ------
-    InputError
-        If pointers and indices do not describe a square real matrix.
-    """
+    """Symmetric matrix of compressed columns, or rows."""
     size = _square(where, shape)
     pointer, index, value = (np.asarray(part).ravel() for part in (pointer, index, value))
     _real(where, value)
@@ -62,7 +56,7 @@ def compressed_matrix(
 
 
 def triplet_matrix(where: str, row: Any, column: Any, value: Any, shape: Any) -> Checked:
-    """Build a matrix of entries (row, column, value), counted from zero."""
+    """Matrix of entries (row, column, value), counted from zero."""
     size = _square(where, shape)
     row, column, value = (np.asarray(part).ravel() for part in (row, column, value))
     _real(where, value)
@@ -153,14 +147,9 @@ class _Arrays:
 def read_numpy_matrix(path: Path, name: str | None, role: Role | None) -> SystemMatrix:
     """Read one matrix.
 
-    Understood are ``scipy.sparse.save_npz`` (one matrix), full arrays by name (``K``, ``M``), and
-    sparse ones as ``K_data``, ``K_indices``, ``K_indptr`` or ``K_data``, ``K_row``, ``K_col``.
-    Arrays ``node`` and ``direction`` say what the rows are.
-
-    Raises
-    ------
-    InputError
-        For complex matrices, objects, names that are not there, and damaged files.
+    From ``scipy.sparse.save_npz`` (one matrix), full arrays by name (``K``, ``M``), or sparse ones
+    as ``K_data``, ``K_indices``, ``K_indptr`` or ``K_data``, ``K_row``, ``K_col``. Arrays ``node``
+    and ``direction`` say what the rows are.
     """
     with foreign_reading(str(path), "a NumPy file", _HINT), zipfile.ZipFile(path) as archive:
         arrays = _Arrays(path, archive)
@@ -233,14 +222,7 @@ _MATLAB_HINT = "save it again: save('model.mat', 'K', 'M', '-v7')."
 def read_matlab_matrix(path: Path, name: str | None, role: Role | None) -> SystemMatrix:
     """Read one matrix; ``name`` may be ``structure.field``.
 
-    Those of version 7.3 are HDF5 and need h5py.
-
-    Raises
-    ------
-    InputError
-        For complex matrices, for names that are not there, and for damaged files.
-    MissingExtraError
-        For a file of version 7.3 without h5py.
+    Files of version 7.3 are HDF5 and need h5py (:class:`~klack.errors.MissingExtraError`).
     """
     with path.open("rb") as stream:
         start = stream.read(520)
@@ -282,7 +264,7 @@ def _choice(
 
 
 def _full_name(path: Path, known: Collection[str], name: str | None, role: Role | None) -> str:
-    """Full name of the matrix asked for, whose last part is enough."""
+    """Name of the wanted matrix, whose last part is enough."""
     last = {key.rpartition(".")[2]: key for key in known}
     if name is not None and name not in last:
         return choose_matrix(str(path), known, name, role)
@@ -292,7 +274,7 @@ def _full_name(path: Path, known: Collection[str], name: str | None, role: Role 
 def _of_fields(
     path: Path, fields: Mapping[str, Any], name: str | None, role: Role | None
 ) -> SystemMatrix:
-    """Choose among fields of structures, by their last name if necessary."""
+    """Choose among fields of structures, if necessary by their last name."""
     square = {key: value for key, value in fields.items() if _is_matrix(value)}
     chosen = _full_name(path, square, name, role)
     return _matlab_matrix(path, chosen, square[chosen])
@@ -326,7 +308,7 @@ def _hdf5(path: Path, name: str | None, role: Role | None) -> SystemMatrix:
 
 
 def _variables(group: Any, path: str, depth: int = 0) -> Iterator[tuple[str, Any]]:
-    """Matrices of a file and of its structures; links to other files are not followed."""
+    """Matrices of a file and of its structures, links to other files excepted."""
     import h5py
 
     for key in group:
@@ -355,7 +337,7 @@ def _dataset(where: str, group: Any, key: str) -> Any:
 
 
 def _check_dataset(where: str, item: Any) -> None:
-    """Refuse numbers that lie in other files, or that cannot lie in the bytes stored for them."""
+    """Reject numbers in other files, or more than the stored bytes can hold."""
     packed = 1 if item.chunks is None else _MOST_PACKED
     foreign = bool(item.external) or item.is_virtual
     if foreign or item.size * item.dtype.itemsize > packed * item.id.get_storage_size():

@@ -21,9 +21,8 @@ class FileSystem:
 
     Parameters
     ----------
-    K, M (n, n)
     rows
-        Node and direction of each row; None where no file says it.
+        Node and direction of each; None where no file says it.
     held
         Degrees of freedom that the program has taken out.
     """
@@ -50,10 +49,10 @@ class FileSystem:
 class NodeSystem:
     """K and M of all degrees of freedom of a mesh, in the units of the files.
 
+    Row ``dimension * i + d`` belongs to node i and direction d.
+
     Parameters
     ----------
-    K, M (n_dof, n_dof)
-        Row ``dimension * i + d`` belongs to node i and direction d.
     absent
         Sorted degrees of freedom that the files leave out: their program holds them at zero.
     """
@@ -72,21 +71,14 @@ def read_system(
     mass_name: str | None = None,
     dofs: Path | None = None,
 ) -> FileSystem:
-    """Read both matrices, and what their rows are.
+    """Read both matrices, which may be in one file, and what their rows are.
 
     Parameters
     ----------
-    stiffness, mass
-        May be the same file.
     stiffness_name, mass_name
         In files of several matrices.
     dofs
-        Table of node and direction; it goes before what the files say themselves.
-
-    Raises
-    ------
-    InputError
-        If they cannot be read, or have different rows.
+        Table of node and direction; overrides what the files say.
     """
     K = read_matrix(stiffness, name=stiffness_name, role="stiffness")
     M = read_matrix(mass, name=mass_name, role="mass")
@@ -170,18 +162,12 @@ def _moved(A: csr_array, place: NDArray[np.int64], size: int) -> csr_array:
 
 
 def on_nodes(system: FileSystem, numbers: NDArray[np.int64], dimension: int) -> NodeSystem:
-    """Put the rows onto nodes.
+    """Put the rows onto nodes; rejects rotations and a number of rows that does not fit.
 
     Parameters
     ----------
     numbers (n,)
-        Number in its program of every node.
-    dimension : {3, 2}
-
-    Raises
-    ------
-    InputError
-        For rows of other nodes, of rotations, and for a number of rows that does not fit.
+        Of every node in its program.
     """
     n, size = len(numbers), dimension * len(numbers)
     rows = system.rows

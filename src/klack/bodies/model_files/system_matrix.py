@@ -1,4 +1,4 @@
-"""One stiffness or mass matrix as its file has it: its numbers, and what its rows mean."""
+"""One stiffness or mass matrix as its file has it, and what its rows mean."""
 
 import re
 from collections.abc import Iterable
@@ -42,7 +42,7 @@ class RowPlaces:
     Parameters
     ----------
     node (n,)
-        Number of the node in its program.
+        Number in its program.
     direction (n,)
         1, 2, 3 for x, y, z (1, 2 for r, z of a body of revolution); 4 to 6 for rotations.
     """
@@ -53,18 +53,16 @@ class RowPlaces:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SystemMatrix:
-    """A symmetric matrix in the units of its file.
+    """A symmetric matrix in the units of its file, both triangles.
 
     Parameters
     ----------
     name
-        In the file; empty where the file holds one matrix without name.
-    matrix (n, n)
-        Both triangles.
+        Empty where the file holds one matrix without name.
     rows
         None where the file does not say.
     held
-        Degrees of freedom that the program has taken out because they are constrained.
+        Constrained degrees of freedom that the program has taken out.
     notes
         What was found while reading.
     """
@@ -78,7 +76,7 @@ class SystemMatrix:
 
 
 class WhichMatrixError(InputError):
-    """A file holds several matrices, or none of the wanted name; ``names`` are those it has."""
+    """A file holds several matrices, or not the wanted one; ``names`` are those it has."""
 
     def __init__(
         self, names: tuple[str, ...], where: str, *, got: str, expected: str, hint: str
@@ -88,13 +86,7 @@ class WhichMatrixError(InputError):
 
 
 def choose_matrix(where: str, names: Iterable[str], wanted: str | None, role: Role | None) -> str:
-    """Name of one matrix of a file: the wanted one, the only one, or the one of the usual name.
-
-    Raises
-    ------
-    InputError
-        If none or several fit; lists the names there are.
-    """
+    """Name of the matrix: the wanted one, the only one, or the one of the usual name."""
     known = list(dict.fromkeys(names))
     if wanted is not None:
         found = [name for name in known if name == wanted] or [
@@ -127,25 +119,10 @@ def symmetric_matrix(
     value: NDArray[np.float64],
     size: int,
 ) -> tuple[csr_array, tuple[str, ...]]:
-    """Build a symmetric matrix from its entries: a lower, an upper or both triangles.
+    """Symmetric matrix from entries (from zero) of a lower, an upper or both triangles, and notes.
 
-    Parameters
-    ----------
-    row, column
-        From zero.
-    size
-        Number of rows.
-
-    Returns
-    -------
-    matrix (size, size)
-    notes : tuple of str
-
-    Raises
-    ------
-    InputError
-        For entries outside, entries given twice, numbers that are not finite, fewer entries than
-        rows, and for a matrix that is not symmetric (with its asymmetry).
+    Rejects entries outside, twice or not finite, fewer entries than rows, and a matrix that is not
+    symmetric (with its asymmetry).
     """
     _check_entries(where, row, column, value, size)
     A = coo_array((value, (row, column)), shape=(size, size)).tocsr()
@@ -180,13 +157,13 @@ def symmetric_matrix(
 
 
 def _has_both(A: csr_array) -> bool:
-    """True if any pair (i, j) is stored together with (j, i)."""
+    """True if any (i, j) is stored together with (j, i)."""
     stored = csr_array((np.ones(A.nnz, dtype=np.int8), A.indices, A.indptr), shape=A.shape)
     return int(stored.multiply(stored.T.tocsr()).nnz) > int(np.count_nonzero(stored.diagonal()))
 
 
 def _asymmetry_notes(where: str, A: csr_array, difference: NDArray[np.float64]) -> tuple[str, ...]:
-    """Notes on asymmetry; reject a clearly asymmetric matrix."""
+    """Notes on asymmetry; reject a clear one."""
     size = float(np.linalg.norm(A.data))
     asymmetry = float(np.linalg.norm(difference)) / size if size else 0.0
     if not asymmetry <= _LARGEST_ASYMMETRY:
@@ -249,14 +226,9 @@ _TURNED = {"r": 1, "ur": 1}
 def read_row_places(path: Path) -> RowPlaces:
     """Read the table.
 
-    Understood are ``node.direction`` (CalculiX ``.dof``), ``node, direction`` and ``row, node,
-    direction`` (the mapping that ANSYS HBMAT writes).  A direction is 1 to 6, x, y, z, UX, UY, UZ,
-    R or Z, or ROTX ... for rotations.
-
-    Raises
-    ------
-    InputError
-        With the line that cannot be understood, or for a place that comes twice.
+    Rows are ``node.direction`` (CalculiX ``.dof``), ``node, direction`` or ``row, node,
+    direction`` (mapping of ANSYS HBMAT). A direction is 1 to 6, x, y, z, UX, UY, UZ, R, Z, or ROTX
+    ... for rotations.
     """
     if path.stat().st_size > _LARGEST:
         hint = "give the table of node and direction alone."

@@ -1,8 +1,8 @@
 """Mode shapes of a universal file: datasets 55, with units (164) and frequency responses (58).
 
-Dataset 55 holds one mode: five lines of text, a line of kinds, a line of whole numbers, a line of
-frequency, modal mass and damping, then two lines for each node (number; displacements).  Numbers
-have five decimals, so shapes are known to about 1e-5.
+Dataset 55 holds one mode: five lines of text, one of kinds, one of whole numbers, one of
+frequency, modal mass and damping, then two for each node (number; displacements). Numbers have
+five decimals, so shapes are known to about 1e-5.
 """
 
 from collections.abc import Iterator
@@ -50,7 +50,7 @@ def uff_datasets(path: Path, lines: list[str]) -> Iterator[tuple[str, int, int]]
 def uff_numbers(
     path: Path, lines: list[str], at: int, end: int, count: int, *, width: int = 13
 ) -> list[float]:
-    """Numbers from line ``at`` on, as many as requested, over several lines if necessary."""
+    """Numbers from line ``at`` on, over several lines if necessary."""
     values: list[float] = []
     while len(values) < count:
         if at >= end:
@@ -100,10 +100,9 @@ class Receptance:
     Parameters
     ----------
     response, reference
-        ``"17 z"``: node and direction; a negative direction has turned the sign already.
+        Node and direction, as ``"17 z"``; the sign of a negative direction is applied already.
     frequency (n,) [Hz]
         Above 0.
-    values (n,)
     """
 
     response: str
@@ -113,15 +112,7 @@ class Receptance:
 
 
 def read_response(path: Path, lines: list[str], first: int, end: int) -> Receptance | None:
-    """Read one dataset 58; None for what is no response of a motion to a force.
-
-    Parameters
-    ----------
-    lines
-        Of the file.
-    first, end
-        Of the dataset, from 0, after its number.
-    """
+    """Read one dataset 58; None for what is no response of a motion to a force."""
     if end - first < 12:
         raise uff_refusal(path, first, "a short dataset 58", "eleven lines and values")
     kind = lines[first + 5][:5].strip()
@@ -180,21 +171,19 @@ class FileModalData:
     Parameters
     ----------
     frequency (m,) [Hz]
-    damping (m,) [-], or None
+    damping (m,) [-]
         None where the file gives none.
     modal_mass (m,)
         1 for mass-normalised shapes.
     shapes (m, n)
     labels
-        Of the columns of ``shapes``: names, or ``"17 z"`` for node and direction.
-    residual (n, n), or None
+        Of the columns of ``shapes``: names, or ``"17 z"`` for node and direction (``by_node``).
+    residual (n, n)
         Residual compliance between the columns.
-    by_node
-        True where columns are nodes and directions.
     length, force [m], [N]
         Units that the file itself claims.
     responses
-        Between nodes; they tell what the modes miss.
+        Between nodes; they show what the modes miss.
     """
 
     path: Path
@@ -223,11 +212,9 @@ class _Mode:
 def read_uff_modes(path: Path) -> FileModalData:
     """Read all normal modes.
 
-    Raises
-    ------
-    InputError
-        With the line, for a damaged file, complex modes, or a file without dataset 55: frequency
-        responses (dataset 58) are no modes; a modal analysis has to find those first.
+    Rejects complex modes and a file without dataset 55: frequency responses (dataset 58) need a
+    modal
+    analysis first.
     """
     if path.stat().st_size > _LARGEST:
         raise InputError(
@@ -320,7 +307,7 @@ def _mode(path: Path, lines: list[str], first: int, end: int) -> _Mode:
 
 
 def _units(path: Path, lines: list[str], first: int, end: int) -> tuple[float, float]:
-    """Unit of length [m] and of force [N]; the file gives their reciprocals."""
+    """Units of length [m] and force [N]; the file has their reciprocals."""
     factors = uff_numbers(path, lines, first + 1, end, 2)
     if not (factors[0] > 0 and factors[1] > 0):
         raise uff_refusal(path, first + 2, f"unit factors {factors[:2]}", "factors above 0")

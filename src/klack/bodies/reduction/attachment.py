@@ -1,32 +1,29 @@
 r"""Attachment modes: deflections that give a truncated basis its static share back.
 
-A body under the load ``b`` of a port deflects statically as the sum over *all* modes; the retained
-ones carry a part.  The rest is the residual attachment mode (MacNeal 1971; Craig & Kurdila 2006,
-ch. 17)
+The static deflection under the load ``b`` of a port, less the part that the retained modes carry,
+is the residual attachment mode (MacNeal 1971; Craig & Kurdila 2006, ch. 17)
 
 .. math:: \psi = K^{+} b - \sum_{i=1}^{m} \varphi_i \frac{\varphi_i^T b}{\omega_i^2},
           \qquad K^{+} = K^{-1} \text{ or } P^T K^{-}_{iso} P, \quad P = I - M R R^T
 
-with inertia relief for a free body.  Being a sum over omitted modes it is M- and K-orthogonal to
-the retained and the rigid ones; it needs only to be diagonalised among its like (several ports) to
-have modal form again.  Then the static compliance at the ports is exact, for any number of modes:
-``psi^T K psi = psi^T b``, hence ``(psi^T b)^2 / (psi^T K psi) = b^T psi``.
+with inertia relief for a free body. A sum over omitted modes, it is M- and K-orthogonal to the
+retained and rigid ones, and is diagonalised among those of other ports. The static compliance at
+the ports is exact for any number of modes: ``psi^T K psi = psi^T b``, hence ``(psi^T b)^2 / (psi^T
+K psi) = b^T psi``.
 
 The shifted attachment mode (Dietz 1999: frequency response modes) does without inertia relief:
 
 .. math:: \psi_s = (K - s M)^{-1} b - \text{its rigid and retained modal part}
 
-The response of the whole body at ``omega^2 = s`` is then a combination of the modes, hence exact,
-and not at the port alone: at every node, so also read at one node (Galerkin's solution is the
-exact one where that lies in the basis).  Each shift adds one mode per port.  A negative shift
-makes ``K - s M`` positive definite, body free or not; a positive one is exact at the frequency
-``sqrt(s) / 2 pi`` itself, and must stay away from the eigenfrequencies, where the response is
-nothing but that eigenmode.  All of them are made M-orthonormal, to the rigid and retained modes
-and among each other, and K-diagonal (Rayleigh-Ritz).  Shifts whose modes are nearly parallel
-would be a basis of round-off and are refused.  The default :func:`default_shift`,
-``s = -omega_1^2``, is far below every omitted mode, so the static response is exact but for an
-error of the order ``(omega_1 / omega_{m+1})^4``; with two shifts far below, of the order
-``(s_1 / omega_{m+1}^2)^2 (s_2 / omega_{m+1}^2)^2``.
+The response at ``omega^2 = s`` is then exact at every node, not at the port alone (Galerkin's
+solution is exact where that lies in the basis). Each shift adds one mode per port. A negative
+shift makes ``K - s M`` positive definite, body free or not; a positive one is exact at the
+frequency ``sqrt(s) / 2 pi``, and must stay away from the eigenfrequencies, where the response is
+that eigenmode alone. All are made M-orthonormal, to the rigid and retained modes and among each
+other, and K-diagonal (Rayleigh-Ritz); nearly parallel ones would be a basis of round-off and are
+rejected. With :func:`default_shift`, ``s = -omega_1^2``, far below every omitted mode, the static
+response has an error of the order ``(omega_1 / omega_{m+1})^4``; with two shifts far below, ``(s_1
+/ omega_{m+1}^2)^2 (s_2 / omega_{m+1}^2)^2``.
 """
 
 from collections.abc import Sequence
@@ -63,31 +60,25 @@ _ROUNDS = 4  # of the inverse iteration
 
 
 def default_shift(omega: NDArray[np.float64]) -> float:
-    """Shift ``-omega_1^2`` [(rad/s)^2] for elastic frequencies ``omega`` (m,) [rad/s]."""
+    """Shift ``-omega_1^2`` [(rad/s)^2] for elastic frequencies (m,) [rad/s]."""
     return -(float(omega[0]) ** 2)
 
 
 def residual_attachment(body: ElasticBody, kept: Modes, deflections: NDArray[np.float64]) -> Modes:
-    """Residual attachment modes in modal form.
+    """Residual attachment modes in modal form, at most one per port.
+
+    A pattern that the retained modes carry in full adds none.
 
     Parameters
     ----------
-    kept
-        Retained elastic modes.
     deflections (n_dof, n_ports) [m/N]
         ``Flexibility(body).solve(patterns)``.
-
-    Returns
-    -------
-    Modes
-        At most one per port, M-orthonormal among themselves and to ``kept`` and the rigid modes;
-        a pattern that the retained modes already carry in full adds none.
     """
     return _diagonal(body, _new_directions(body, kept, deflections))
 
 
 def shift_at(frequency: float) -> float:
-    """Shift [(rad/s)^2] of a frequency [Hz]; below zero for one below zero.
+    """Shift [(rad/s)^2] of a frequency [Hz], with its sign.
 
     Examples
     --------
@@ -111,21 +102,12 @@ def shifted_attachment(
 ) -> Modes:
     """Shifted attachment modes in modal form; one factorisation for each shift, kept in the cache.
 
+    Rejects a shift at an eigenfrequency that the patterns excite, of a free body also at 0 Hz.
+
     Parameters
     ----------
-    kept
-        Retained elastic modes.
     patterns (n_dof, n_ports) [-]
     shifts [(rad/s)^2]
-        Of both signs, see the module text; a positive one is at a frequency (:func:`shift_at`).
-    flexibility
-        Of the same body.
-
-    Raises
-    ------
-    InputError
-        For a shift at an eigenfrequency that the patterns excite, of a free body also at 0 Hz, and
-        for two shifts whose modes are nearly parallel.
     """
     found = np.empty((body.dof_count, 0))
     for i, shift in enumerate(shifts):
@@ -152,7 +134,7 @@ def shifted_attachment(
 def _shifted_solve(
     body: ElasticBody, patterns: Floats, shift: float, flexibility: Flexibility
 ) -> Floats:
-    """Response at a shift; refused where it is nothing but one mode of the body."""
+    """Response at a shift; rejected where it is one mode alone."""
     free = body.free
     K, M = body.K[free][:, free], body.M[free][:, free]
     load, rigid = patterns[free], body.rigid_modes[free]
@@ -179,10 +161,11 @@ def _shifted_solve(
 def _nearest(
     solve: Solver, K: csr_array, M: csr_array, response: Floats, shift: float
 ) -> float | None:
-    """Square of an eigenfrequency [(rad/s)^2] that is too near to a shift, else None.
+    """Square of an eigenfrequency [(rad/s)^2] too near to a shift, else None.
 
-    Inverse iteration from the response: with unit M-norm, the next vector is as long as one over
-    the distance to the nearest eigenvalue that the load excites, or shorter.
+    Inverse iteration from the response of unit M-norm: the next vector is at most as long as one
+    over
+    the distance to the nearest eigenvalue that the load excites.
     """
     limit = 2.0 * _NEAR * shift
     for column in response.T:
@@ -201,7 +184,7 @@ def _nearest(
 
 
 def _new_directions(body: ElasticBody, kept: Modes, vectors: Floats) -> Floats:
-    """M-orthonormal basis of what vectors have beside the rigid and retained modes."""
+    """M-orthonormal basis of vectors beside the rigid and retained modes."""
     M = body.M
     rest = vectors / _norms(M, vectors)
     for _ in range(2):  # twice is enough (Kahan, Parlett)

@@ -1,7 +1,7 @@
-"""Modal damping: a small viscous ratio for each mode, from any input.
+"""Modal damping: a small viscous ratio for each mode.
 
-The reduced body is damped mode by mode, ``q'' + 2 zeta omega q' + omega^2 q = phi^T F``.  Rigid
-modes (``omega = 0``) are never damped: that would be drag, which belongs to the fluid.
+Mode by mode, ``q'' + 2 zeta omega q' + omega^2 q = phi^T F``. Rigid modes (``omega = 0``) are
+never damped: drag belongs to the fluid.
 """
 
 from dataclasses import dataclass
@@ -20,8 +20,8 @@ class ModalDamping:
 
     Parameters
     ----------
-    ratio : float or array, shape (m,) [-]
-        Share of critical damping, the same for all elastic modes or one for each.
+    ratio, one or (m,) [-]
+        Share of critical damping, for all elastic modes or for each.
 
     Examples
     --------
@@ -36,7 +36,7 @@ class ModalDamping:
         require_nonnegative("ModalDamping.ratio", float(lowest), "-")
 
     def ratios(self, omega: ArrayLike) -> NDArray[np.float64]:
-        """Damping ratios [-] of modes with angular frequencies ``omega`` (m,) [rad/s]."""
+        """Damping ratios [-] of modes with ``omega`` (m,) [rad/s]."""
         omega = np.asarray(omega, dtype=float)
         ratio = np.asarray(self.ratio, dtype=float)
         elastic = omega > 0
@@ -54,10 +54,10 @@ class ModalDamping:
 
 @dataclass(frozen=True, kw_only=True)
 class RayleighDamping:
-    r"""Damping matrix ``alpha M + beta K``, hence ``zeta = alpha / (2 omega) + beta omega / 2``.
+    """Damping matrix ``alpha M + beta K``, hence ``zeta = alpha / (2 omega) + beta omega / 2``.
 
-    It damps high modes in proportion to their frequency (``beta``), which is convenient and rarely
-    what a measurement shows; prefer :class:`LossFactor` for a metal part.
+    High modes are damped in proportion to their frequency (``beta``), which measurements rarely
+    show; prefer :class:`LossFactor` for a metal part.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class RayleighDamping:
         require_nonnegative("RayleighDamping.beta", self.beta, "s")
 
     def ratios(self, omega: ArrayLike) -> NDArray[np.float64]:
-        """Damping ratios [-] of modes with angular frequencies ``omega`` (m,) [rad/s]."""
+        """Damping ratios [-] of modes with ``omega`` (m,) [rad/s]."""
         omega = np.asarray(omega, dtype=float)
         safe = np.where(omega > 0, omega, 1.0)
         return np.where(omega > 0, self.alpha / (2 * safe) + self.beta * omega / 2, 0.0)
@@ -102,7 +102,7 @@ class LossFactor:
         require_nonnegative("LossFactor.eta", self.eta, "-")
 
     def ratios(self, omega: ArrayLike) -> NDArray[np.float64]:
-        """Damping ratios [-] of modes with angular frequencies ``omega`` (m,) [rad/s]."""
+        """Damping ratios [-] of modes with ``omega`` (m,) [rad/s]."""
         return np.where(np.asarray(omega, dtype=float) > 0, self.eta / 2, 0.0)
 
 

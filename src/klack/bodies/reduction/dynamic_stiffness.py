@@ -1,7 +1,7 @@
 """Solutions with the dynamic stiffness ``K - w^2 M``: symmetric, but not definite.
 
-Above the first eigenfrequency the Cholesky factorisation of the statics does not exist.  PARDISO
-(symmetric indefinite, Bunch-Kaufman pivots) does it where it is installed, SuperLU elsewhere.
+Above the first eigenfrequency there is no Cholesky factor: PARDISO (symmetric indefinite,
+Bunch-Kaufman pivots) where installed, else SuperLU.
 """
 
 from collections.abc import Callable, Iterator
@@ -21,12 +21,12 @@ Solver = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 
 def solve_symmetric(A: csr_array, B: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Solve ``A X = B`` once for a sparse symmetric matrix, definite or not.
+    """Solve ``A X = B`` once.
 
     Parameters
     ----------
     A (n, n)
-        Full storage.
+        Symmetric, definite or not, full storage.
     B (n, m)
 
     Examples
@@ -41,13 +41,7 @@ def solve_symmetric(A: csr_array, B: NDArray[np.float64]) -> NDArray[np.float64]
 
 @contextmanager
 def factorized_symmetric(A: csr_array) -> Iterator[Solver]:
-    """Factorise once for several solutions; the factor goes with the context.
-
-    Parameters
-    ----------
-    A (n, n)
-        Full storage, symmetric, definite or not.
-    """
+    """Factorise A (symmetric, definite or not, full storage) for several solutions."""
     if "pardiso" not in available_backends():
         yield scipy.sparse.linalg.splu(A.tocsc()).solve
         return

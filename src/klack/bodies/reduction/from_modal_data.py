@@ -31,16 +31,11 @@ def body_of_modal_data(
     ----------
     frequency, damping (m,) [Hz], [-]
     shapes (m, n_ports) [1/sqrt(kg)]
-        The mean displacement of each port along +z, weighted as its force.
+        Mean displacement of each port along +z, weighted as its force.
     residual (n_ports, n_ports) [m/N]
-        Compliance of the modes that are left out.
+        Compliance of the omitted modes.
     mass [kg]
-
-    Raises
-    ------
-    InputError
-        For negative frequencies or damping, and as
-        :func:`klack.bodies.reduction.given_modes.body_of_modes`.
+        As of :func:`klack.bodies.reduction.given_modes.body_of_modes`.
     """
     for key, values, unit in (("frequency", frequency, "Hz"), ("damping", damping, "-")):
         if not np.all(np.isfinite(values)) or np.any(values < 0):
@@ -86,21 +81,17 @@ def body_of_craig_bampton(
 ) -> ReducedBody:
     r"""Solve the reduced eigenvalue problem and take the ports from the boundary rows.
 
-    The matrices of boundary displacements and fixed-interface coordinates are small, so all modes
-    of :math:`K \varphi = \omega^2 M \varphi` are computed and kept; nothing is lost.  The shape of
-    a port is the row of its boundary displacement.
+    The matrices of boundary displacements and fixed-interface coordinates are small: all modes of
+    :math:`K \varphi = \omega^2 M \varphi` are kept.  Rejects asymmetry, an M that is not positive
+    definite and a K that is not semidefinite.
 
     Parameters
     ----------
     K, M (n, n) [N/m], [kg]
     rows
-        Row of the boundary displacement of each port, from 0.
+        Of the boundary displacement of each port, from 0: its shape.
     mass [kg]
-
-    Raises
-    ------
-    InputError
-        If the matrices are not symmetric, M is not positive definite or K not semidefinite.
+        As of :func:`klack.bodies.reduction.given_modes.body_of_modes`.
     """
     for key, matrix in (("K", K), ("M", M)):
         apart = float(np.max(np.abs(matrix - matrix.T)))
@@ -177,25 +168,22 @@ def fit_residual(
 ) -> float:
     r"""Residual compliance [m/N] between two places.
 
-    Far below the modes that are left out, the difference
+    Far below the omitted modes, the difference
 
     .. math:: H(\omega) - \sum_k \frac{\varphi_k \varphi_k^T}{\omega_k^2 - \omega^2
               + 2 i \zeta_k \omega_k \omega}
 
-    is the real constant that belongs into the feedthrough.  It is fitted with weights ``1/|sum|``,
-    so that the resonances, where five decimals of a frequency matter, have no say.
+    is the real constant of the feedthrough. The weights ``1/|sum|`` silence the resonances, where
+    five decimals of a frequency matter.
+
+    Rejects fewer than three frequencies below half the highest mode, and modes that disagree with
+    the responses by more than a tenth in the median.
 
     Parameters
     ----------
     frequency, response (n,) [Hz], [m/N]
     omega, damping, product (m,) [rad/s], [-], [1/kg]
-        Modes, rigid ones included, and the product of their shapes at both places.
-
-    Raises
-    ------
-    InputError
-        If there are fewer than three frequencies below half the highest mode, or if modes and
-        responses disagree by more than a tenth in the median.
+        Modes, rigid ones included; product of their shapes at both places.
     """
     low = frequency <= _HIGHEST * float(omega.max(initial=0.0)) / (2.0 * np.pi)
     if np.sum(low) < _FEWEST:

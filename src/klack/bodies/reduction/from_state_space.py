@@ -5,13 +5,12 @@ The transfer function of a mechanical body at its ports is
 .. math:: D + \frac{G_r}{s^2} + \sum_i \frac{G_i}{s^2 + 2\zeta_i\omega_i s + \omega_i^2},
           \qquad G_i = \varphi_i \varphi_i^T .
 
-Its rigid part is a *defective* double pole: an eigenvalue solver splits it into a pair at the
-square root of round-off.  Here the null spaces of ``A`` and ``A^2`` are found by two singular value
-decompositions and split off; eigenvalues are computed of the rest alone.  Every other pole pair
-:math:`\lambda, \bar\lambda` with the residue :math:`r` has :math:`G = (\lambda-\bar\lambda)\,r`,
-and a real pair the same with its two poles.  A body that creates no energy has real, symmetric
-:math:`G \ge 0`; the port shape is its factor.  A model with one port cannot show a mismatch of
-force and displacement unless a residue turns negative: its mass is the check that remains.
+Its rigid part is a *defective* double pole, which an eigenvalue solver splits into a pair at the
+square root of round-off. The null spaces of ``A`` and ``A^2`` are therefore found by two singular
+value decompositions and split off first. Every other pole pair :math:`\lambda, \bar\lambda` (or
+real pair) with the residue :math:`r` has :math:`G = (\lambda-\bar\lambda)\,r`. A body that creates
+no energy has real, symmetric :math:`G \ge 0`; the port shape is its factor. With one port, a
+mismatch of force and displacement shows only in a negative residue or a wrong mass.
 """
 
 from collections.abc import Sequence
@@ -53,7 +52,7 @@ class _Poles:
 
 
 def state_space_in_si(model: StateSpace, units: UnitSystem) -> StateSpace:
-    """Turn forces, displacements and time of a model into N, m and s."""
+    """Convert forces, displacements and time of a model to N, m and s."""
     return StateSpace(
         A=model.A / units.time,
         B=model.B / (units.time * units.force),
@@ -69,23 +68,22 @@ def body_of_state_space(
 ) -> ReducedBody:
     """Convert a state space whose inputs and outputs are the ports, in SI and in pairs.
 
+    Rejects a model that is unstable, not reciprocal, not passive, or whose damping couples modes;
+    the
+    error names mode and ports.
+
     Parameters
     ----------
     model
         Forces [N] in, displacements [m] out, ``input_names`` being those of the ports.
     mass [kg]
-
-    Raises
-    ------
-    InputError
-        For a model that is unstable, not reciprocal, not passive, or whose damping couples modes;
-        the text names mode and ports.
+        As of :func:`klack.bodies.reduction.given_modes.body_of_modes`.
     """
     return body_of_modes(name, where, modes_of_state_space(model, where=where), mass=mass)
 
 
 def modes_of_state_space(model: StateSpace, *, where: str) -> ModesAtPorts:
-    """Modes and rigid motion of a state space at its ports; see :func:`body_of_state_space`."""
+    """Modes and rigid motion at the ports; see :func:`body_of_state_space`."""
     ports = model.input_names
     A, B, C = _balanced(model)
     rigid, rest = _split_rigid(where, A, B, C)
@@ -113,7 +111,7 @@ def modes_of_state_space(model: StateSpace, *, where: str) -> ModesAtPorts:
 
 
 def _balanced(model: StateSpace) -> tuple[Floats, Floats, Floats]:
-    """Scale the states, so that positions and velocities are of one size."""
+    """Scale the states: positions and velocities of one size."""
     A, scale = scipy.linalg.matrix_balance(model.A, permute=False, separate=True)
     size = np.asarray(scale[0], dtype=np.float64)
     return np.asarray(A, dtype=np.float64), model.B / size[:, None], model.C * size
@@ -125,7 +123,7 @@ def _balanced(model: StateSpace) -> tuple[Floats, Floats, Floats]:
 def _split_rigid(
     where: str, A: Floats, B: Floats, C: Floats
 ) -> tuple[Floats, tuple[Floats, Floats, Floats]]:
-    """Rigid part as ``C A B`` on the null space of ``A^2``, and the model without it."""
+    """Rigid part ``C A B`` on the null space of ``A^2``, and the model without it."""
     V0, chains = _generalised_null_space(A)
     W0, _ = _generalised_null_space(A.T)
     zero = np.zeros((len(C), B.shape[1]))
@@ -160,8 +158,8 @@ def _split_rigid(
 def _generalised_null_space(A: Floats) -> tuple[Floats, int]:
     """Orthonormal basis of the null space of all powers of ``A``, and the dimension of its first.
 
-    One power at a time: in an orthonormal basis that begins with the null space, the null space of
-    the remaining block belongs to the next power.  ``A^2`` itself would square the round-off.
+    In an orthonormal basis that begins with the null space, the null space of the remaining block
+    belongs to the next power; ``A^2`` itself would square the round-off.
     """
     size = float(np.linalg.norm(A, 2))
     basis, found, first = np.eye(len(A)), 0, 0
@@ -215,7 +213,7 @@ _Pair = tuple[float, float, Complex, int]
 
 
 def _oscillating(found: _Poles, wanted: NDArray[np.bool_]) -> list[_Pair]:
-    """Pairs of complex poles; poles that coincide (bending in two planes) stay together."""
+    """Pairs of complex poles; coinciding ones (bending in two planes) stay together."""
     upper = np.flatnonzero(wanted & (found.poles.imag > 0))
     upper = upper[np.argsort(np.abs(found.poles[upper]))]
     groups: list[list[int]] = []
@@ -236,7 +234,7 @@ def _oscillating(found: _Poles, wanted: NDArray[np.bool_]) -> list[_Pair]:
 
 
 def _overdamped(where: str, found: _Poles, wanted: NDArray[np.bool_]) -> list[_Pair]:
-    """Pairs of real poles with opposite residues; those not visible at any port are left out."""
+    """Pairs of real poles with opposite residues, those visible at a port."""
     real = np.flatnonzero(wanted & (found.poles.imag == 0))
     sizes = np.array([float(np.max(np.abs(r))) for r in found.residues]) * np.abs(found.poles)
     floor = _NOISE * _NOISE * float(sizes.max(initial=0.0))
@@ -262,7 +260,7 @@ def _overdamped(where: str, found: _Poles, wanted: NDArray[np.bool_]) -> list[_P
 
 
 def _check_gram(where: str, ports: Sequence[str], G: Complex, largest: float) -> None:
-    """Raise unless ``G`` is real, symmetric and positive, as far as it matters."""
+    """Reject a ``G`` that is not real, symmetric and positive, as far as it matters."""
     own = float(np.max(np.abs(G)))
     limit = TOLERANCE * own + _NOISE * largest
     turned = float(np.max(np.abs(G.imag)))

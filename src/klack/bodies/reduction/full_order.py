@@ -1,19 +1,18 @@
 r"""Transfer functions of the full body, without a factorisation at every frequency.
 
-Wanted is ``G(w) = b^T [(1 + i eta) K - w^2 M]^{-1} b`` at hundreds of frequencies.  One direct
-solution each would take one factorisation each (a second or more in 3-D).  Instead the body is
-projected onto the block Krylov space
+Wanted is ``G(w) = b^T [(1 + i eta) K - w^2 M]^{-1} b`` at hundreds of frequencies; a factorisation
+for each takes a second or more in 3-D. Instead the body is projected onto the block Krylov space
 
 .. math:: \{K^{+} b,\; K^{+} M K^{+} b,\; (K^{+} M)^2 K^{+} b, \ldots\}
 
 which takes *one* factorisation, that of the statics, and one back-substitution per vector (Lanczos
-1950; Grimme 1997 as moment matching).  Its Ritz vectors are exactly those combinations of modes
-that the ports can excite, so a few dozen replace hundreds of eigenmodes.  Rigid modes are added
-exactly; known eigenmodes may be put in first.
+1950; Grimme 1997 as moment matching). Its Ritz vectors are the combinations of modes that the
+ports can excite: a few dozen replace hundreds of eigenmodes. Rigid modes are added exactly; known
+eigenmodes may come first.
 
-How far it is the full order is not assumed but bounded.  Orthogonalisation gives the recurrence
-``K^+ M Q = Q T + W [0 ... beta]`` with one next block ``W``; with it the residual
-``r = b - [(1 + i eta) K - w^2 M] Q y`` is known at *every* frequency without touching the mesh,
+The error is bounded. Orthogonalisation gives the recurrence ``K^+ M Q = Q T + W [0 ... beta]``
+with one next block ``W``; with it the residual ``r = b - [(1 + i eta) K - w^2 M] Q y`` is known at
+*every* frequency,
 
 .. math:: K^{+} r = Q \left[ \beta_0 - (1 + i\eta) y + \omega^2 T y \right]
                     + \omega^2 W \beta \, y_{last} .
@@ -23,9 +22,9 @@ By reciprocity the error of ``G`` is quadratic in the residual, and since
 
 .. math:: |\Delta G| = |r^T [(1 + i \eta) K - \omega^2 M]^{-1} r| \le r^H K^{+} r \,/\, \eta .
 
-The basis grows until this bound is below ``tolerance |G|`` at every frequency.  (Between two ports
-the bound is the geometric mean of theirs.)  Independent of all that, ``checks`` frequencies can be
-solved directly and the deviation reported: ``klack verify`` does so.
+The basis grows until this bound is below ``tolerance |G|`` at every frequency. (Between two ports
+the bound is the geometric mean of theirs.) Independently, ``checks`` frequencies can be solved
+directly, as ``klack verify`` does.
 """
 
 import json
@@ -68,13 +67,13 @@ class FullOrderReceptance:
     Parameters
     ----------
     basis_size
-        Number of basis vectors, rigid modes included.
+        Rigid modes included.
     error_bound (n, n_ports) [-]
-        Of the drive-point receptances, relative; the true error is mostly far smaller.
+        Of the drive-point receptances, relative; the error is mostly far smaller.
     checked_frequencies (k,) [Hz]
         Where the undamped full system was solved directly.
     checked_deviations (k,) [-]
-        Largest relative deviation of the (undamped) receptance there.
+        Largest relative deviation of the undamped receptance there.
     """
 
     receptance: Receptance
@@ -85,7 +84,7 @@ class FullOrderReceptance:
 
     @property
     def note(self) -> str:
-        """One sentence for the caption of a figure."""
+        """Sentence for the caption of a figure."""
         text = (
             f"{self.receptance.label}: Krylov basis of {self.basis_size} vectors, relative error "
             f"at most {self.error_bound.max():.1g} at each of "
@@ -115,29 +114,22 @@ def full_order_receptance(
 ) -> FullOrderReceptance:
     """Displacement per force between all ports of the full body.
 
+    Raises :class:`~klack.errors.ConvergenceError` if ``max_vectors`` do not reach the tolerance.
+
     Parameters
     ----------
     frequencies (n,) [Hz]
         Ascending, above zero.
     loss_factor [-]
-        Structural damping ``eta`` of ``(1 + i eta) K``, above zero.
+        ``eta`` of ``(1 + i eta) K``, above zero.
     flexibility
-        Of the same body; saves the factorisation.
+        Of this body; saves the factorisation.
     modes
-        Elastic eigenmodes computed before; the basis starts with them.
+        Known elastic eigenmodes, put in first.
     tolerance [-]
-        Largest accepted bound of the relative error at any frequency.
-    max_vectors
-        Give up above this basis size.
+        Largest accepted error bound at any frequency.
     checks
-        Number of direct solutions, spread over the upper half of the axis.
-    backend, threads
-        Of the sparse direct solver.
-
-    Raises
-    ------
-    ConvergenceError
-        If ``max_vectors`` do not reach the tolerance.
+        Number of direct solutions, in the upper half of the axis.
     """
     frequencies = frequency_axis("full_order_receptance: frequencies", frequencies)
     require_positive("full_order_receptance: loss_factor", loss_factor, "-")
@@ -168,7 +160,7 @@ def _grow_until(
     tolerance: float,
     max_vectors: int,
 ) -> NDArray[np.float64]:
-    """Enlarge the basis; returns the bound of the relative error, shape (n, p)."""
+    """Enlarge the basis; returns the relative error bound, shape (n, p)."""
     while True:
         space.grow(_BLOCKS_BETWEEN_TESTS)
         size = np.abs(np.einsum("wpp->wp", space.receptance(omega, eta)))
@@ -191,8 +183,7 @@ def direct_receptance(
 ) -> Receptance:
     """Undamped receptance by one factorisation of ``K - w^2 M`` for each frequency.
 
-    The slow truth behind :func:`full_order_receptance`; parameters as there.  It is not defined at
-    an eigenfrequency.
+    The slow truth behind :func:`full_order_receptance`; undefined at an eigenfrequency.
     """
     frequencies = frequency_axis("direct_receptance: frequencies", frequencies)
     B = np.column_stack([port.pattern for port in ports])[body.free]
@@ -211,7 +202,7 @@ def direct_receptance(
 
 
 class _KrylovSpace:
-    """M-orthonormal basis ``Q`` of elastic fields that the ports excite, and the projected body."""
+    """M-orthonormal basis ``Q`` of fields that the ports excite, and the projected body."""
 
     def __init__(
         self,
@@ -242,7 +233,7 @@ class _KrylovSpace:
         return not self.pending.shape[1]
 
     def grow(self, blocks: int) -> None:
-        """Add some Krylov blocks of one vector per port."""
+        """Add Krylov blocks of one vector per port."""
         for _ in range(blocks):
             if self.exhausted:
                 return
@@ -258,7 +249,7 @@ class _KrylovSpace:
             self.recurrence = square
 
     def _append(self, vectors: NDArray[np.float64]) -> None:
-        """Take M-orthonormal vectors into the basis and border the projected stiffness."""
+        """Take M-orthonormal vectors into the basis; border the projected stiffness."""
         image = self.body.K @ vectors
         side = self.basis.T @ image
         corner = vectors.T @ image
@@ -280,7 +271,7 @@ class _KrylovSpace:
     def _split(
         self, vectors: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Write vectors as ``Q inside + W link`` with M-orthonormal W, orthogonal to Q."""
+        """Write vectors as ``Q inside + W link``, W M-orthonormal and orthogonal to Q."""
         M, rigid = self.body.M, self.body.rigid_modes
         inside = np.zeros((self.size, vectors.shape[1]))
         link = np.eye(vectors.shape[1])
@@ -310,7 +301,7 @@ class _KrylovSpace:
         return modal_sum(shapes, squares * (1 + 1j * eta) - omega[:, None] ** 2)
 
     def residual_energy(self, omega: NDArray[np.float64], eta: float) -> NDArray[np.float64]:
-        """Energy norm squared, ``r^H K^+ r``, of the residual of each port, (n, p) [m/N]."""
+        """Energy norm squared ``r^H K^+ r`` of the residuals, (n, p) [m/N]."""
         squares, turn = scipy.linalg.eigh(self.stiffness)
         w2 = omega[:, None, None] ** 2
         loads = turn.T @ (self.basis.T @ self.patterns)
@@ -331,7 +322,7 @@ def _norms(M: csr_array, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _check_places(frequencies: NDArray[np.float64], count: int) -> NDArray[np.float64]:
-    """Frequencies in the upper half of the axis, where errors are largest; the last included."""
+    """Frequencies in the upper half of the axis, where errors are largest, and the last."""
     places = np.linspace(len(frequencies) - 1, (len(frequencies) - 1) / 2, max(count, 0))
     return np.sort(frequencies[np.unique(np.round(places).astype(int))])
 

@@ -1,8 +1,8 @@
 r"""A reduced body from modes that another program computed: checks, units, rigid motion.
 
-Rigid modes reach klack as :math:`G_r = \sum \varphi_r \varphi_r^T` over the ports, because the
-single rigid modes of another program are any mixture.  A unit motion along z moves every port by
-1, :math:`\Phi_r^T a = 1`, which gives the mass :math:`a \cdot a`.
+Rigid modes, which another program may mix, are given as :math:`G_r = \sum \varphi_r \varphi_r^T`
+over the ports. A unit motion along z moves every port by 1, :math:`\Phi_r^T a = 1`, which gives
+the mass :math:`a \cdot a`.
 """
 
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ TOLERANCE = 1e-3
 """Accepted deviation from reciprocity and from one common axial motion [-]."""
 
 RIGID_FREQUENCY = 1.0
-"""Modes below are rigid [Hz]: the round-off of free bodies in other programs."""
+"""Limit of rigid modes [Hz]: the round-off of free bodies in other programs."""
 
 _RANK = 1e-5  # of the largest eigenvalue of a Gram matrix; below lies the rounding of text files
 _MASS = 0.01
@@ -35,14 +35,14 @@ class ModesAtPorts:
     Parameters
     ----------
     omega, damping (m,) [rad/s], [-]
-        Elastic modes, any order.
+        Elastic, in any order.
     shapes (m, n_ports) [1/sqrt(kg)]
     rigid_gram (n_ports, n_ports) [1/kg]
         Zero for a held body.
     residual (n_ports, n_ports) [m/N]
         Compliance beside the modes.
     coordinates
-        Degrees of freedom of the model that they come from.
+        Degrees of freedom of the original model.
     """
 
     port_names: tuple[str, ...]
@@ -59,17 +59,14 @@ def body_of_modes(
 ) -> ReducedBody:
     """Convert modes to the form of klack and check them.
 
+    Rejects a residual compliance that is not reciprocal and passive, and ports that do not move
+    together along z.
+
     Parameters
     ----------
     mass [kg]
         A free body is checked against it; needed if its ports tell translation and rotation apart.
-        The mass of a held body without it is unknown (nan).
-
-    Raises
-    ------
-    InputError
-        If the residual compliance is not reciprocal and passive, the ports do not move together
-        along z, or the mass is another one.
+        Without it the mass of a held body is nan.
     """
     residual = _residual(where, modes)
     rigid = _rigid_shapes(where, modes)
@@ -102,7 +99,7 @@ def body_of_modes(
 def shapes_of_gram(gram: Floats, most: int) -> Floats:
     r"""Factor :math:`G = \sum_k \varphi_k \varphi_k^T`, shape (most, n_ports), largest first.
 
-    The first component of (nearly) the largest magnitude of each shape is positive.
+    The first component of (nearly) the largest magnitude is positive.
     """
     values, vectors = np.linalg.eigh(0.5 * (gram + gram.T))
     order = np.argsort(values)[::-1][:most]

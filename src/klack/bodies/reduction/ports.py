@@ -1,16 +1,15 @@
 """Ports: where a force enters a body and which displacement does work on it.
 
-A port is one load pattern ``b``, the nodal forces of a resultant of 1 N.  Force in: ``f = b F``.
-Displacement out: ``y = b^T u``, the mean displacement weighted like the load.  Input and output
-with the *same* vector make the transfer function symmetric (Maxwell, Betti), and ``F dy`` is
-exactly the work that the nodal forces do.
+A port is one load pattern ``b``, the nodal forces of a resultant of 1 N. Force in: ``f = b F``.
+Displacement out: ``y = b^T u``, the mean displacement weighted like the load. The *same* vector
+for both makes the transfer function symmetric (Maxwell, Betti), and ``F dy`` the work of the nodal
+forces.
 
-Why a single node is no port.  A load spread over an area but read at one node has ``c != b``: the
-reduced body is then non-reciprocal, ``F dy`` is not the work done, and a contact closed over such a
-pair creates or swallows energy (a mismatch of 10 % in the modal amplitudes moved the energy of a
-two-rod impact by -5 to +3 %).  A point load is no way out either: in three dimensions its own
-displacement grows without bound as the mesh is refined.  Single nodes are therefore available as
-:class:`Observer` only: they are read, never loaded.
+A single node is no port. A load spread over an area but read at one node has ``c != b``: the
+reduced body is not reciprocal, and a contact closed over such a pair creates or swallows energy (a
+mismatch of 10 % in the modal amplitudes moved the energy of a two-rod impact by -5 to +3 %). Under
+a point load, in three dimensions, the displacement grows without bound as the mesh is refined.
+Single nodes are therefore read only, by an :class:`Observer`.
 """
 
 from dataclasses import dataclass
@@ -45,7 +44,7 @@ class FaceSamples:
     values (q, n) [-]
         Shape functions.
     area (f, q) [m^2]
-        Weight times area; of an axisymmetric face round the full circle.
+        Weight times area, of an axisymmetric face round the full circle.
     normal (f, q, dimension) [-]
         Outwards, of length 1; zero where a face has no area.
     """
@@ -56,13 +55,7 @@ class FaceSamples:
 
 
 def face_samples(mesh: Mesh, block: FaceBlock) -> FaceSamples:
-    """Integration points that are exact for products of two shape functions on plane faces.
-
-    Parameters
-    ----------
-    block
-        Faces of one family of this mesh.
-    """
+    """Integration points, exact for products of two shape functions on plane faces."""
     xi, weights = quadrature(block.family, "mass")
     values, slopes = shape_functions(block.family, xi)
     corners = mesh.points[block.connectivity]
@@ -90,8 +83,8 @@ class Port:
     Parameters
     ----------
     pattern (n_dof,) [-]
-        Nodal forces ``b`` of a resultant of 1 N; the displacement of the port is ``b . u``.  The
-        pattern of a contact port is ``G^T lam / P`` of the static contact problem.
+        Nodal forces ``b`` of a resultant of 1 N; of a contact ``G^T lam / P`` of the static
+        contact problem.
     """
 
     name: str
@@ -137,8 +130,8 @@ def surface_port(mesh: Mesh, surface: str | Surface, direction: Direction, *, na
 
     .. math:: b_{id} = \frac{e_d}{A} \int_A N_i \, dA
 
-    integrated over the curved faces (around the full circle of an axisymmetric body), so the
-    displacement is the mean over the area.
+    integrated over the curved faces (the full circle of an axisymmetric body): the displacement is
+    the mean over the area.
 
     Parameters
     ----------
@@ -165,13 +158,9 @@ def pressure_port(mesh: Mesh, surface: str | Surface, *, name: str) -> Port:
     .. math:: b_i = -\frac{1}{R} \int_A N_i \, n \, dA, \qquad
               R = \left| \int_A n \, dA \right|
 
-    Unlike :func:`surface_port`, the load of a cone or a sphere has lateral parts that cancel in the
-    resultant but squeeze the body.  The port points along the resultant (into the material).
-
-    Parameters
-    ----------
-    surface
-        A closed surface has no resultant and is refused.
+    Unlike :func:`surface_port`, the load of a cone or a sphere has lateral parts that squeeze the
+    body. The port points along the resultant (into the material). A closed surface has none and is
+    rejected.
     """
     surface = mesh.surface(surface) if isinstance(surface, str) else surface
     load = np.zeros((mesh.node_count, mesh.dimension))
@@ -193,20 +182,12 @@ def node_set_port(mesh: Mesh, node_set: str, direction: Direction, *, name: str)
     """Port of equal forces on the nodes of a set, resultant 1 N along ``direction``.
 
     For bodies without faces.  Equal weights are no uniform pressure: on quadratic elements corner
-    nodes should carry nothing of it, so take a set of many nodes, or a mesh with faces and
-    :func:`surface_port`.
+    nodes should carry none of it, so take a set of many nodes, or faces and :func:`surface_port`.
 
     Parameters
     ----------
-    mesh
-        With the set among its ``node_sets``.
     direction : "x", "y", "z", or array, shape (dimension,)
         An axisymmetric body takes ``"z"`` only.
-
-    Raises
-    ------
-    InputError
-        For a set that the mesh does not have, or without nodes.
     """
     where = f"port '{name}' on node set '{node_set}'"
     nodes = mesh.node_sets.get(node_set)
@@ -228,12 +209,12 @@ def node_set_port(mesh: Mesh, node_set: str, direction: Direction, *, name: str)
 def node_observer(
     mesh: Mesh, place: int | ArrayLike, direction: Direction, *, name: str
 ) -> Observer:
-    """Displacement of one node, for output only (see the module text: not for loads).
+    """Displacement of one node, for output only.
 
     Parameters
     ----------
     place : int or array, shape (dimension,) [m]
-        Node number, or a point whose nearest node is taken.
+        Number, or a point whose nearest node is taken.
     direction : "x", "y", "z", "r" (axisymmetric), or array, shape (dimension,)
     """
     where = f"observer '{name}'"

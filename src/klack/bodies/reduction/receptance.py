@@ -15,7 +15,7 @@ __all__ = ["Receptance", "frequency_axis", "modal_sum", "observed_receptance", "
 class Receptance:
     """Displacement per force between the ports of a body, harmonic ``exp(+i w t)``.
 
-    Symmetric (reciprocity), and with ``imag <= 0`` on the diagonal (a passive body takes in power).
+    Symmetric (reciprocity), with ``imag <= 0`` on the diagonal (passivity).
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ class Receptance:
     values: NDArray[np.complex128]
 
     def between(self, output: str, source: str) -> NDArray[np.complex128]:
-        """Displacement of port ``output`` per force at port ``source``, shape (n,) [m/N]."""
+        """Displacement of ``output`` per force at ``source``, shape (n,) [m/N]."""
         return self.values[:, self._index(output), self._index(source)]
 
     def drive(self, port: str) -> NDArray[np.complex128]:
@@ -60,13 +60,13 @@ def reduced_receptance(
     frequencies (n,) [Hz]
         Ascending, above zero.
     with_residual
-        Add the residual compliance ``R``, which is what the consistent contact law does in the
-        time domain; with attachment modes it is zero already.
+        Add the residual compliance ``R``, as the consistent contact law does in the time domain;
+        zero with attachment modes.
     loss_factor [-]
-        Replace the viscous damping by the structural one, ``omega_i^2 (1 + i eta)``, as the full
-        order has it; equal at each resonance if ``eta = 2 zeta``.
+        Structural damping ``omega_i^2 (1 + i eta)`` instead of the viscous one, as of the full
+        order; equal at each resonance if ``eta = 2 zeta``.
     label
-        Legend; made from the number of modes and the correction by default.
+        Legend; default: number of modes and correction.
     """
     frequencies = frequency_axis("reduced_receptance: frequencies", frequencies)
     denominator = _denominator(reduced, frequencies, loss_factor)
@@ -84,17 +84,9 @@ def reduced_receptance(
 def observed_receptance(
     reduced: ReducedBody, frequencies: ArrayLike, *, loss_factor: float | None = None
 ) -> NDArray[np.complex128]:
-    """Displacement of the observers of a body per force at its ports: not reciprocal.
+    """Displacement of the observers per force at the ports, shape (n, n_observers, n_ports) [m/N].
 
-    Parameters
-    ----------
-    reduced, frequencies, loss_factor
-        As of :func:`reduced_receptance`.
-
-    Returns
-    -------
-    (n, n_observers, n_ports) [m/N]
-        Of the modes alone.
+    Of the modes alone, not reciprocal; parameters as of :func:`reduced_receptance`.
     """
     axis = frequency_axis("observed_receptance: frequencies", frequencies)
     products = np.einsum("mo,mp->mop", reduced.observer_shapes, reduced.port_shapes)
@@ -129,7 +121,7 @@ def modal_sum(
 
 
 def frequency_axis(where: str, frequencies: ArrayLike) -> NDArray[np.float64]:
-    """Check an axis of frequencies [Hz]: one-dimensional, above zero, ascending."""
+    """Check frequencies [Hz]: one-dimensional, above zero, ascending."""
     axis = np.asarray(frequencies, dtype=float)
     if axis.ndim != 1 or not axis.size or not axis[0] > 0 or not np.all(np.diff(axis) > 0):
         raise InputError(

@@ -1,7 +1,7 @@
-r"""From a finite-element body to a reduced one.
+"""From a finite-element body to a reduced one.
 
-Every reduction computes the static compliance at the ports from the *full* body as well.  What the
-kept modes miss of it must come back in one of two ways, never in both:
+Every reduction also computes the static compliance at the ports of the *full* body. What the kept
+modes miss of it comes back in one of two ways, never in both:
 
 - ``"consistent"``: the modes stay alone, and the local contact law takes exactly the missing
   compliance; nothing is counted twice, for any number of modes (default).
@@ -53,33 +53,24 @@ def reduce_body(
 
     Parameters
     ----------
-    ports
-        At least one.
     correction
         See the module text.
     damping
-        For the elastic and attachment modes; rigid modes stay undamped.
+        Rigid modes stay undamped.
     modes_pool
-        Elastic modes computed before, lowest first without gaps; saves the eigenvalue solution.
-        With :class:`ByFrequency` it must reach that frequency.
+        Known elastic modes, lowest first without gaps; saves the eigenvalue solution. With
+        :class:`ByFrequency` it must reach that frequency.
     flexibility
-        Of the same body; saves the only factorisation that statics and modes need.
+        Of this body; saves the factorisation.
     port_compliance (n_ports, n_ports) [m/N]
-        Static compliance at the ports, where it is known; saves the static solutions, unless
-        attachment modes need them.
-    shifts : sequence of float [(rad/s)^2], optional
-        With ``correction="attachment"``: shifted instead of residual attachment modes, one per
-        port and shift, for example ``(default_shift(pool.omega),)`` or ``shift_at`` of frequencies.
+        Known static compliance; saves the static solutions, unless attachment modes need them.
+    shifts [(rad/s)^2]
+        With ``correction="attachment"``: shifted instead of residual attachment modes, for example
+        ``(default_shift(pool.omega),)`` or ``shift_at`` of frequencies.
     recovery_surfaces
-        Surfaces whose displacement can be recovered from the modes.
+        Whose displacement can be recovered from the modes.
     recovery_nodes
-        Further nodes to recover.
-    backend, threads
-        Of the sparse direct solver.
-
-    Returns
-    -------
-    ReducedBody
+        Further ones to recover.
     """
     patterns = _patterns(body, ports)
     flexibility = flexibility or Flexibility(body, backend=backend, threads=threads)
@@ -128,13 +119,12 @@ def kept_modes(selection: ModeSelection, pool: Modes, patterns: NDArray[np.float
     Parameters
     ----------
     patterns (n_dof, n_ports) [-]
-        Load patterns of the ports.
     """
     return pool.kept(select(selection, pool.omega, at_ports(pool.shapes, patterns)))
 
 
 def at_ports(shapes: NDArray[np.float64], patterns: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Displacement of modes at ports, shape (modes, ports): most nodes have no part in any."""
+    """Displacement of modes at ports, shape (modes, ports); most nodes have no part in any."""
     rows = np.flatnonzero(patterns.any(axis=1))
     return np.asarray(shapes[rows].T @ patterns[rows])
 

@@ -24,28 +24,14 @@ _OTHERS = (MemoryError, RuntimeError, NotImplementedError, KeyError, SyntaxError
 
 
 def write_arrays(path: Path, kind: str, version: int, arrays: Mapping[str, NDArray[Any]]) -> None:
-    """Write arrays to ``path``, all of them or none.
-
-    Parameters
-    ----------
-    kind
-        What the file holds, for example ``"klack.reduced_body"``.
-    arrays
-        Numbers or text.
-    """
+    """Write numbers or text, all or nothing; ``kind`` as ``"klack.reduced_body"``."""
     contents: Arrays = {"format": np.array(kind), "version": np.array(version), **arrays}
     with whole_file(path) as new, new.open("wb") as stream:
         np.savez(stream, **contents)  # type: ignore[arg-type]
 
 
 def read_arrays(path: Path, kind: str, version: int, required: Sequence[str]) -> Arrays:
-    """Read arrays back and check that the file is what it should be.
-
-    Raises
-    ------
-    InputError
-        If the file is missing, truncated, of another kind or newer than this program.
-    """
+    """Read arrays; rejects a file that is truncated, of another kind or newer than klack."""
     where = f"file '{path}'"
     try:
         with path.open("rb") as stream:
@@ -95,7 +81,7 @@ def _check_kind(where: str, arrays: Arrays, kind: str, version: int) -> None:
 
 
 def port_among(known: Sequence[str], name: str, where: str, what: str, hint: str) -> int:
-    """Place of a port among those of a body; raise if it has none of that name."""
+    """Place of a port among those of a body."""
     if name not in known:
         raise InputError(
             f"{where}: port '{name}'",
@@ -113,13 +99,13 @@ class Recovery:
     Parameters
     ----------
     nodes (n,)
-        Node numbers of the full mesh.
+        Of the full mesh.
     points (n, dimension) [m]
     shapes (n * dimension, m) [1/sqrt(kg)]
-        ``u = shapes @ q``, ordered node by node like the degrees of freedom of the mesh.
+        ``u = shapes @ q``, node by node.
     faces (f, 3) or (f, 2)
-        Triangles (solid) or line segments (axisymmetric) in local numbers ``0 .. n-1``, through all
-        nodes, oriented outwards; none when nodes were given instead of surfaces.
+        Triangles or (axisymmetric) line segments in local numbers, through all nodes, oriented
+        outwards; none when nodes were given instead of surfaces.
     """
 
     nodes: NDArray[np.int64]
@@ -129,7 +115,7 @@ class Recovery:
 
 
 def surface_faces(mesh: Mesh, surfaces: Sequence[str]) -> NDArray[np.int64]:
-    """Simplices of some surfaces in node numbers of the mesh, shape (f, dimension)."""
+    """Simplices of surfaces by nodes of the mesh, shape (f, dimension)."""
     blocks = [block for name in surfaces for block in mesh.surface(name).blocks]
     pieces = [simplices(block) for block in blocks]
     empty = np.empty((0, mesh.dimension), dtype=np.int64)
@@ -167,31 +153,29 @@ class ReducedBody:
     .. math:: \ddot q_i + 2 \zeta_i \omega_i \dot q_i + \omega_i^2 q_i = \sum_p \varphi_{ip} F_p,
               \qquad y_p = \sum_i \varphi_{ip} q_i
 
-    Rigid modes come first and have ``omega = 0``.  Input and output share ``port_shapes``, so the
-    body is reciprocal and passive for every set of non-negative damping ratios.
+    Rigid modes come first, with ``omega = 0``. Input and output share ``port_shapes``: the body is
+    reciprocal and, with damping ratios of zero or more, passive.
 
     Parameters
     ----------
     mass [kg]
     omega (m,) [rad/s]
     damping (m,) [-]
-        Viscous ratios ``zeta``.
+        ``zeta``.
     port_shapes (m, n_ports) [1/sqrt(kg)]
         ``phi = V^T b``.
     observer_shapes (m, n_observers) [1/sqrt(kg)]
     static_compliance (n_ports, n_ports) [m/N]
-        Of the *full* body at its ports; of a free body the elastic part only (inertia relief).
+        Of the *full* body; of a free body the elastic part only (inertia relief).
     rigid_axial (rigid_count,) [sqrt(kg)]
-        Modal velocities of a unit axial velocity, ``R^T M e_z``.  The axial velocity of the centre
-        of mass is ``rigid_axial . q'_rigid / mass``; ``rigid_axial . rigid_axial = mass`` for a
-        free body.
+        Modal velocities of a unit axial velocity, ``R^T M e_z``. The centre of mass moves at
+        ``rigid_axial . q'_rigid / mass``; ``rigid_axial . rigid_axial = mass`` for a free body.
     dof_count
-        Degrees of freedom of the full body.
+        Of the full body.
     correction
-        ``"consistent"``: modes only, the local contact law takes :attr:`residual_compliance`;
-        ``"attachment"``: attachment modes are among the modes; ``"none"``.
+        See :mod:`klack.bodies.reduction.reduce`.
     attachment_count
-        How many of the modes come from attachment modes.
+        Attachment modes among the modes.
     """
 
     name: str
@@ -244,29 +228,29 @@ class ReducedBody:
 
     @property
     def frequencies(self) -> NDArray[np.float64]:
-        """Eigenfrequencies [Hz] of all modes, shape (m,); rigid ones are 0."""
+        """Eigenfrequencies [Hz], shape (m,); rigid ones are 0."""
         return self.omega / (2.0 * np.pi)
 
     @property
     def modal_compliance(self) -> NDArray[np.float64]:
-        r"""Static compliance [m/N] that the elastic modes carry, shape (n_ports, n_ports)."""
+        """Static compliance [m/N] of the elastic modes, shape (n_ports, n_ports)."""
         scaled = self.port_shapes[self.rigid_count :] / self.omega[self.rigid_count :, None]
         return scaled.T @ scaled
 
     @property
     def residual_compliance(self) -> NDArray[np.float64]:
-        """Residual compliance [m/N]: static minus modal compliance, shape (n_ports, n_ports)."""
+        """Static minus modal compliance [m/N], shape (n_ports, n_ports)."""
         return self.static_compliance - self.modal_compliance
 
     @property
     def compliance_share(self) -> NDArray[np.float64]:
-        """Share of the static compliance that the modes carry at each port, shape (n_ports,)."""
+        """Share of the static compliance that the modes carry, shape (n_ports,)."""
         return np.diag(self.modal_compliance) / np.diag(self.static_compliance)
 
     def along_axis(self) -> Self:
-        """Return the body with no rigid motion but the shift along its axis, as in a guide.
+        """The body with no rigid motion but the shift along its axis, as in a guide.
 
-        Elastic modes stay as they are; a body that is held stays as it is.
+        A held body stays as it is.
         """
         r, size = self.rigid_count, float(np.linalg.norm(self.rigid_axial))
         if r < 2 or size == 0.0:
@@ -291,13 +275,7 @@ class ReducedBody:
         )
 
     def port_index(self, name: str) -> int:
-        """Column of a port.
-
-        Raises
-        ------
-        InputError
-            If there is none of that name.
-        """
+        """Column of a port."""
         hint = "ports are named when the body is reduced."
         return port_among(self.port_names, name, f"reduced body '{self.name}'", "the body", hint)
 
@@ -307,8 +285,8 @@ class ReducedBody:
         Parameters
         ----------
         with_residual
-            Put :attr:`residual_compliance` into the feedthrough between the ports.  Observers have
-            none: their share of the residual is not known.
+            Put :attr:`residual_compliance` into the feedthrough between the ports; the share of
+            observers is not known.
         """
         m, ports, observers = self.mode_count, len(self.port_names), len(self.observer_names)
         A = np.zeros((2 * m, 2 * m))
@@ -330,7 +308,7 @@ class ReducedBody:
         )
 
     def save(self, path: str | Path) -> None:
-        """Write to a ``.npz`` file (no pickle); the file appears complete or not at all."""
+        """Write to a ``.npz`` file (no pickle), completely or not at all."""
         arrays = {key: np.asarray(getattr(self, key)) for key in (*_ARRAYS, *_NAMES, *_SCALARS)}
         for key in _NAMES:
             arrays[key] = np.array(getattr(self, key), dtype=np.str_)
@@ -341,13 +319,7 @@ class ReducedBody:
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
-        """Read back what :meth:`save` wrote.
-
-        Raises
-        ------
-        InputError
-            If the file is missing, truncated, foreign, or of a newer version.
-        """
+        """Read back what :meth:`save` wrote."""
         required = (*_ARRAYS, *_NAMES, *_SCALARS)
         arrays = read_arrays(Path(path), FORMAT, VERSION, required)
         recovery = None

@@ -1,14 +1,14 @@
 r"""Which elastic modes to keep.
 
-A needle of D4 x L30 mm has 22 elastic modes below 300 kHz, of which only three are longitudinal:
-the lowest modes are seldom those that the contact feels.  :class:`ByParticipation` ranks a computed
-pool by the static compliance that each mode carries at the ports,
+A needle of D4 x L30 mm has 22 elastic modes below 300 kHz, only three of them longitudinal: the
+lowest modes are seldom those that the contact feels. :class:`ByParticipation` ranks a pool by the
+static compliance that each mode carries at the ports,
 
 .. math:: p_i = \sum_p \frac{(\varphi_i^T b_p)^2}{\omega_i^2} \Big/
                 \sum_j \frac{(\varphi_j^T b_p)^2}{\omega_j^2}
 
-and keeps the largest.  Not to be mistaken for the effective mass of earthquake engineering, which
-has no ``1/omega^2`` and belongs to a shaken base.
+and keeps the largest. The effective mass of earthquake engineering, of a shaken base, has no
+``1/omega^2``.
 """
 
 from dataclasses import dataclass
@@ -43,7 +43,7 @@ class ByFrequency:
 
 @dataclass(frozen=True, slots=True)
 class ByParticipation:
-    """The ``count`` modes that carry most of the static compliance, out of the ``pool`` lowest."""
+    """The ``count`` modes with most of the static compliance, of the ``pool`` lowest."""
 
     count: int
     pool: int
@@ -65,19 +65,14 @@ ModeSelection = ByCount | ByFrequency | ByParticipation
 def participation(
     omega: NDArray[np.float64], port_shapes: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Share of the pool's static compliance that each mode carries, summed over the ports.
+    """Share of the pool's static compliance in each mode, summed over the ports, shape (m,).
 
     Parameters
     ----------
     omega (m,) [rad/s]
-        Elastic modes only, all above zero.
+        Elastic only, above zero.
     port_shapes (m, n_ports) [1/sqrt(kg)]
-        Modal amplitudes ``phi^T b`` of a pool of mass-normalised modes.
-
-    Returns
-    -------
-    (m,) [-]
-        Sums to the number of ports that any mode moves.
+        ``phi^T b`` of mass-normalised modes.
 
     Examples
     --------
@@ -97,7 +92,7 @@ def select(
     Parameters
     ----------
     omega (m,) [rad/s]
-        Of the pool, ascending.
+        Ascending.
     port_shapes (m, n_ports) [1/sqrt(kg)]
     """
     if isinstance(selection, ByFrequency):

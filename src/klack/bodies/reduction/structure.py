@@ -42,24 +42,21 @@ class Structure:
     .. math:: \ddot q_i + 2 \zeta_i \omega_i \dot q_i + \omega_i^2 q_i = \sum_p \varphi_{ip} F_p,
               \qquad u_n(x) = \sum_i n \cdot \phi_i(x)\, q_i + \sum_p r_p(x) F_p
 
-    ``m`` modes, ``p`` ports, ``g`` groups of the surface, ``f`` faces, ``k`` points.  Surface
-    integrals know ``b = m + p + 1`` fields in this order: the modes, the static rests ``r_p`` of
-    the ports, and a unit axial motion of the whole body.
+    ``m`` modes, ``p`` ports, ``g`` groups of the surface, ``f`` faces, ``k`` points. Surface
+    integrals have ``b = m + p + 1`` fields in this order: modes, static rests ``r_p`` of the
+    ports, and a unit axial motion of the whole body.
 
     Parameters
     ----------
-    name
-        Of the body.
     mass [kg]
     dimension
-        2: axisymmetric, in the meridian plane; areas are those of the full rings.
+        2: axisymmetric; areas are those of full rings.
     omega (m,) [rad/s]
     damping (m,) [-]
     port_stops
-        Stop whose force acts at each port; empty for ports of other components.
+        Stop that acts at each port; empty for ports of other components.
     port_signs (p,) [-]
-        Force at the port, along +z, for a force above zero of its stop: +1 on the upper body of
-        the stop, -1 on the lower one.
+        As :class:`StructurePort`.
     port_shapes (m, p) [1/sqrt(kg)]
     static_compliance (p, p) [m/N]
         Of the full body.
@@ -69,22 +66,21 @@ class Structure:
         Named surfaces that meet the air.
     group_area (g,) [m^2]
     group_gram (g, b, b) [m^2/kg for two modes]
-        ``int (n . u_i)(n . u_j) dA`` of two fields over each group, by the quadrature of the
-        elements; symmetric.
+        ``int (n . u_i)(n . u_j) dA`` over each group, by the quadrature of the elements.
     group_volume (g, b) [m^2/sqrt(kg) for a mode]
-        ``int n . u_i dA``: volume displaced per displacement of a field.
+        ``int n . u_i dA``: volume per displacement of a field.
     points (k, dimension) [m]
         Corners of the faces; (r, z) or (x, y, z).
     faces (f, 2), (f, 3) or (f, 4)
-        Element faces by their corners; a triangle repeats its last corner among quadrangles.
+        By corners; a triangle repeats its last one among quadrangles.
     face_group (f,)
     face_area (f,) [m^2]
-    face_shapes : float32 array, shape (f, m) [1/sqrt(kg)]
-        Mean of ``n . phi_i`` over each face, n outwards.
-    face_residual : float32 array, shape (f, p) [m/N]
-        Static normal displacement of each face per force at each port, less the share of the modes.
+    face_shapes (f, m) [1/sqrt(kg)]
+        Mean of ``n . phi_i``, n outwards.
+    face_residual (f, p) [m/N]
+        Static normal displacement per force at each port, less the share of the modes.
     axial_normals (f,) [-]
-        Mean axial component of the outward normal: what the face sees of a rigid axial motion.
+        Mean axial component of the outward normal.
     """
 
     name: str
@@ -112,7 +108,7 @@ class Structure:
 
     @property
     def highest_frequency(self) -> float:
-        """Highest kept mode [Hz]: above it the response is that of the static rest alone."""
+        """Highest kept mode [Hz]; above it only the static rest responds."""
         return float(self.omega.max() / (2.0 * np.pi)) if self.omega.size else 0.0
 
     @property
@@ -122,13 +118,7 @@ class Structure:
         return self.static_compliance - scaled.T @ scaled
 
     def port_index(self, name: str) -> int:
-        """Column of a port.
-
-        Raises
-        ------
-        InputError
-            If there is none of that name.
-        """
+        """Column of a port."""
         hint = "a contact port is named like its surface; of klack impact 'contact'."
         return port_among(self.port_names, name, f"body '{self.name}'", "the body", hint)
 
@@ -151,9 +141,10 @@ class StructurePort:
     port
         Resultant 1 N along +z.
     stop
-        Stop whose force acts here; empty for a port of another component.
+        Empty for a port of another component.
     sign [-]
-        Force along +z for a force above zero of the stop: +1 on its upper body, -1 on the lower.
+        Force at the port, along +z, for a force above zero of its stop: +1 on the upper body of
+        the stop, -1 on the lower one.
     """
 
     port: Port
@@ -175,27 +166,19 @@ def build_structure(
 
     .. math:: r_p = K^{-1} b_p - \sum_i \frac{\varphi_i\,\varphi_i^T b_p}{\omega_i^2}
 
-    is the static rest that the modes miss (Craig & Kurdila 2006, ch. 17).  Surface integrals use
-    the quadrature of the element faces, exact for the elements' own fields on plane faces; a face
-    that stands in several surfaces counts in the first.
+    is the static rest that the modes miss (Craig & Kurdila 2006, ch. 17). Surface integrals are
+    exact for the elements' fields on plane faces; a face in several surfaces counts in the first.
+
+    Rejects a free body, whose modes do not tell how it moves as a whole.
 
     Parameters
     ----------
-    body
-        Held.
-    modes
-        Kept ones, with full shapes.
     deflections (n_dof, p) [m/N]
-        Static solutions ``K^-1 b`` of the ports.
+        ``K^-1 b`` of the ports.
     surfaces
-        Named surfaces of the mesh that meet the air; those without area (an axis) fall away.
+        That meet the air; those without area (an axis) are dropped.
     left_out
-        Surfaces whose faces never count, whatever other surface they stand in.
-
-    Raises
-    ------
-    InputError
-        For a free body: it moves as a whole, and its modes do not tell how.
+        Whose faces never count, whatever other surface they are in.
     """
     if not body.is_fixed:
         raise InputError(
@@ -243,7 +226,7 @@ def build_structure(
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Part:
-    """Faces of one family: their corners, areas (f,), and mean normal motion (f, b)."""
+    """Faces of one family: corners, areas (f,), mean normal motion (f, b)."""
 
     corners: NDArray[np.int64]
     area: NDArray[np.float64]
@@ -317,7 +300,7 @@ def _keys(block: FaceBlock) -> Iterable[tuple[int, ...]]:
 def _sampled(
     body: ElasticBody, block: FaceBlock, fields: NDArray[np.float64]
 ) -> tuple[_Part, NDArray[np.float64], NDArray[np.float64]]:
-    """Sample the normal motion of all fields (f q, b) and its weights (f q,) on some faces."""
+    """Normal motion of all fields (f q, b) and its weights (f q,) on some faces."""
     at = face_samples(body.mesh, block)
     area = at.area.sum(axis=1)
     kept = area > _NO_AREA * float(np.max(np.ptp(body.mesh.points, axis=0))) ** 2
@@ -335,7 +318,7 @@ def _sampled(
 def _faces(
     parts: Sequence[_Part], body: ElasticBody
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Faces by their corners, all of one width, in numbers of the points that they use."""
+    """Faces by corners, all of one width, and the points that they use."""
     width = max((part.corners.shape[1] for part in parts), default=body.dimension)
     padded = [
         np.pad(part.corners, ((0, 0), (0, width - part.corners.shape[1])), mode="edge")

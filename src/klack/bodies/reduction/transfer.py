@@ -1,8 +1,7 @@
-r"""Frequency limit of a reduced body: its receptance against that of the full body.
+"""Frequency limit of a reduced body: its receptance against that of the full body.
 
-The deviation is taken in decibels, point by point, ``20 log10 |G_reduced / G_full|``, and its
-magnitude is then averaged over a sliding window of one-third octave (equal weight per logarithmic
-frequency):
+The magnitude of the deviation in decibels, ``20 log10 |G_reduced / G_full|``, is averaged over a
+sliding window of one-third octave (equal weight per logarithmic frequency):
 
 - A point-wise limit would be decided by antiresonances, where a shift of a fraction of a per cent
   gives tens of decibels over a negligible share of the band.
@@ -11,10 +10,8 @@ frequency):
 - The mean *magnitude* of the level difference counts resonances, antiresonances and everything
   between by the share of the band that they spoil.
 
-``valid_up_to`` is the frequency up to which this mean stays within the tolerance everywhere.  The
-damping is structural with a declared loss factor, equal for full and reduced, so that every peak
-and notch is finite; the axis should have at least two points per half-power bandwidth
-(``ln 2 / eta`` per octave and more).
+Both have the same declared loss factor, so that every peak and notch is finite; the axis should
+have at least two points per half-power bandwidth (``ln 2 / eta`` per octave and more).
 """
 
 from collections.abc import Mapping, Sequence
@@ -42,19 +39,19 @@ class TransferComparison:
     Parameters
     ----------
     frequencies (n,) [Hz]
-    labels : tuple of str, length k
+    labels, k
     curves (k, n) [m/N]
     level_deviations (k, n) [dB]
-        Point by point, against the first curve.
+        Against the first curve.
     mean_deviations (k, n) [dB]
-        Magnitude, averaged over a sliding window of one-third octave.
+        Of the magnitude, over one-third octave.
     tolerance [dB]
     valid_up_to (k,) [Hz]
-        Highest frequency below which the mean deviation stays within the tolerance; 0 if it never
-        does, the top of the axis if it always does.
+        Frequency below which the mean deviation stays within the tolerance; 0 if it never does,
+        the top of the axis if it always does.
     loss_factor [-]
     reference_note
-        What the reference is and how well it was verified.
+        What the reference is and how it was verified.
     """
 
     body: str
@@ -80,16 +77,7 @@ def compare_receptances(
     reference_note: str,
     tolerance: float = 1.0,
 ) -> TransferComparison:
-    """Lay receptances of reduced bodies over that of the full one.
-
-    Parameters
-    ----------
-    candidates
-        On the same frequency axis.
-    loss_factor [-]
-        With which all of them were computed.
-    tolerance [dB]
-    """
+    """Compare receptances of reduced bodies with that of the full one, on one axis."""
     for candidate in candidates:
         if not np.array_equal(candidate.frequencies, reference.frequencies):
             raise InputError(
@@ -119,14 +107,14 @@ def compare_curves(
     reference_note: str,
     tolerance: float = 1.0,
 ) -> TransferComparison:
-    """Lay transfer functions over the first of them; see :func:`compare_receptances`.
+    """Compare transfer functions with the first of them.
 
     Parameters
     ----------
     frequencies (n,) [Hz]
-    curves : mapping of label to complex array, shape (n,) [m/N]
-    body, port, loss_factor, reference_note, tolerance
-        As there.
+    curves
+        By label, shape (n,) [m/N].
+    tolerance [dB]
     """
     require_positive("compare_curves: tolerance", tolerance, "dB")
     values = np.array(list(curves.values()))
@@ -150,19 +138,13 @@ def compare_curves(
 def mean_level_deviation(
     frequencies: NDArray[np.float64], level: NDArray[np.float64], octaves: float = 1.0 / 3.0
 ) -> NDArray[np.float64]:
-    """Magnitude of a level difference, averaged over a sliding window of log frequency.
+    """Magnitude of a level difference over a sliding window of log frequency, shape (n,) [dB].
 
     Parameters
     ----------
-    frequencies (n,) [Hz]
-        At least two.
     level (n,) [dB]
     octaves
-        Width of the window; at the ends of the axis it is cut, not shifted.
-
-    Returns
-    -------
-    array, shape (n,) [dB]
+        Window; at the ends of the axis it is cut, not shifted.
 
     Examples
     --------
