@@ -1,21 +1,20 @@
 r"""Rough faces: a layer of asperities on every contact point, whose pressure rises with closure.
 
 Greenwood & Williamson (Proc. R. Soc. A 295 (1966) 300): spherical summits of radius :math:`\beta`
-and density :math:`\eta`, heights normal with the deviation :math:`\sigma`, each pressed elastically
-as by Hertz and independent of its neighbours.  At the separation d of the mean planes of summits
+and density :math:`\eta`, heights normal with the deviation :math:`\sigma`, each pressed as by
+Hertz, independent of its neighbours. At the separation d of the mean planes of summits
 
 .. math:: p = \tfrac43 (\eta\beta\sigma)\, E^* \sqrt{\sigma/\beta}\; F_{3/2}(d/\sigma), \qquad
     F_{3/2}(h) = \frac{1}{\sqrt{2\pi}} \int_h^\infty (s - h)^{3/2} e^{-s^2/2}\, ds .
 
-The closure c counts from the highest summits, 4 sigma above the mean, where the pressure begins.
-The layer is elastic: closing and opening take one curve, and its energy is
+The closure c counts from the highest summits, 4 sigma above the mean. The layer is elastic, its
+energy
 
 .. math:: U = \sum_k A_k \int_0^{c_k} p\, dc .
 
 With :math:`c_k = \max(-g_k, 0)` the gap of a point is negative by the closure of its layer, and
-the forces :math:`\lambda_k = A_k\, p(c_k)` need no complementarity: they are zero on open points by
-themselves.  :func:`press` solves for them.  Limits: summits that yield do so in the first contacts;
-their real area stays small against the face, p << E* sqrt(sigma/beta).
+the forces :math:`\lambda_k = A_k\, p(c_k)` need no complementarity. Limits: summits that yield do
+so in the first contacts; their real area stays small against the face, p << E* sqrt(sigma/beta).
 """
 
 from dataclasses import dataclass
@@ -71,7 +70,7 @@ class AsperityLayer:
         rms [m]
             sigma, of the heights of both faces together.
         radius [m]
-            beta, of the summits.
+            beta.
         density [-]
             eta beta sigma.
         modulus [Pa]
@@ -83,7 +82,7 @@ class AsperityLayer:
         return cls(closure=rms * (_HIGHEST - separation), pressure=scale * (shape - shape[0]))
 
     def state(self, closure: Floats) -> tuple[Floats, Floats, Floats]:
-        """Pressure [Pa], its slope [Pa/m] and energy per area [J/m^2] at closures, shape (n,)."""
+        """Pressure [Pa], slope [Pa/m] and energy [J/m^2] at closures, shape (n,)."""
         at = np.clip(np.searchsorted(self.closure, closure, "right") - 1, 0, len(self.closure) - 2)
         start = self.closure[at]
         slope = np.diff(self.pressure)[at] / np.diff(self.closure)[at]
@@ -96,18 +95,12 @@ class AsperityLayer:
         return tuple(np.where(is_closed, one, 0.0) for one in (pressure, slope, energy))  # type: ignore[return-value]
 
     def mean_pressure(self, closure: Floats, before: Floats) -> tuple[Floats, Floats]:
-        """Pressure whose work from one closure to the next is the change of energy, and its slope.
+        """Pressure [Pa] whose work over a step is the change of energy, and its slope [Pa/m].
 
         Parameters
         ----------
         closure, before (n,) [m]
-            At the end and at the start of a step; below 0 where open.
-
-        Returns
-        -------
-        pressure (n,) [Pa]
-        slope (n,) [Pa/m]
-            Over ``closure``.
+            At the end and the start of the step; below 0 where open.
         """
         moved = closure - before
         tiny = np.abs(moved) < 1e-7 * self.closure[-1]
@@ -137,9 +130,10 @@ def press(
     before: Floats | None = None,
     start: Floats | None = None,
 ) -> tuple[Floats, Floats]:
-    """Forces and gaps of points with a layer.
+    """Forces (n,) [N] and gaps (n,) [m] of points with a layer; gaps negative by the closure.
 
-    Newton's method on :math:`g = q + C A p(-g)`, a monotone equation, halved where it goes too far.
+    Newton's method on :math:`g = q + C A p(-g)`, a monotone equation, halved where it goes too
+    far.
 
     Parameters
     ----------
@@ -149,15 +143,9 @@ def press(
     q (n,) [m]
         Gaps without forces.
     before (n,) [m]
-        Gaps at the start of a step: the forces then are those whose work is the change of energy.
+        Gaps at the start of a step: forces then do the change of energy as work.
     start (n,) [m]
         First guess of the gaps.
-
-    Returns
-    -------
-    force (n,) [N]
-    gap (n,) [m]
-        Negative by the closure where the layer is pressed.
     """
 
     def missed(gap: Floats) -> tuple[Floats, Floats, Floats]:

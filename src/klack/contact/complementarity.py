@@ -4,11 +4,11 @@ The unknown multipliers obey the linear complementarity problem
 
 .. math:: \lambda \ge 0, \qquad g = q + A \lambda \ge 0, \qquad \lambda^T g = 0
 
-with a symmetric positive definite compliance ``A``.  It is solved by guessing the active set:
-solve :math:`A_{aa} \lambda_a = -q_a`, then flip every point that pulls or penetrates (the
-primal-dual active set of Hintermueller, Ito & Kunisch 2002).  That settles in a few rounds but is
-not proven to; when the number of wrong points stops falling, and always after 100 rounds, only the
-last one is flipped, which ends for every positive definite matrix (Murty 1974).
+with a symmetric positive definite compliance ``A``: solve :math:`A_{aa} \lambda_a = -q_a` on a
+guessed active set, then flip every point that pulls or penetrates (primal-dual active set,
+Hintermueller, Ito & Kunisch 2002). That settles in a few rounds but is not proven to; when the
+number of wrong points stops falling, and always after 100 rounds, only the last one is flipped,
+which ends for every such matrix (Murty 1974).
 """
 
 from collections import deque
@@ -22,24 +22,24 @@ from klack.errors import ConvergenceError, InputError
 __all__ = ["ComplementaritySolver", "solve_lcp"]
 
 _MEMORY = 8
-"""Rounds over which the number of wrong points has to fall."""
+"""Rounds in which the number of wrong points has to fall."""
 
 
 _FAST_ROUNDS = 100
-"""Rounds after which points are flipped one by one only."""
+"""Rounds after which points are flipped one by one."""
 
 
 class ComplementaritySolver:
     """Solves the problem again and again for one matrix and slowly changing gaps.
 
-    The Cholesky factor of the last active block is kept: in a time loop the active set changes
-    only every few steps, and a round then costs two triangular solves.  Points that join or leave
-    in the reverse order cost their own rows of it.
+    The Cholesky factor of the last active block is kept: while the active set stays, a round costs
+    two triangular solves. Points that join, or leave in the reverse order, cost their own rows of
+    it.
 
     Parameters
     ----------
     A (n, n) [m/N]
-        Symmetric positive definite compliance.  It is copied.
+        Copied.
     """
 
     def __init__(self, A: NDArray[np.float64]) -> None:
@@ -62,28 +62,17 @@ class ComplementaritySolver:
     def solve(
         self, q: NDArray[np.float64], active: NDArray[np.bool_] | None = None
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_], int]:
-        """Pressures for one set of gaps.
+        """Forces, points that carry, and rounds (active sets tried) for one set of gaps.
+
+        Raises :class:`~klack.errors.ConvergenceError` if no active set is found, or A is not
+        positive definite on one.
 
         Parameters
         ----------
         q (n,) [m]
             Gaps without contact forces.
         active (n,)
-            First guess; without it the points with q < 0.
-
-        Returns
-        -------
-        lam (n,) [N]
-            Not below zero.
-        active (n,)
-            Points that carry, the guess for the next call.
-        rounds : int
-            Active sets tried.
-
-        Raises
-        ------
-        ConvergenceError
-            When no active set is found, or A is not positive definite on one of them.
+            First guess, such as the last result; default: points with q < 0.
         """
         q = np.asarray(q, dtype=float)
         active = q < 0 if active is None else np.array(active, dtype=bool)
@@ -115,7 +104,7 @@ class ComplementaritySolver:
         )
 
     def _forces(self, q: NDArray[np.float64], active: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """Return the forces that close the active gaps, in the order of the active points."""
+        """Forces that close the active gaps, in the order of the active points."""
         if not np.array_equal(active, self._set):
             self._factorise(q, active)
         if not len(self._active):
@@ -124,10 +113,10 @@ class ComplementaritySolver:
         return forces
 
     def _factorise(self, q: NDArray[np.float64], active: NDArray[np.bool_]) -> None:
-        """Factorise the active block; points stand in the order in which they became active.
+        """Factorise the active block, points in the order in which they became active.
 
-        Of those that become so at once the deepest comes first.  What precedes the first point
-        that left is kept: a contact that grows or shrinks costs the points at its border.
+        Of those that become so at once the deepest comes first. What precedes the first point that
+        left is kept: a contact that grows or shrinks costs the points at its border.
         """
         order, columns = self._active, self._columns
         left = np.flatnonzero(~active[order])
@@ -148,18 +137,11 @@ class ComplementaritySolver:
 def _bordered(
     known: NDArray[np.float64], beside: NDArray[np.float64], corner: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    r"""Lower Cholesky factor of a block with further points; what is above its diagonal is void.
+    r"""Lower Cholesky factor of a block with further points; above its diagonal void.
 
     .. math:: L_{21} = A_{21} L_{11}^{-T}, \qquad L_{22} L_{22}^T = A_{22} - L_{21} L_{21}^T
 
-    Parameters
-    ----------
-    known (k, k)
-        :math:`L_{11}`.
-    beside (k, m)
-        :math:`A_{12}`.
-    corner (m, m)
-        :math:`A_{22}`.
+    The arguments are :math:`L_{11}`, :math:`A_{12}` and :math:`A_{22}`.
     """
     if not len(corner):
         return known
@@ -183,22 +165,7 @@ def _bordered(
 def solve_lcp(
     A: NDArray[np.float64], q: NDArray[np.float64], active: NDArray[np.bool_] | None = None
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_], int]:
-    """One complementarity problem; :class:`ComplementaritySolver` is faster for a sequence.
-
-    Parameters
-    ----------
-    A (n, n) [m/N]
-        Symmetric positive definite compliance.
-    q (n,) [m]
-        Gaps without contact forces.
-    active (n,)
-        First guess.
-
-    Returns
-    -------
-    lam (n,) [N]
-    active (n,)
-    rounds : int
+    """One complementarity problem; results as :meth:`ComplementaritySolver.solve`.
 
     Examples
     --------

@@ -1,15 +1,15 @@
 r"""Form of two faces that are drawn plane: crown, waviness and tilt, together as one axial height.
 
-Real end faces are flat to a fraction of a micrometre, and that decides how fast the force of an
-impact rises.  The deviation of both faces together is a height along z that opens the gaps,
+Flatness, a fraction of a micrometre, decides how fast the force of an impact rises. The deviation
+of both faces together is a height along z that opens the gaps,
 
 .. math:: f = h \frac{r^2}{R^2} + a \left[1 - \cos\left(\frac{2 \pi s}{\lambda} + \phi\right)\right]
     + (R + t) \tan \alpha
 
-with r the distance from the centre of the face, R that of its outermost point, s along the waves (r
-for waves round the centre) and t the coordinate towards which a tilted face opens.  A gap is taken
-along the normal n of the slave face, so it grows by :math:`f |n_z|`.  Meshes, compliances and modes
-stay those of the drawing: good for slopes far below 1, and :data:`STEEPEST` is the limit.
+with r the distance from the centre of the face, R that of its outermost point, s along the waves
+(r for waves round the centre) and t the coordinate towards which a tilted face opens. A gap along
+the normal n of the slave face grows by :math:`f |n_z|`. Meshes, compliances and modes stay those
+of the drawing: good for slopes far below 1, at most :data:`STEEPEST`.
 
 A crown on one of two plane faces is a sphere of radius :math:`R^2 / (2 h)` (Johnson, Contact
 Mechanics, 1985, section 4.1) as long as the contact stays away from the edge.
@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 __all__ = ["STEEPEST", "FaceForm", "Waves"]
 
 STEEPEST = 0.1
-"""Slope [-] up to which a form may be put on the faces of a mesh; normals turn by as much."""
+"""Largest slope [-] of a form; normals turn by as much."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,7 +34,7 @@ class Waves:
     Parameters
     ----------
     amplitude [m]
-        Half of the height from valley to crest.
+        Half the height from valley to crest.
     length [m]
         From crest to crest.
     direction [rad]
@@ -62,11 +62,11 @@ class FaceForm:
     Parameters
     ----------
     centre [m]
-        x and y of the centre of the face; 0 and 0 in the meridian plane.
+        x and y; 0 and 0 in the meridian plane.
     radius [m]
-        R, from the centre to the outermost point of the face.
+        R.
     crown [m]
-        h, height of the centre above the edge.
+        h, centre above edge.
     tilt [rad]
         alpha, between the two faces.
     tilt_direction [rad]
@@ -81,7 +81,7 @@ class FaceForm:
     tilt_direction: float = 0.0
 
     def heights(self, position: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Axial heights f [m], shape (n,), at positions of shape (n, 3), or (n, 2) as (r, z)."""
+        """Axial heights f [m], shape (n,), at positions (n, 3), or (n, 2) as (r, z)."""
         x = position[:, 0] - self.centre[0]
         y = position[:, 1] - self.centre[1] if position.shape[1] == 3 else np.zeros(len(x))
         r = np.hypot(x, y)
@@ -99,5 +99,5 @@ class FaceForm:
     def gaps(
         self, position: NDArray[np.float64], normal: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Growth of the gaps [m] at points of the slave face with these normals, shape (n,)."""
+        """Growth of the gaps [m] at points of the slave face, shape (n,)."""
         return self.heights(position) * np.abs(normal[:, -1])

@@ -21,8 +21,7 @@ class FaceFriction:
     Parameters
     ----------
     T_a, T_b (ways nc, dofs of a), (ways nc, dofs of b) [-]
-        Displacement of a past b, ``T_a u_a + T_b u_b``: all points in the first direction, then in
-        the second one (:func:`klack.contact.mortar.tangent_rows`).
+        As of :func:`klack.contact.mortar.tangent_rows`.
     """
 
     law: Friction
@@ -39,7 +38,7 @@ class FaceFriction:
         mesh_b: Mesh,
         surface_b: Surface,
     ) -> Self | None:
-        """Friction of two surfaces as of :meth:`on`; None where they have none."""
+        """As :meth:`on`; None without friction."""
         return None if law.is_none else cls.on(law, space, mesh_a, surface_a, mesh_b, surface_b)
 
     @classmethod
@@ -52,24 +51,18 @@ class FaceFriction:
         mesh_b: Mesh,
         surface_b: Surface,
     ) -> Self:
-        """Tangential rows of the contact points ``space`` of two surfaces, even without friction.
-
-        Parameters
-        ----------
-        mesh_a, surface_a, mesh_b, surface_b
-            As given to :func:`klack.contact.mortar.contact_space`.
-        """
+        """Tangential rows of the contact points of two surfaces, even without friction."""
         T_a, T_b = tangent_rows(space, mesh_a, surface_a, mesh_b, surface_b)
         return cls(law=law, T_a=T_a, T_b=T_b)
 
 
 def lifted_offset(rows: csr_array, dimension: int) -> NDArray[np.float64]:
-    """Change of the tangential offsets per translation of one body along +z, shape (ways nc,) [-].
+    """Change of tangential offsets per translation of one body along +z, shape (ways nc,) [-].
 
     Parameters
     ----------
-    rows (ways nc, dofs of the body)
-        ``T_a`` or ``T_b`` of :class:`FaceFriction`.
+    rows
+        ``T_a`` or ``T_b``.
     """
     along = np.zeros(rows.shape[1])
     along[dimension - 1 :: dimension] = 1.0
@@ -77,13 +70,9 @@ def lifted_offset(rows: csr_array, dimension: int) -> NDArray[np.float64]:
 
 
 def with_still_directions(C: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Compliance in which directions that cannot move have the mean one, without coupling.
+    """Compliance (m, m) [m/N] in which directions that cannot move have the mean one, uncoupled.
 
-    They never slip, and so never carry a force: the law stays solvable, and no answer changes.
-
-    Parameters
-    ----------
-    C (m, m) [m/N]
+    They never slip or carry a force: the law stays solvable, and no answer changes.
     """
     own = np.diag(C)
     still = own == 0.0

@@ -1,18 +1,17 @@
-r"""Coulomb friction of two faces: how much a pressed point can hold across its normal.
+r"""Coulomb friction of two faces.
 
-A point pressed by :math:`\lambda_n` holds at most :math:`\mu \lambda_n` across its normal: it
-sticks below, and slips against that force.  The coefficient falls with the speed *v* of slip from
-the static to the kinetic value (Stribeck's curve, in the form of Bo & Pavelescu, Wear 82 (1982)
-277, with exponent 1),
+A point pressed by :math:`\lambda_n` holds at most :math:`\mu \lambda_n` across its normal, and
+slips against that force. The coefficient falls with the speed *v* of slip (Stribeck's curve in the
+form of Bo & Pavelescu, Wear 82 (1982) 277, with exponent 1),
 
 .. math:: \mu(v) = \mu_k + (\mu_s - \mu_k)\, e^{-v / v_s} ,
 
 and at once for :math:`v_s = 0`: a point that has stuck (or just closed) holds
 :math:`\mu_s \lambda_n`, one that slips :math:`\mu_k \lambda_n`.
 
-Both refinements are of little weight in impacts.  A face of a fast valve slips at 0.1 to 1 m/s
-within the first microsecond, far above the millimetres per second at which an oil film is
-squeezed out, and a film takes longer to follow than the contact lasts: :math:`\mu_k` decides.
+In impacts :math:`\mu_k` decides: a face of a fast valve slips at 0.1 to 1 m/s within the first
+microsecond, far above the millimetres per second at which an oil film is squeezed out, and a film
+takes longer to follow than the contact lasts.
 """
 
 from dataclasses import dataclass
@@ -26,7 +25,7 @@ from klack.errors import InputError, require_nonnegative
 __all__ = ["MOST_FRICTION", "Friction"]
 
 MOST_FRICTION = 2.0
-"""Largest coefficient that a case may give; dry clean metals reach 1."""
+"""Largest coefficient of a case; dry clean metals reach 1."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,14 +37,9 @@ class Friction:
     kinetic [-]
         While the faces slip.
     static [-]
-        While they stick, at least ``kinetic``.
+        While they stick; at least ``kinetic``.
     speed [m/s]
-        Speed of slip over which the static value fades to the kinetic one; 0: at once.
-
-    Raises
-    ------
-    InputError
-        For negative values, or a static coefficient below the kinetic one.
+        v_s; 0: at once.
     """
 
     kinetic: float
@@ -65,16 +59,13 @@ class Friction:
 
     @classmethod
     def coulomb(cls, coefficient: float) -> Self:
-        """One coefficient, whether the faces stick or slip."""
+        """One coefficient for sticking and slipping."""
         return cls(kinetic=coefficient, static=coefficient)
 
     def scaled(self, kinetic: float) -> "Friction":
         """Faces of another kinetic coefficient [-], the static one in the same ratio to it.
 
-        Raises
-        ------
-        InputError
-            Where the ratio is not known: for a kinetic coefficient of 0 below a static one.
+        Rejects a kinetic coefficient of 0 below a static one, whose ratio is not known.
         """
         if kinetic == self.kinetic:
             return self

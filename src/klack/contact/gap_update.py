@@ -1,28 +1,26 @@
 r"""Gaps of the same contact points after one body has been moved rigidly, on the curved faces.
 
 The hats keep their points and weights W; only where the normals of the slave meet the master
-changes.  A gap does not notice a motion of both bodies together, so the lines are carried into the
-frame of the unmoved master:
+changes. The lines are carried into the frame of the unmoved master:
 
 .. math:: x' = R (x - c) + c + t \;\;(\text{slave moves}), \qquad
     x' = R^T (x - c - t) + c \;\;(\text{master moves}), \qquad
     g_k = \frac{\sum_p W_{kp}\, g(x'_p, n'_p)}{\sum_p W_{kp}} .
 
-To first order this is :math:`g_0 + G_a u_a`.  The difference is of the second order in the motion
-over the radius of curvature: a body that comes back one micrometre aside of where it left meets
-gaps that are wrong by a nanometre in first order, one that comes back ten aside by a hundred.
+To first order this is :math:`g_0 + G_a u_a`; the error is of second order in the motion over the
+radius of curvature: a body that returns one micrometre aside meets gaps that are wrong by a
+nanometre in first order, ten aside by a hundred.
 
 Gaps round a ring after a body of revolution has left its axis, on the curved surfaces.
 
-The hats of the half section (:mod:`klack.contact.mortar`) stand at equal angles of the ring.  Their
-lines are carried into the frame of the other body, whose surface is the revolved meridian.  A line
-:math:`x + s n` has the radius :math:`\rho(s) = |(x + s n)_\perp|`; in the half plane
-:math:`(\rho, z)` it is a curve, and where it meets the meridian is found with its tangent,
+The hats of the half section (:mod:`klack.contact.mortar`) stand at equal angles of the ring; the
+other surface is a revolved meridian. A line :math:`x + s n` has the radius :math:`\rho(s) = |(x +
+s n)_\perp|`, a curve in the half plane :math:`(\rho, z)`, and meets the meridian by its tangent,
 
 .. math:: \frac{d \rho}{d s} = \frac{(x + s n)_\perp \cdot n_\perp}{\rho} ,
 
-from where it stands, again and again: the curve bends by the square of the small angle between the
-line and the plane, so that two or three rounds are exact.
+iterated: the curve bends by the square of the small angle between line and plane, so that two or
+three rounds are exact.
 """
 
 from dataclasses import dataclass, replace
@@ -52,12 +50,12 @@ _LISTED_WITHIN = 10.0  # reaches by which a line may move while its list of face
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ListedFaces:
-    """Faces of the master side, and which of them are near each line of the slave side.
+    """Faces of the master side, and which are near each line of the slave side.
 
     Parameters
     ----------
     first, listed
-        Faces near each line, up to a motion of ``within`` [m].
+        Up to a motion of ``within``, as :func:`klack.contact.ray_cutting.list_near`.
     within [m]
     """
 
@@ -70,7 +68,7 @@ class ListedFaces:
     def of(
         cls, master: tuple[Mesh, Surface], position: Floats, normal: Floats, reach: float
     ) -> Self:
-        """Those near lines from contact points of this reach [m]."""
+        """Faces near lines from contact points of this reach [m]."""
         faces, within = curved_faces(*master), _LISTED_WITHIN * reach
         met, _, _ = cut_nearest(position, normal, faces)
         first, listed = list_near(position, normal, met, faces, within)
@@ -98,7 +96,7 @@ def slave_and_master(
 def carried(
     position: Floats, normal: Floats, placement: Floats, centre: Floats, *, slave_moves: bool
 ) -> tuple[Floats, Floats]:
-    """Lines of the slave side in the frame of the master, at a rigid placement of body a."""
+    """Lines of the slave side in the frame of the master, body a being placed."""
     shift, R = np.asarray(placement[:3]), rotation_matrix(placement[3:])
     arm = position - centre
     if slave_moves:
@@ -119,21 +117,18 @@ def mean_gaps(weight: csr_array, gap: Floats, form: Floats, away: float) -> Floa
 class RingGaps:
     """Gaps at points on rings as a function of the rigid placement of body a.
 
+    Fields as of :class:`RigidGaps`.
+
     Parameters
     ----------
     hats
         On the half section of the slave side.
     angle (n,) [rad]
     near
-        Of the half section of the other side, for each point at each angle.
+        Of the other half section, for each point at each angle.
     centre (3,) [m]
-        Point that a rotation leaves in place.
-    slave_moves
-        True if body a carries the hats.
     form (p,) [m]
-        Growth of the gaps by the form of the faces.
     away [m]
-        Gap of a hat that no longer faces the master.
     """
 
     hats: HatQuadrature
@@ -161,12 +156,9 @@ class RingGaps:
 
         Parameters
         ----------
-        mesh_a, surface_a : the body that will be moved
-        mesh_b, surface_b : the other one
         angle (n,) [rad]
             Of the points of every ring.
         centre (3,) [m]
-            Point that a rotation leaves in place, usually the centre of mass of a.
         form
             That ``section`` was built with, of revolution.
         """
@@ -191,17 +183,12 @@ class RingGaps:
         )
 
     def __call__(self, placement: Floats) -> Floats:
-        """Gaps at a rigid placement of body a.
+        """Gaps (nc, n) [m] of every hat at every angle, at a rigid placement of body a.
 
         Parameters
         ----------
         placement (6,) [m], [rad]
-            Translation of ``centre`` and rotation vector, from where the section was built.
-
-        Returns
-        -------
-        (nc, n) [m]
-            Of every hat at every angle.
+            As :meth:`RigidGaps.__call__`.
         """
         position, normal = (_around(x, self.angle) for x in (self.hats.position, self.hats.normal))
         position, normal = carried(
@@ -247,7 +234,7 @@ def _around(vectors: Floats, angle: Floats) -> Floats:
 class RigidGaps:
     """Gaps of a contact space as a function of the rigid placement of body a.
 
-    Made by :meth:`of`; plain arrays, cheap to send to other processes.
+    Plain arrays, cheap to send to other processes.
 
     Parameters
     ----------
@@ -257,7 +244,7 @@ class RigidGaps:
     near
         Of the master side.
     centre (3,) [m]
-        Point that a rotation leaves in place.
+        Point that a rotation leaves in place, usually the centre of mass of a.
     slave_moves
         True if body a carries the hats.
     form (p,) [m]
@@ -287,21 +274,9 @@ class RigidGaps:
         centre: NDArray[np.float64],
         form: FaceForm | None = None,
     ) -> Self:
-        """Prepare the contact points of ``space``, built from these meshes and surfaces.
+        """Prepare the contact points of ``space``, built from these meshes, surfaces and form.
 
-        Parameters
-        ----------
-        mesh_a, surface_a : the body that will be moved
-        mesh_b, surface_b : the other one
-        centre (3,) [m]
-            Point that a rotation leaves in place, usually the centre of mass of a.
-        form
-            That ``space`` was built with.
-
-        Raises
-        ------
-        InputError
-            For axisymmetric bodies, which cannot leave their axis.
+        Rejects axisymmetric bodies, which cannot leave their axis.
         """
         if space.dimension != 3:
             raise InputError(
@@ -330,7 +305,7 @@ class RigidGaps:
         Parameters
         ----------
         placement (6,) [m], [rad]
-            Translation of ``centre`` and rotation vector, from where the space was built.
+            Translation of ``centre`` and rotation vector, from the drawn place.
         """
         position, normal = carried(
             self.position, self.normal, placement, self.centre, slave_moves=self.slave_moves
@@ -346,17 +321,17 @@ class PlacedGaps:
 
     Parameters
     ----------
-    contacts : tuple of RigidGaps or RingGaps
-        Each with the centre of mass of the moving body as its ``centre``.
+    contacts
+        Centred in the centre of mass of the moving body.
     is_upper
-        Whether the moving body is body a there; else a is moved the opposite way.
+        Whether the moving body is a; else a is moved the opposite way.
     """
 
     contacts: tuple[RigidGaps | RingGaps, ...]
     is_upper: tuple[bool, ...]
 
     def __call__(self, placement: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Gaps, shape (nc,) [m], at a placement of the moving body, shape (6,) [m], [rad]."""
+        """Gaps (nc,) [m] at a placement of the moving body, shape (6,) [m], [rad]."""
         shift, rotation = placement[:3], placement[3:]
         back = np.concatenate([-rotation_matrix(rotation).T @ shift, -rotation])
         return np.concatenate(

@@ -1,6 +1,6 @@
-r"""Width of smooth contacts on half-spaces: a line and a point (Hertz 1882; Johnson 1985, ch. 4).
+"""Width of smooth contacts on half-spaces: a line and a point (Hertz 1882; Johnson 1985, ch. 4).
 
-It says how wide a contact will be before any mesh resolves it, so that a mesh can be sized.
+For sizing a mesh before any mesh resolves the contact.
 """
 
 from math import pi, sqrt
@@ -18,16 +18,11 @@ def line_half_width(load: float, curvature: float, modulus: float) -> float:
     Parameters
     ----------
     load [N/m]
-        F', normal force per length of the line.
+        F'.
     curvature [1/m]
         Relative, across the line: sum of both bodies, convex positive.
     modulus [Pa]
         E* with 1/E* = (1 - nu_a^2)/E_a + (1 - nu_b^2)/E_b.
-
-    Raises
-    ------
-    InputError
-        For a curvature or modulus that is not above zero, or a negative load.
 
     Examples
     --------
@@ -51,14 +46,9 @@ def point_radius(force: float, curvature: float, modulus: float) -> float:
     ----------
     force [N]
     curvature [1/m]
-        Relative: sum of both bodies, convex positive.
+        Sum of both bodies, convex positive.
     modulus [Pa]
-        E* as in :func:`line_half_width`.
-
-    Raises
-    ------
-    InputError
-        For a curvature or modulus that is not above zero, or a negative force.
+        E*.
 
     Examples
     --------

@@ -1,7 +1,6 @@
-"""History of one contact between two bodies, from any solver.
+"""History of one contact between two bodies, from any solver and level.
 
-The lumped, the reduced and the full-order level all return this object, so any two can be
-compared.  Axis of motion z; body a (the needle) is above and moves in -z onto body b.
+Axis of motion z; body a (the needle) is above and moves in -z onto body b.
 """
 
 from dataclasses import dataclass, field
@@ -21,15 +20,15 @@ class BodyEnergy:
     Parameters
     ----------
     translation [J]
-        Kinetic energy of the centre of mass along z, ``m v_cm^2 / 2``.
+        ``m v_cm^2 / 2`` of the centre of mass along z.
     vibration [J]
         All other kinetic energy, and the strain energy.
     strain [J]
-        The part of ``vibration`` that is strain energy.
+        Part of ``vibration``.
     frequency (m,) [Hz]
-        Undamped frequency of each elastic mode, empty for a solver that has none.
+        Undamped, of each elastic mode; empty for a solver without modes.
     modal (m,) [J]
-        Kinetic and strain energy of each elastic mode.
+        Kinetic and strain energy of each.
     """
 
     name: str
@@ -52,25 +51,25 @@ class EnergyLedger:
     Parameters
     ----------
     initial [J]
-        Kinetic and strain energy of all bodies at the start.
+        Kinetic and strain energy of all bodies.
     bodies
         At the end.
     contact [J]
-        Stored in the contacts at the end (0 after separation).
+        Stored in contacts at the end (0 after separation).
     contact_dissipation [J]
-        Lost in contact damping, including work clipped where a law would have pulled.
+        In contact damping, including work clipped where a law would have pulled.
     damping [J]
-        Lost in modal damping.
+        In modal damping.
     work [J]
-        Done on the bodies by constant forces.
+        Of constant forces on the bodies.
     spring [J]
-        Change of the energy stored in springs to ground.
+        Change of springs to ground.
     friction [J]
-        Lost in friction of the faces, never below zero.
+        Of the faces, never below zero.
     plastic [J]
-        Lost to faces that yield; a tenth of it stays in them as energy of residual stress.
+        Of faces that yield; a tenth stays in them as energy of residual stress.
     radiated [J]
-        Carried away through non-reflecting ends, never below zero.
+        Through non-reflecting ends, never below zero.
     """
 
     initial: float
@@ -93,26 +92,26 @@ class EnergyLedger:
 
     @property
     def residual(self) -> float:
-        """Energy that appeared from nowhere, relative to the energy turned over [-]."""
+        """Energy from nowhere over the energy turned over [-]."""
         held = sum(body.total for body in self.bodies) + self.contact + self.spring
         scale = self.turned_over
         return (held + self.lost - self.initial - self.work) / scale if scale else 0.0
 
     @property
     def turned_over(self) -> float:
-        """Scale of the residual [J]: initial energy, work done, or change of the springs."""
+        """Scale of the residual [J]: initial energy, work, or change of the springs."""
         return max(self.initial, abs(self.work), abs(self.spring))
 
     @property
     def least_loss(self) -> float:
-        """Smallest loss, relative to the energy turned over [-], of those that are there."""
+        """Smallest existing loss over the energy turned over [-]."""
         losses = [self.contact_dissipation, self.damping]
         losses += [loss for loss in (self.friction, self.plastic, self.radiated) if loss]
         scale = self.turned_over
         return min(losses) / scale if scale else 0.0
 
     def parts(self) -> dict[str, float]:
-        """Return every entry by name [J], the initial energy first; losses of faces if not zero."""
+        """Every entry by name [J], the initial energy first; losses of faces if not zero."""
         out = {"initial kinetic": self.initial}
         for body in self.bodies:
             out[f"{body.name} kinetic (rigid)"] = body.translation
@@ -141,33 +140,33 @@ class ImpactHistory:
     Parameters
     ----------
     step [s]
-        Length of an interval; a multiple of the integration step.
+        A multiple of the integration step.
     force (n,) [N]
         Mean contact force over the interval, pushes a in +z and b in -z; >= 0, but for faces that
         friction keeps from parting.
     gap (n,) [m]
-        Mean gap over the interval, negative where closed (for a full-order contact: the
+        Mean gap over the interval, negative where closed (of a full-order contact the
         pressure-weighted or area-weighted mean).
     velocity_a, velocity_b (n + 1,) [m/s]
-        Centre-of-mass velocity along z; zero for a supported body.
+        Of the centre of mass along z; zero for a supported body.
     speed [m/s]
-        Relative speed of approach at the start, above zero.
+        Of approach at the start, relative, above zero.
     mass_a, mass_b [kg]
         ``mass_b`` is ``inf`` for a supported body.
-    peak_force (n,) [N], optional
-        Largest force of any integration step within the interval; the mean where not given.
-    displacement_a, displacement_b (n + 1,) [m], optional
-        Of the contact ports along z; empty where not given.
-    external_force (n,) [N], optional
-        Mean axial force on body a from outside the contact (springs, constant forces), + in z.
+    peak_force (n,) [N]
+        Largest force of any integration step within the interval; default: the mean.
+    displacement_a, displacement_b (n + 1,) [m]
+        Of the contact ports along z, or empty.
+    external_force (n,) [N]
+        Mean axial force on body a from springs and constant forces, + in z.
     longest_period [s]
-        Of the elastic modes of body a; 0 for a rigid body.  Separates clusters of sub-contacts.
+        Of the elastic modes of body a, 0 if rigid; separates clusters of sub-contacts.
     pressed [m]
         Largest local indentation since the faces were new, of a law that yields; else 0.
     solver
-        What computed this, in words.
+        In words.
     start [s]
-        Time of the first interval's beginning.
+        Of the first interval.
     """
 
     step: float
@@ -221,5 +220,5 @@ class ImpactHistory:
 
     @property
     def impulse(self) -> float:
-        """Integral of the contact force over the whole record [N s]."""
+        """Integral of the contact force [N s]."""
         return float(np.sum(self.force) * self.step)

@@ -1,12 +1,12 @@
 r"""Contact laws along the axis of motion: force over indentation, with an exact potential.
 
-The indentation ``d`` [m] is the closed part of the gap, ``d = -gap``.  Every law is zero for
-``d <= 0``, rises monotonically and never pulls.  The potential is the work stored in the contact,
+The indentation is ``d = -gap`` [m]. Every law is zero for ``d <= 0``, rises monotonically and
+never pulls. The potential is the stored work,
 
 .. math:: V(d) = \int_0^d F(s)\,\mathrm ds ,
 
-which is what the discrete-gradient time step of :mod:`klack.simulation` balances to round-off.
-The elastic laws have no damping on purpose: with modal bodies the wave losses are in the modes.
+which the discrete-gradient time step of :mod:`klack.simulation` balances to round-off. Elastic
+laws have no damping: the wave losses of modal bodies are in the modes.
 """
 
 from dataclasses import dataclass, field
@@ -38,10 +38,10 @@ class FlatLaw:
     Parameters
     ----------
     kind
-        ``LAW_LINEAR``: ``parameters = [k]``; ``LAW_HERTZ``: ``[K, n]``; ``LAW_TABLE``: ``[n]``
-        followed by six numbers for each of ``n`` intervals: its start, the force there, the factors
-        of ``s``, ``s^2``, ``s^3`` (``s`` from the start of the interval) and the potential there.
-        The last interval has no end: it is the linear continuation.
+        ``LAW_LINEAR``: ``parameters = [k]``; ``LAW_HERTZ``: ``[K, n]``; ``LAW_TABLE``: ``[n]`` and
+        six numbers for each of ``n`` intervals: its start, the force there, the factors of ``s``,
+        ``s^2``, ``s^3`` (``s`` from the start) and the potential there. The last interval is the
+        endless linear continuation.
     dissipation [-]
         ``alpha`` of :class:`HuntCrossley`; 0 for an elastic law.
     """
@@ -58,7 +58,7 @@ class LinearLaw:
     Parameters
     ----------
     stiffness [N/m]
-        Local stiffness of the contact zone: *what the modes do not carry already*.
+        Of the contact zone: *what the modes do not carry already*.
     """
 
     stiffness: float
@@ -67,19 +67,19 @@ class LinearLaw:
         require_positive("LinearLaw.stiffness", self.stiffness, "N/m")
 
     def force(self, indentation: ArrayLike) -> NDArray[np.float64]:
-        """Return the force [N] at the given indentation [m]."""
+        """Force [N] at an indentation [m]."""
         return self.stiffness * _closed(indentation)
 
     def potential(self, indentation: ArrayLike) -> NDArray[np.float64]:
-        """Return the stored energy [J] at the given indentation [m]."""
+        """Stored energy [J] at an indentation [m]."""
         return 0.5 * self.stiffness * _closed(indentation) ** 2
 
     def tangent_stiffness(self, indentation: ArrayLike) -> NDArray[np.float64]:
-        """Return the tangent stiffness dF/dd [N/m] at the given indentation [m]."""
+        """Slope dF/dd [N/m] at an indentation [m]."""
         return np.where(np.asarray(indentation, dtype=float) > 0.0, self.stiffness, 0.0)
 
     def flat(self) -> FlatLaw:
-        """Return the law as plain numbers for the kernel."""
+        """Law as numbers for the kernel."""
         return FlatLaw(kind=LAW_LINEAR, parameters=np.array([self.stiffness]))
 
 
@@ -111,22 +111,22 @@ class HertzLaw:
             )
 
     def force(self, indentation: ArrayLike) -> NDArray[np.float64]:
-        """Return the force [N] at the given indentation [m]."""
+        """Force [N] at an indentation [m]."""
         return self.coefficient * _closed(indentation) ** self.exponent
 
     def potential(self, indentation: ArrayLike) -> NDArray[np.float64]:
-        """Return the stored energy [J] at the given indentation [m]."""
+        """Stored energy [J] at an indentation [m]."""
         n = self.exponent
         return self.coefficient / (n + 1.0) * _closed(indentation) ** (n + 1.0)
 
     def tangent_stiffness(self, indentation: ArrayLike) -> NDArray[np.float64]:
-        """Return the tangent stiffness dF/dd [N/m] at the given indentation [m]."""
+        """Slope dF/dd [N/m] at an indentation [m]."""
         n = self.exponent
         d = np.asarray(indentation, dtype=float)
         return np.where(d > 0.0, self.coefficient * n * _closed(d) ** (n - 1.0), 0.0)
 
     def flat(self) -> FlatLaw:
-        """Return the law as plain numbers for the kernel."""
+        """Law as numbers for the kernel."""
         return FlatLaw(kind=LAW_HERTZ, parameters=np.array([self.coefficient, self.exponent]))
 
 
@@ -134,16 +134,15 @@ class HertzLaw:
 class TableLaw:
     """Monotone curve through tabulated points, starting at the origin.
 
-    Between the points a monotone cubic (PCHIP, Fritsch and Carlson 1980; Fritsch and Butland 1984),
-    beyond the last point its tangent.  Piecewise cubic force means a piecewise quartic potential:
-    both are exact, nothing is integrated numerically.
+    Between the points a monotone cubic (PCHIP, Fritsch and Carlson 1980; Fritsch and Butland
+    1984), beyond the last its tangent. The potential is a piecewise quartic, exact.
 
     Parameters
     ----------
     indentation (n,) [m]
-        Increasing, not negative; the origin is added where it is missing.
+        Increasing, not negative; a missing origin is added.
     force (n,) [N]
-        Increasing with the indentation.
+        Increasing.
 
     Examples
     --------
@@ -171,13 +170,13 @@ class TableLaw:
         object.__setattr__(self, "stored", np.concatenate(([0.0], np.cumsum(work))))
 
     def force(self, indentation: ArrayLike) -> NDArray[np.float64]:
-        """Return the force [N] at the given indentation [m]."""
+        """Force [N] at an indentation [m]."""
         i, s = self._locate(indentation)
         c1, c2, c3 = self.coefficients
         return self.force_points[i] + s * (c1[i] + s * (c2[i] + s * c3[i]))
 
     def potential(self, indentation: ArrayLike) -> NDArray[np.float64]:
-        """Return the stored energy [J] at the given indentation [m]."""
+        """Stored energy [J] at an indentation [m]."""
         i, s = self._locate(indentation)
         c1, c2, c3 = self.coefficients
         return self.stored[i] + s * (
@@ -185,14 +184,14 @@ class TableLaw:
         )
 
     def tangent_stiffness(self, indentation: ArrayLike) -> NDArray[np.float64]:
-        """Return the tangent stiffness dF/dd [N/m] at the given indentation [m]."""
+        """Slope dF/dd [N/m] at an indentation [m]."""
         i, s = self._locate(indentation)
         c1, c2, c3 = self.coefficients
         tangent = c1[i] + s * (2 * c2[i] + s * 3 * c3[i])
         return np.where(np.asarray(indentation, dtype=float) > 0.0, tangent, 0.0)
 
     def flat(self) -> FlatLaw:
-        """Return the law as plain numbers for the kernel."""
+        """Law as numbers for the kernel."""
         columns = (
             self.indentation,
             self.force_points,
@@ -216,18 +215,12 @@ class HuntCrossley:
 
     .. math:: F = F_e(d)\,\bigl(1 + \chi \dot d\bigr), \qquad \chi = \alpha / v_0
 
-    (Hunt and Crossley 1975); ``v0`` is the approach speed at first touch, which the time
-    integration finds by itself, and anew once the contact has been open by a tenth of its deepest
-    indentation: bounces are damped each by their own speed, trembling is not.  With ``alpha`` from
+    (Hunt and Crossley 1975); ``v0`` is the approach speed at first touch, found by the time
+    integration, and anew once the contact has been open by a tenth of its deepest indentation:
+    each bounce is damped by its own speed, trembling is not. With ``alpha`` of
     :func:`gonthier_coefficient` two rigid bodies rebound with exactly the prescribed restitution,
-    for every elastic law.  On bodies with modes the wave loss would be counted twice.  The law is
-    clipped where it would pull, and the clipped work is counted as a loss.
-
-    Parameters
-    ----------
-    law : LinearLaw, HertzLaw or TableLaw
-    dissipation [-]
-        ``alpha``.
+    for every elastic law. On bodies with modes the wave loss would count twice. Where it would
+    pull, the law is clipped, and the clipped work is a loss.
     """
 
     law: "ElasticLaw"
@@ -244,19 +237,19 @@ class HuntCrossley:
             )
 
     def force(self, indentation: ArrayLike) -> NDArray[np.float64]:
-        """Return the elastic (zero rate) force [N] at the given indentation [m]."""
+        """Elastic force [N] (zero rate) at an indentation [m]."""
         return self.law.force(indentation)
 
     def potential(self, indentation: ArrayLike) -> NDArray[np.float64]:
-        """Return the stored energy [J] at the given indentation [m]."""
+        """Stored energy [J] at an indentation [m]."""
         return self.law.potential(indentation)
 
     def tangent_stiffness(self, indentation: ArrayLike) -> NDArray[np.float64]:
-        """Return the tangent stiffness dF/dd of the elastic part [N/m]."""
+        """Slope dF/dd [N/m] of the elastic part."""
         return self.law.tangent_stiffness(indentation)
 
     def flat(self) -> FlatLaw:
-        """Return the law as plain numbers for the kernel."""
+        """Law as numbers for the kernel."""
         elastic = self.law.flat()
         return FlatLaw(
             kind=elastic.kind, parameters=elastic.parameters, dissipation=self.dissipation
@@ -268,7 +261,7 @@ ContactLaw = LinearLaw | HertzLaw | TableLaw | HuntCrossley
 
 
 def gonthier_coefficient(restitution: float) -> float:
-    r"""Dissipation factor ``alpha`` that gives two rigid bodies this restitution, exactly.
+    r"""Dissipation factor ``alpha`` [-] that gives two rigid bodies exactly this restitution.
 
     With ``alpha = D/e`` the speed after release solves
 
@@ -280,10 +273,6 @@ def gonthier_coefficient(restitution: float) -> float:
     ----------
     restitution [-]
         Above 0, up to 1.
-
-    Returns
-    -------
-    float [-]
 
     Examples
     --------
@@ -321,7 +310,7 @@ def _closed(indentation: ArrayLike) -> NDArray[np.float64]:
 def _with_origin(
     d: NDArray[np.float64], f: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Prepend (0, 0) where it is missing and refuse what is not a monotone curve."""
+    """Prepend a missing (0, 0) and reject what is no monotone curve."""
     if d.size != f.size or d.size == 0:
         raise InputError(
             "TableLaw",
@@ -343,7 +332,7 @@ def _with_origin(
 
 
 def _monotone_cubics(d: NDArray[np.float64], f: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Factors of s, s^2, s^3 in each interval, shape (3, n); the last column continues the line."""
+    """Factors of s, s^2, s^3 in each interval, shape (3, n); last: the straight continuation."""
     secant = np.diff(f) / np.diff(d)
     if d.size == 2:
         slope = np.repeat(secant, 2)

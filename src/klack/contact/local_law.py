@@ -1,20 +1,19 @@
 r"""The consistent local law: exactly the compliance that the retained modes miss.
 
-The static contact of the two full bodies gives the approach :math:`\delta(P)`.  The retained
-elastic modes already yield by :math:`P\,c`, with
-:math:`c = \sum_a \varphi_i^2/\omega_i^2 + \sum_b \varphi_j^2/\omega_j^2` and the modal amplitudes
-under the contact's pressure pattern.  The rest,
+The static contact of the full bodies gives the approach :math:`\delta(P)`. The retained elastic
+modes yield by :math:`P\,c`, with :math:`c = \sum_a \varphi_i^2/\omega_i^2 + \sum_b
+\varphi_j^2/\omega_j^2` and their amplitudes under the contact's pressure pattern. The rest,
 
 .. math:: \delta_{loc}(P) = \delta(P) - P\,c ,
 
-is the local law of the reduced model: massless, monotone, with a potential.  Nothing is counted
-twice and nothing is missing, whatever the number of modes.  A constant local stiffness on top of
-residual attachment modes, the usual recipe, freezes one contact area; a bare Hertz law on top of
-modes counts the compliance of the modes near the contact twice.
+is the local law of the reduced model: massless, monotone, with a potential. Nothing is counted
+twice or missing, for any number of modes. A constant local stiffness with residual attachment
+modes, the usual recipe, freezes one contact area; a bare Hertz law counts the compliance of the
+modes near the contact twice.
 
-Limit: *c* belongs to one pressure pattern (take it near the expected peak force) while the real
-contact grows with the load.  With very many modes the rest can then fall with rising force; such a
-law is refused.
+Limit: *c* belongs to one pressure pattern (take it near the expected peak force) while the contact
+grows with the load. With very many modes the rest can then fall with rising force; such a law is
+rejected.
 """
 
 import warnings
@@ -33,7 +32,7 @@ _FAIR_SHARE = 0.2
 """Share of the compliance below which the law is a small difference of large numbers."""
 
 _POWERS = (1.0, 2.0)
-"""Exponents F ~ delta^n that the beginning of a smooth contact can have."""
+"""Exponents F ~ delta^n of the beginning of a smooth contact."""
 
 
 class OverfullModesError(InputError):
@@ -47,21 +46,21 @@ class LocalLaw:
     Parameters
     ----------
     law
-        Force over the local indentation; beyond the table its last tangent continues.
+        Over the local indentation; beyond the table the last tangent continues.
     force (n,) [N]
-        Axial forces of the static ladder.
+        Of the static ladder.
     approach (n,) [m]
-        Approach of the full bodies at these forces.
+        Of the full bodies at these forces.
     share (n,) [-]
         Local indentation over approach.
     tangent_share (n,) [-]
-        The same for the slopes over the force; the law is monotone while it is above zero.
+        The same of the slopes; the law is monotone while it is above zero.
     modal_compliance [m/N]
-        What was subtracted.
+        Subtracted.
     resolved_force [N]
         Below it the contact is narrower than the elements and a power law continues the curve.
     exponent [-]
-        Of that power law.
+        Of that law.
     """
 
     law: TableLaw
@@ -75,7 +74,7 @@ class LocalLaw:
 
     @property
     def max_force(self) -> float:
-        """End of the table [N]; an impact should stay below it."""
+        """End of the table [N]; an impact should stay below."""
         return float(self.force[-1])
 
     @property
@@ -87,22 +86,21 @@ class LocalLaw:
 def consistent_law(static: StaticContact, modal_compliance: float) -> LocalLaw:
     """Local law that carries what the retained modes miss.
 
-    A contact narrower than one element is that of single hats, not of the bodies.  The ladder
-    below the first state whose full width exceeds the element size is therefore replaced by the
-    power law that continues the curve there with equal value and slope.
+    A contact narrower than one element is that of single hats. Below the first state whose full
+    width exceeds the element size, the ladder is therefore replaced by the power law that
+    continues the curve with equal value and slope.
 
     Parameters
     ----------
     static
-        Ladder up to above the highest force of the impact.
+        Up to above the highest force of the impact.
     modal_compliance [m/N]
-        Sum over the retained elastic modes of both bodies of (modal amplitude under the pressure
-        pattern)^2 / omega^2; 0 for rigid bodies, whose law is then the whole approach.
+        c of the module text; 0 for rigid bodies, whose law is the whole approach.
 
     Raises
     ------
     OverfullModesError
-        If the modes carry so much that the rest is not monotone.
+        If the rest is not monotone.
     """
     require_nonnegative("consistent law: modal compliance", modal_compliance, "m/N")
     force, approach, first, exponent = _smooth_start(static)
@@ -143,7 +141,7 @@ def consistent_law(static: StaticContact, modal_compliance: float) -> LocalLaw:
 def _smooth_start(
     static: StaticContact,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], int, float]:
-    """Ladder with its unresolved beginning replaced by a power law, and where it ends."""
+    """Ladder whose unresolved beginning is a power law, and where that ends."""
     force, approach = static.force, static.approach
     size = float(np.average(static.space.size, weights=static.pressures[-1]))
     resolved = 2.0 * static.half_width >= size

@@ -14,15 +14,14 @@ taken on the *curved* faces, with :math:`x_m` on the master along the outward sl
 .. math:: g = g_0 + G_a u_a + G_b u_b, \qquad f_a = G_a^T \lambda, \quad f_b = G_b^T \lambda,
     \qquad \lambda_k \ge 0 \text{ in N}, \quad p_k = \lambda_k / A_k .
 
-A gap above zero is open and the forces push both bodies apart.  The same weights enter the gap and
-the force, and an integration point that meets no master face is left out of all three integrals,
-so a rigid translation of both bodies changes no gap and the two resultants cancel exactly.
+A gap above zero is open and the forces push the bodies apart. Gap and force have the same weights,
+and an integration point that meets no master face is left out of all three integrals: a rigid
+translation of both bodies changes no gap and the resultants cancel exactly.
 
 These multipliers pass the patch test; nodes as contact points do not, and dual hats have negative
 weights on quadratic faces, which create energy in impacts (Popp et al. 2012 on the latter).
 
-Written by hand: the packages for mortar weights are in C++ and Julia and part of other programs;
-none was found that Python could call on two free meshes.
+No package for mortar weights was found that Python could call on two free meshes.
 """
 
 from collections.abc import Iterator
@@ -59,22 +58,22 @@ __all__ = [
 ]
 
 _POINTS_BY_COST = {2: 400, 3: 1000}
-"""Number of contact points that an automatic reach aims at, by dimension."""
+"""Contact points that an automatic reach aims at, by dimension."""
 
 _WALL = 0.9
-"""Cosine of the normal with the direction away from the axis, from which a face is a wall."""
+"""Cosine between normal and radial direction from which a face is a wall."""
 
 _CENTRAL = 3.0
 """Element sizes from the axis up to which hats count as around it."""
 
 _LOWEST = 32
-"""Hats that give the excess of the mean gap over a hat over the gap at its node."""
+"""Hats that give the excess of their mean gap over the gap at the node."""
 
 _ON_AXIS = 1e-6
-"""Of the element size: distance from the axis at which a hat is on it."""
+"""Share of the element size at which a hat is on the axis."""
 
 COVERED = 0.05
-"""Least share of a hat's area that has to face the master."""
+"""Least share of a hat that has to face the master."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -87,34 +86,34 @@ class ContactSpace:
     ----------
     G_a, G_b (nc, dofs of a), (nc, dofs of b) [-]
     gap (nc,) [m]
-        Initial weighted gaps, positive when open.
+        Initial weighted gaps.
     area (nc,) [m^2]
-        Area of each hat; axisymmetric: of the whole ring.
+        Of each hat; axisymmetric: of the whole ring.
     points (nc, dimension) [m]
-        Slave node of each hat.
+        Of the slave nodes.
     axial (nc,) [-]
-        Change of the gaps per unit translation of a along +z; ``axial @ lam`` is the axial force
-        that pushes a to +z and b to -z.
+        Change of the gaps per translation of a along +z; ``axial @ lam`` is the axial force that
+        pushes a to +z and b to -z.
     rim (nc,)
-        Hats at the border of the candidates: a neighbour was left out because its gap exceeds
-        ``reach``.  None of them may ever carry a force.
+        Hats at the border of the candidates: a neighbour exceeds ``reach``. None may ever carry a
+        force.
     size (nc,) [m]
-        Element size across the contact (mean shortest extent of the slave faces at the hat).
+        Element size across the contact (mean shortest extent of the slave faces).
     slave
-        Side that carries the hats, the finer one.
+        Side of the hats, the finer one.
     nodes (nc,)
-        Slave node of each hat.
+        Slave nodes.
     reach [m]
-        Largest gap of a candidate, above the smallest one.
+        Largest gap of a candidate above the smallest.
     clearance [m]
-        Distance that a has to move to -z, rigidly, until the surfaces themselves touch.  The
-        weighted gaps close a little later (:attr:`touch`), by about h^2/(50 R) on elements of
-        size h and surfaces of relative radius R.
+        Distance that a moves rigidly to -z until the surfaces touch. The weighted gaps close a
+        little later (:attr:`touch`), by about h^2/(50 R) on elements of size h and surfaces of
+        relative radius R.
     beyond [m]
-        No point that was left out has a smaller gap.  As long as the bodies approach by less, a
-        contact at the rim is complete all the same: elements may be wider than the reach.
+        Smallest gap of the omitted points. While the bodies approach by less, a contact at the rim
+        is complete all the same: elements may be wider than the reach.
     entry (nc,) [m]
-        Reach from which on each point is a candidate.
+        Reach from which each point is a candidate.
     """
 
     G_a: csr_array
@@ -144,7 +143,7 @@ class ContactSpace:
 
     @property
     def touch(self) -> float:
-        """Distance [m] that a has to move to -z, rigidly, until the first weighted gap closes."""
+        """Distance [m] that a moves rigidly to -z until the first weighted gap closes."""
         facing = self.axial > 1e-6
         if not np.any(facing):
             raise InputError(
@@ -156,9 +155,9 @@ class ContactSpace:
         return float(np.min(self.gap[facing] / self.axial[facing]))
 
     def shifted(self, distance: float) -> Self:
-        """Return the same contact points with a moved rigidly along +z by a small ``distance`` [m].
+        """Same contact points with a moved rigidly along +z by a small ``distance`` [m].
 
-        First order; rebuild the space after moves that are not small against the element size.
+        First order; rebuild the space after moves not small against the element size.
         """
         return replace(
             self,
@@ -168,14 +167,14 @@ class ContactSpace:
         )
 
     def complete_at(self, travel: float) -> bool:
-        """Whether no omitted point can have closed after a has moved by ``travel`` to -z [m].
+        """Whether no omitted point can have closed after a moved by ``travel`` [m] to -z.
 
         The deformation under contact forces only opens the gaps of points without a force.
         """
         return travel * float(np.max(self.axial)) < self.beyond
 
     def restricted(self, keep: NDArray[np.bool_]) -> Self:
-        """Only the contact points ``keep``, shape (nc,); the new border becomes the rim."""
+        """Contact points ``keep`` alone, shape (nc,); the new border becomes the rim."""
         keep = np.asarray(keep, dtype=bool)
         # two hats are neighbours when they share slave nodes
         G = self.G_a if self.slave == "a" else self.G_b
@@ -202,25 +201,16 @@ def contact_space(
     slave: Literal["a", "b"] | None = None,
     form: FaceForm | None = None,
 ) -> ContactSpace:
-    """Contact points between two surfaces that face each other.
+    """Contact points between surfaces that face each other: needle a, stop or seat b.
 
     Parameters
     ----------
-    mesh_a, surface_a : needle
-    mesh_b, surface_b : stop or seat
     reach [m]
-        Largest gap of a contact point, counted from the smallest one; somewhat more than the
-        largest expected approach, so that the contact never grows to the rim.  Without it the
-        reach is set by cost: the faces with the smallest gaps, up to about 400 contact points
-        (axisymmetric) or 1000 (solid).
+        Largest gap of a contact point above the smallest; somewhat more than the largest expected
+        approach, so that the contact never grows to the rim.  Default by cost: the faces with the
+        smallest gaps, up to about 400 contact points (axisymmetric) or 1000 (solid).
     slave
-        Side that carries the multipliers; without it the side with the smaller elements across
-        the contact.
-
-    Raises
-    ------
-    InputError
-        If the surfaces do not face each other or the meshes have different dimensions.
+        Side of the multipliers; default: that with the smaller elements across the contact.
     """
     _check_pair(mesh_a, surface_a, mesh_b, surface_b, reach)
     sides = {"a": (mesh_a, surface_a), "b": (mesh_b, surface_b)}
@@ -305,7 +295,7 @@ _PIECES: dict[str, tuple[tuple[int, ...], ...]] = {
     "quad4": ((0, 1, 2, 3),),
     "quad8": ((0, 4, 7), (4, 1, 5), (5, 2, 6), (6, 3, 7), (4, 5, 6, 7)),
 }
-"""Nodes of the pieces of every face: lines, triangles, and quads for the middle of a quad."""
+"""Nodes of the pieces of every face: lines, triangles, quads."""
 
 
 def _pieces(family: str) -> list[_Piece]:
@@ -343,8 +333,8 @@ _Entries = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]
 class _Sums:
     """Integrals over the slave faces, collected per slave node, and the entries of both matrices.
 
-    Of the hat: covered and full area, gap, squared distance from the node (spread); of its square:
-    the same, called narrow.
+    Of the hat: covered and full area, gap, squared distance from the node (spread); of its square
+    (narrow): the same.
     """
 
     def __init__(self, dimension: int, count: int) -> None:
@@ -363,7 +353,7 @@ def _build(
     floor: float,
     form: FaceForm | None,
 ) -> ContactSpace:
-    """Contact points up to a gap: ``gaps`` are those of the faces of the slave side."""
+    """Contact points up to a gap; ``gaps`` of the faces of the slave side."""
     mesh, surface = sides[slave]
     near = np.isfinite(gaps) & (gaps <= limit)
     inner = _part(surface, near).nodes
@@ -403,7 +393,7 @@ def _faces_at(surface: Surface, nodes: NDArray[np.int64]) -> NDArray[np.bool_]:
 
 
 class _Facing(NamedTuple):
-    """One piece of every face of a block, at its integration points (f, q) and hats (f, hats)."""
+    """A piece of every face of a block, at integration points (f, q) and hats (f, hats)."""
 
     faces: FaceBlock
     piece: _Piece
@@ -424,7 +414,7 @@ class _Facing(NamedTuple):
 
 
 def _facing(mesh: Mesh, surface: Surface, master: tuple[Mesh, Surface]) -> Iterator[_Facing]:
-    """Pieces of the faces of the slave side, with what they meet on the master."""
+    """Pieces of the slave faces, with what they meet on the master."""
     for block in surface.blocks:
         for piece in _pieces(block.family):
             at, hats, share = _shares(mesh, block, piece)
@@ -462,7 +452,7 @@ def _integrate(
 def _shares(
     mesh: Mesh, faces: FaceBlock, piece: _Piece
 ) -> tuple[FaceGeometry, NDArray[np.int64], NDArray[np.float64]]:
-    """Integration points of one piece of every face, its hats (f, hats), psi_k dA (f, q, hats)."""
+    """Integration points of one piece of every face, hats (f, hats), psi_k dA (f, q, hats)."""
     at = face_geometry(mesh.points, faces, piece.xi)
     weight = at.stretch * piece.weight  # dA
     return at, faces.connectivity[:, piece.nodes], weight[:, :, None] * piece.hats
@@ -481,12 +471,12 @@ class HatQuadrature:
 
     .. math:: A_k = \sum_p W_{kp}, \qquad g_k = \frac{1}{A_k} \sum_p W_{kp}\, g_p
 
-    if every point meets the master; points that meet nothing are left out of both sums.
+    over the points that meet the master.
 
     Parameters
     ----------
     position, normal (p, d) [m], [-]
-        Points of the slave faces and their outward normals.
+        Of the slave faces, outward.
     weight (nc, p) [m^2]
         Hat times area, W.
     """
@@ -497,7 +487,7 @@ class HatQuadrature:
 
 
 def hat_quadrature(space: ContactSpace, mesh: Mesh, surface: Surface) -> HatQuadrature:
-    """Integration points of the hats of ``space``; mesh and surface are those of its slave side."""
+    """Integration points of the hats; mesh and surface are those of the slave side."""
     number = _numbers(mesh.node_count, space.nodes)
     positions, normals, entries, count = [], [], [], 0
     for block in _part(surface, _faces_at(surface, space.nodes)).blocks:
@@ -524,7 +514,7 @@ def _numbered(
 ) -> tuple[str, float, Iterator[tuple[_Facing, NDArray[np.int64]]]]:
     """Side of the master, sign of the slave (+: a), pieces of its faces and their hats (f, hats).
 
-    Hats are numbered as in ``space``, -1 where it has none.
+    Numbered as in ``space``, -1 for none.
     """
     other = "b" if space.slave == "a" else "a"
     mesh, surface = sides[space.slave]
@@ -542,25 +532,18 @@ def tangent_rows(
     .. math:: s_k = \frac{1}{A_k} \int \psi_k \, [t \cdot (u_a - u_b)
         \mp g \, n \cdot \partial u_s / \partial t] \, dA = T_a u_a + T_b u_b
 
-    so that tangential forces :math:`T_a^T \lambda_t`, :math:`T_b^T \lambda_t` on the bodies cancel,
-    and so do their moments: across a gap *g* (that of the meshes) the normal of the slave side *s*
-    (-: a, +: b) turns with its surface, and both bodies turned as one do not slip.
+    so that tangential forces :math:`T_a^T \lambda_t`, :math:`T_b^T \lambda_t` on the bodies
+    cancel, and so do their moments: across a gap *g* (that of the meshes) the normal of the slave
+    side *s* (-: a, +: b) turns with its surface, and both bodies turned as one do not slip.
     Axisymmetric bodies have one direction *t*, along the meridian and away from the axis of motion
-    (along it on walls); solids have a second one round it (the first is along x where hats surround
-    it).  Each is taken in the tangential plane of every integration point.  The hat at the axis of
-    bodies of revolution has an empty row: it cannot slip.
-
-    Parameters
-    ----------
-    space
-        Of these meshes.
-    mesh_a, surface_a, mesh_b, surface_b
-        As given to :func:`contact_space`.
+    (along it on walls); solids have a second one round it (the first is along x where hats
+    surround it). Each is taken in the tangential plane of every integration point. The hat at the
+    axis of bodies of revolution has an empty row: it cannot slip.
 
     Returns
     -------
     T_a, T_b (ways nc, dofs of a), (ways nc, dofs of b) [-]
-        All points in the first direction, then in the second one.
+        All points in the first direction, then in the second.
     """
     sides = {"a": (mesh_a, surface_a), "b": (mesh_b, surface_b)}
     other, sign, parts = _numbered(space, sides)
@@ -595,24 +578,17 @@ def around_rows(
 ) -> tuple[tuple[csr_array, csr_array], tuple[csr_array, csr_array]]:
     r"""Displacement of a past b round the ring, of bodies of revolution in a Fourier order.
 
-    What :func:`tangent_rows` has for solids as the second direction, in the same sense.  With the
-    slave side *s* in the order *n*, and the normal in the half section,
+    The second direction of :func:`tangent_rows`, in the same sense. With the slave side *s* in the
+    order *n*, and the normal in the half section,
 
     .. math:: n \cdot \frac{1}{r} \frac{\partial u_s}{\partial \theta}
         = - \frac{1}{r} \big[ n_r V + n\, (n_r U + n_z W) \big] \sin n \theta ,
 
     so a row reads V, and *n* times a row on U and W.
 
-    Parameters
-    ----------
-    space
-        Of these meshes, axisymmetric.
-    mesh_a, surface_a, mesh_b, surface_b
-        As given to :func:`contact_space`.
-
     Returns
     -------
-    around, turned : pairs of sparse array, shape (nc, nodes), (nc, 2 nodes) [-]
+    around, turned (nc, nodes), (nc, 2 nodes) [-]
         Rows on V, and rows on U and W that count n times, each of a and of b.
     """
     sides = {"a": (mesh_a, surface_a), "b": (mesh_b, surface_b)}
@@ -655,7 +631,7 @@ def _dual_tangents(mesh: Mesh, block: FaceBlock, dN: NDArray[np.float64]) -> NDA
 
 
 def _away_from_axis(points: NDArray[np.float64], central: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Unit vectors away from the axis z, shape (..., d); along x for hats around the axis."""
+    """Unit vectors away from z, shape (..., d); along x for hats around it."""
     shape = np.broadcast_shapes(points.shape[:-1], central.shape)
     away = np.array(np.broadcast_to(points, (*shape, points.shape[-1])))
     away[..., -1] = 0.0
@@ -669,7 +645,7 @@ def _away_from_axis(points: NDArray[np.float64], central: NDArray[np.bool_]) -> 
 def _tangents(
     normal: NDArray[np.float64], towards: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], ...]:
-    """Directions at right angles to normals, shape (..., d) each."""
+    """Directions at right angles to normals, each (..., d)."""
     d = normal.shape[-1]
     is_wall = np.abs(np.sum(normal * towards, axis=-1, keepdims=True)) > _WALL
     wanted = np.where(is_wall, np.eye(d)[-1], towards)
@@ -683,7 +659,7 @@ def _tangents(
 
 
 def _scaled(parts: list[_Entries], area: NDArray[np.float64], columns: int) -> csr_array:
-    """Matrix of the entries, each row over the area of its hat; rows below zero are left out."""
+    """Matrix of the entries, rows over the area of their hat, without rows below zero."""
     row, column, value = (np.concatenate(part) for part in zip(*parts, strict=True))
     kept = row >= 0
     scaled = value[kept] / area[row[kept]]
@@ -698,7 +674,7 @@ def _store_master(
     met: Projection,
     surface: Surface,
 ) -> None:
-    """Shares of the hats along directions (points, hats, d), over the nodes that were met."""
+    """Shares of the hats along directions (points, hats, d), over the met nodes."""
     for number, block in enumerate(surface.blocks):
         point = np.flatnonzero(met.block == number)
         if not len(point):
@@ -731,7 +707,6 @@ def _assemble(
     limit: float,
     floor: float,
 ) -> ContactSpace:
-    """Choose the hats and divide their sums by their areas."""
     mesh, surface = sides[slave]
     full = np.where(sums.full > 0, sums.full, 1.0)
     facing = sums.covered > COVERED * full
@@ -772,10 +747,9 @@ def _clearance(sums: _Sums, nodes: NDArray[np.int64], axial: NDArray[np.float64]
     """Axial distance of the surfaces where they touch first [m].
 
     The mean gap over a hat exceeds that at its node by curvature times mean square distance.  The
-    means over the hat and over its square, a narrower kernel, tell the two apart; the difference
-    is averaged over the hats that touch first.  The gap at single points would not do: the mixed
-    cubic term that a 6-node face lacks makes it wiggle by some nanometres, on swept meshes of few
-    layers by a hundred, which the means remove.
+    means over the hat and over its square tell the two apart; the difference is averaged over the
+    hats that touch first.  Gaps at single points would not do: the mixed cubic term that a 6-node
+    face lacks makes them wiggle by some nanometres, on swept meshes of few layers by a hundred.
     """
     area, narrow = sums.covered[nodes], sums.narrow[nodes]
     mean, narrow_mean = sums.gap[nodes] / area, sums.narrow_gap[nodes] / narrow
@@ -821,15 +795,15 @@ def touching_shift(
     surface_b: Surface,
     form: FaceForm | None = None,
 ) -> float:
-    """Find the translation of a along z [m] after which the smallest weighted gap is zero.
+    """Translation of a along z [m] after which the smallest weighted gap is zero.
 
-    Lines along z give the first place from any distance or overlap; then the weighted gaps are
-    rebuilt after every move, since points slide along the other surface.
+    Lines along z give a first place; the weighted gaps are rebuilt after every move, since points
+    slide along the other surface.
 
     Raises
     ------
     ConvergenceError
-        If the place is not found within 30 moves.
+        After 30 moves.
     """
     shift = -axial_distance(mesh_a, surface_a, mesh_b, surface_b)
     if not np.isfinite(shift):

@@ -5,10 +5,9 @@ From a point of the slave surface a straight line along the outward normal **n**
 
 .. math:: x_s + g\, n = x_m(\xi), \qquad g > 0 \text{ open},
 
-by Newton's method in :math:`(\xi, g)`.  Straight facets instead of the curved faces would leave
-wrong gaps of micrometres between surfaces that do not match, and a negative wrong gap is a source
-of energy.  Every master face whose bounding box the line meets is tried; among several cuts with
-opposed normals the nearest counts.
+by Newton's method in :math:`(\xi, g)`. Straight facets would leave wrong gaps of micrometres
+between surfaces that do not match, and a negative one is a source of energy. Every master face
+whose bounding box the line meets is tried; of cuts with opposed normals the nearest counts.
 """
 
 from dataclasses import dataclass
@@ -43,7 +42,7 @@ __all__ = [
 ]
 
 _DEPTH = 0.1
-"""Deepest penetration that counts, relative to the extent of the master surface."""
+"""Deepest penetration that counts, over the extent of the master surface."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +53,7 @@ class FaceGeometry:
     ----------
     position (f, q, d) [m]
     normal (f, q, d) [-]
-        Outward unit normals.
+        Outward.
     stretch (f, q) [m^(d-1)]
         Area (axisymmetric: of the full ring, 2 pi r ds) per unit of the reference domain.
     """
@@ -71,11 +70,11 @@ class Projection:
     Parameters
     ----------
     block, face (p,)
-        Face block of the surface and face within it; -1 where nothing was met.
+        Block of the surface and face within it; -1 where nothing was met.
     xi (p, d - 1) [-]
-        Reference coordinates on that face.
+        On that face.
     gap (p,) [m]
-        Distance along the slave normal, negative for a penetration; nan where nothing was met.
+        Along the slave normal, negative for a penetration; nan where nothing was met.
     """
 
     block: NDArray[np.int64]
@@ -92,13 +91,7 @@ class Projection:
 def face_geometry(
     points: NDArray[np.float64], block: FaceBlock, xi: NDArray[np.float64]
 ) -> FaceGeometry:
-    """Position, outward normal and stretch at reference points of every face.
-
-    Parameters
-    ----------
-    points (n, d) [m]
-    xi (q, d - 1) [-]
-    """
+    """Position, outward normal and stretch at reference points xi (q, d - 1) of every face."""
     N, dN = shape_functions(block.family, xi)
     corners = points[block.connectivity]
     position = np.einsum("qn,fnd->fqd", N, corners)
@@ -130,7 +123,7 @@ def _normals(tangents: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def face_lattice(family: str, count: int) -> NDArray[np.float64]:
-    """Reference points spread evenly over a face, ``count`` along a side, borders left out."""
+    """Reference points spread evenly over a face, ``count`` along a side, borders excluded."""
     s = (np.arange(count) + 0.5) / count
     if family.startswith("line"):
         return 2.0 * s[:, None] - 1.0
@@ -145,8 +138,7 @@ def face_thickness(mesh: Mesh, surface: Surface) -> NDArray[np.float64]:
     """Shortest extent of every face [m], in the order of the blocks.
 
     The shortest side, or sqrt(2) times the height over the longest side if a face is flatter than
-    half a square.  On swept meshes, fine along the meridian and coarse around, this is the size
-    along the meridian.
+    half a square: on swept meshes, coarse around, the size along the meridian.
     """
     sizes = []
     for block in surface.blocks:
@@ -171,15 +163,14 @@ def project_to_surface(
     *,
     deepest: float | None = None,
 ) -> Projection:
-    """Cut the lines through ``points`` along ``normals`` with the curved faces of a surface.
+    """Cut lines through ``points`` along ``normals`` with the curved faces of a (master) surface.
 
     Parameters
     ----------
     points, normals (p, d) [m], [-]
-    mesh, surface : the master side
     deepest [m]
-        Deepest penetration that counts as one; a tenth of the extent of the master surface unless
-        given, since a line that starts beside a ring-shaped seat may meet its far side backwards.
+        Deepest penetration that counts; default a tenth of the extent of the surface, since a line
+        that starts beside a ring-shaped seat may meet its far side backwards.
     """
     face, xi, gap = _nearest(points, normals, curved_faces(mesh, surface), deepest)
     start = np.cumsum([0, *(len(block.connectivity) for block in surface.blocks)])
@@ -189,7 +180,7 @@ def project_to_surface(
 
 
 def curved_faces(mesh: Mesh, surface: Surface) -> CurvedFaces:
-    """Prepare the faces of a surface for :func:`project_to_surface` and the like."""
+    """Prepare the faces of a surface for :func:`project_to_surface`."""
     parts, kinds = [], []
     for block in surface.blocks:
         parts.append(face_polynomials(mesh.points, block.family, block.connectivity))
@@ -210,7 +201,7 @@ def curved_faces(mesh: Mesh, surface: Surface) -> CurvedFaces:
 def gaps_to(
     points: NDArray[np.float64], normals: NDArray[np.float64], faces: CurvedFaces
 ) -> NDArray[np.float64]:
-    """Gaps of :func:`project_to_surface` to faces that are prepared [m]; nan where none is met."""
+    """Gaps of :func:`project_to_surface` to prepared faces [m]; nan where none is met."""
     return _nearest(points, normals, faces)[2]
 
 
@@ -220,7 +211,7 @@ def _nearest(
     faces: CurvedFaces,
     deepest: float | None = None,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-    """Number of the face that each line cuts first, place on it, and gap."""
+    """Face that each line cuts first, place on it, and gap."""
     if deepest is not None:
         faces = faces._replace(deepest=deepest)
     return cut_nearest(in_space(points), in_space(normals), faces)
@@ -238,10 +229,7 @@ def face_gaps(
     other_surface: Surface,
     form: FaceForm | None = None,
 ) -> NDArray[np.float64]:
-    """Smallest gap [m] sampled on every face (corners and centre); nan where nothing is met.
-
-    The order is that of the blocks of ``surface``; a form of the faces opens their gaps.
-    """
+    """Smallest gap [m] of every face (corners and centre); nan where nothing is met."""
     gaps = []
     for block in surface.blocks:
         position, normal = _samples(mesh, block)
@@ -255,7 +243,7 @@ def face_gaps(
 def axial_distance(mesh_a: Mesh, surface_a: Surface, mesh_b: Mesh, surface_b: Surface) -> float:
     """Distance [m] that a has to move to -z until it touches b; negative where they overlap.
 
-    Sampled along lines parallel to z from the faces of both surfaces; nan if none meets the other.
+    Along lines parallel to z from the faces of both surfaces; nan if none meets the other.
     """
     least = np.inf
     sides = (
@@ -276,7 +264,7 @@ def axial_distance(mesh_a: Mesh, surface_a: Surface, mesh_b: Mesh, surface_b: Su
 
 
 def _samples(mesh: Mesh, block: FaceBlock) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Position and normal at the centre and, drawn in a little, at the corners of every face."""
+    """Position and normal at the centre and, drawn in a little, the corners of every face."""
     corners = reference_nodes(block.family)[: FAMILIES[block.family].corners]
     centre = corners.mean(axis=0, keepdims=True)
     # exactly at a border of two surfaces of the same size a line may miss

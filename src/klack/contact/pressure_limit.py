@@ -1,14 +1,13 @@
-r"""Highest pressure that faces bear before their set grows, over the set.
+r"""Highest pressure that faces bear before their set grows.
 
 A contact point whose pressure reaches the limit yields, and its set *w* follows,
 
 .. math:: 0 \le p \le p_\text{lim}(w), \qquad \dot w \ge 0, \qquad
     \dot w\, (p_\text{lim}(w) - p) = 0 ,
 
-a bed of rigid-plastic springs that harden, in series with the elastic bodies.  In a contact of
-width *b* the limit is some 1.7 Y at first yield and rises to 2.3 to 3 Y where the plastic zone has
-reached the faces all over (Johnson, Contact Mechanics, 1985, section 6.3), so that a constant one
-is right at one load only.
+a bed of rigid-plastic springs that harden, in series with the elastic bodies. The limit is some
+1.7 Y at first yield and rises to 2.3 to 3 Y where the plastic zone has reached the faces all over
+(Johnson, Contact Mechanics, 1985, section 6.3): a constant one is right at one load only.
 """
 
 from dataclasses import dataclass
@@ -24,19 +23,14 @@ __all__ = ["PressureLimit"]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PressureLimit:
-    """Limit as straight lines between sets; it rises as the last line beyond them.
+    """Limit as straight lines between sets; the last line continues.
 
     Parameters
     ----------
     set (m,) [m]
         Increasing from 0, two at least.
     pressure (m,) [Pa]
-        Increasing, above 0.
-
-    Raises
-    ------
-    InputError
-        For a limit that does not rise: the set would not be unique.
+        Increasing, above 0: else the set would not be unique.
     """
 
     set: Floats
@@ -54,7 +48,7 @@ class PressureLimit:
 
     @property
     def deepest(self) -> float:
-        """Set [m] up to which the limit is known; beyond it is a guess."""
+        """Set [m] up to which the limit is known."""
         return float(self.set[-1])
 
     @cached_property
@@ -64,7 +58,7 @@ class PressureLimit:
         return np.append(lines, lines[-1])
 
     def loss(self, set: Floats) -> Floats:
-        """Plastic work per area [J/m^2] up to a set [m], the integral of the limit."""
+        """Plastic work [J/m^2] up to a set [m], the integral of the limit."""
         between = np.diff(self.set) * (self.pressure[1:] + self.pressure[:-1]) / 2.0
         whole = np.concatenate([[0.0], np.cumsum(between)])
         line = np.clip(np.searchsorted(self.set, set, side="right") - 1, 0, len(self.set) - 1)

@@ -36,7 +36,7 @@ _BOX_SAMPLES = 5  # along an edge, at which a face is sampled for its box
 
 
 class CurvedFaces(NamedTuple):
-    """Faces of a master surface, all blocks of it in turn, ready to be cut by lines."""
+    """Faces of a master surface, all blocks in turn, ready to be cut by lines."""
 
     coefficients: Cube  # (f, 8, 3)
     centre: Matrix  # (f, 3) [m] middle of the box around each face
@@ -49,7 +49,7 @@ class CurvedFaces(NamedTuple):
 def face_polynomials(
     points: NDArray[np.float64], family: str, connectivity: NDArray[np.int64]
 ) -> NDArray[np.float64]:
-    """Coefficients of every face, shape (f, 8, 3); axisymmetric points are put at (r, 0, z)."""
+    """Coefficients of every face, shape (f, 8, 3); axisymmetric points as (r, 0, z)."""
     corner = points[connectivity]
     if corner.shape[2] == 3:
         return np.einsum("nm,fnd->fmd", _monomial_factors(family), corner)
@@ -66,9 +66,9 @@ def face_boxes(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Box around every face: middle (f, 3), directions in rows (f, 3, 3), half widths (f, 3).
 
-    The first direction is the longest of the face, the last one its normal.  Between the samples
-    of a face that is a quadratic along each line, its extent can exceed theirs by 1/16 of the
-    bulge; the box has a tenth more than the samples span.
+    The first direction is the longest, the last one the normal. Between samples of a face that is
+    quadratic along each line, its extent can exceed theirs by 1/16 of the bulge; the box has a
+    tenth more.
     """
     s = np.linspace(0.0, 1.0, _BOX_SAMPLES)
     square = np.stack(np.meshgrid(2.0 * s - 1.0, 2.0 * s - 1.0), axis=-1).reshape(-1, 2)
@@ -121,14 +121,9 @@ def _monomial_factors(family: str) -> NDArray[np.float64]:
 def cut_nearest(
     points: Matrix, normals: Matrix, faces: CurvedFaces
 ) -> tuple[Index, Matrix, Vector]:
-    """Nearest valid cut of every line, points and normals of shape (p, 3), with any of the faces.
+    """Nearest valid cut of every line, points and normals (p, 3), with any of the faces.
 
-    Returns
-    -------
-    face (p,)
-        -1 where nothing is cut.
-    xi (p, 2)
-    gap (p,)
+    Returns face (p,), -1 where nothing is cut, xi (p, 2) and gap (p,).
     """
     count = len(points)
     face = np.full(count, -1, dtype=np.int64)
@@ -145,16 +140,11 @@ def cut_nearest(
 def cut_listed(
     first: Index, listed: Index, points: Matrix, normals: Matrix, faces: CurvedFaces
 ) -> Vector:
-    """Nearest valid cut of every line, looked for among a few faces first.
+    """Gap (p,) of the nearest valid cut of every line, first among a few faces; nan where none is.
 
     Line p tries the faces ``listed[first[p]:first[p + 1]]``, and all others if none of these is
     cut.  A cut much nearer than its face is wide is the nearest one: between two sheets of a
-    surface that look the same way there is a whole wall.  Else as :func:`cut_nearest`.
-
-    Returns
-    -------
-    gap (p,)
-        nan where nothing is cut.
+    surface that look the same way there is a whole wall.
     """
     gap = np.full(len(points), np.nan)
     every = np.arange(len(faces.coefficients))
@@ -172,13 +162,7 @@ def list_near(
 ) -> tuple[Index, Index]:
     """Faces whose boxes, larger by ``within`` [m] on all sides, each line meets.
 
-    Face ``start[p]`` (-1: none) comes first.
-
-    Returns
-    -------
-    first (p + 1,)
-    listed : int array
-        Faces ``listed[first[p]:first[p + 1]]`` are near line p.
+    Face ``start[p]`` (-1: none) comes first; of line p ``listed[first[p]:first[p + 1]]``.
     """
     first = np.zeros(len(points) + 1, dtype=np.int64)
     for fill in (False, True):
@@ -200,7 +184,7 @@ def list_near(
 
 @inner
 def _meets_box(d, n, axes, half, within):  # type: ignore[no-untyped-def]
-    """Whether a line along n meets a box whose middle is at d from a point of the line."""
+    """Whether a line along n meets a box whose middle is at d from it."""
     x = d[0] * axes[0, 0] + d[1] * axes[0, 1] + d[2] * axes[0, 2]
     y = d[0] * axes[1, 0] + d[1] * axes[1, 1] + d[2] * axes[1, 2]
     z = d[0] * axes[2, 0] + d[1] * axes[2, 1] + d[2] * axes[2, 2]
@@ -218,7 +202,7 @@ def _meets_box(d, n, axes, half, within):  # type: ignore[no-untyped-def]
 
 @inner
 def _nearest_of(tried, x, n, faces, close):  # type: ignore[no-untyped-def]
-    """Nearest valid cut of one line with some faces; returns face, u, v, gap.
+    """Nearest valid cut of one line: face, u, v, gap.
 
     A cut nearer than ``close`` half widths of its face ends the search.
     """
@@ -270,7 +254,7 @@ def _component(c, k, u, v):  # type: ignore[no-untyped-def]
 
 @inner
 def cut_face(c, x0, x1, x2, n0, n1, n2, u, v, g):  # type: ignore[no-untyped-def]
-    """Solve x + g n = face(u, v) from a guess; returns u, v, g, cosine of the normals, settled."""
+    """Solve x + g n = face(u, v) from a guess; u, v, g, cosine of the normals, settled."""
     for _ in range(25):
         p0, a0, b0 = _component(c, 0, u, v)
         p1, a1, b1 = _component(c, 1, u, v)

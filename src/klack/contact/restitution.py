@@ -1,6 +1,6 @@
-r"""Numbers of one impact: peak force, contact time, impulse, restitution, vibration left behind.
+r"""Measures of one impact: peak force, contact time, impulse, restitution, vibration left.
 
-Restitution is a *result* and belongs to the centres of mass, never to a point of the surface:
+Restitution belongs to the centres of mass, never to a point of the surface:
 
 .. math:: e = -\frac{(v_a - v_b)_\text{after}}{(v_a - v_b)_\text{before}}
 
@@ -8,12 +8,11 @@ Restitution is a *result* and belongs to the centres of mass, never to a point o
 twice the longest contact before, form one cluster = one impact; ``after`` is after the last of
 them.
 
-Times are found inside the records: the impulse gathered since first touch grows like a power ``1
-+ n`` of the time (``n = 1`` for a linear law, 1.5 for Hertz), so three sums of the force give the
-exponent and the instant of touch.  The same rule, backwards, gives the end.  Where the force
-fades out instead of ending (rods do, in theory without end), the end is where it crosses the
-threshold: that is the rule when the way from the threshold to zero takes more than half the time
-of the fall from ten times the threshold to the threshold.
+Times are found inside the records: the impulse since first touch grows like a power ``1 + n`` of
+the time (``n = 1`` for a linear law, 1.5 for Hertz), so three sums of the force give the exponent
+and the instant of touch; backwards, the end. A force that fades out (of rods, in theory without
+end) ends where it crosses the threshold: when the way from there to zero takes more than half the
+time of the fall from ten times the threshold.
 """
 
 from dataclasses import dataclass
@@ -39,12 +38,12 @@ class ContactPhase:
     Parameters
     ----------
     start, end [s]
-        First touch and separation, located inside the records.
+        Located inside the records.
     peak_force [N]
     peak_time [s]
-        Middle of the record that holds the peak.
+        Middle of its record.
     first, last
-        Records ``first <= i < last`` belong to the contact.
+        Records ``first <= i < last``.
     """
 
     start: float
@@ -62,27 +61,27 @@ class ContactPhase:
 
 @dataclass(frozen=True, kw_only=True)
 class ImpactMeasures:
-    """The numbers of the first impact (cluster of contacts) of a history.
+    """Measures of the first impact (cluster of contacts) of a history.
 
     Parameters
     ----------
     peak_force [N]
-        Largest force of any integration step.
+        Of any integration step.
     peak_time [s]
-        Counted from first touch.
+        From first touch.
     strongest
-        Which contact of the cluster has the peak force, counted from 1.
+        Contact of the cluster with the peak force, from 1.
     first_touch [s]
     contact_time [s]
         First touch to the end of the first contact.
     total_contact_time [s]
-        First touch to the end of the last contact of the cluster.
+        The same of the last contact of the cluster.
     sub_contacts
         Contacts in the cluster.
     impulse [N s]
         Of the cluster.
     approach_speed, rebound_speed [m/s]
-        Relative speed of the centres of mass, both above zero for an ordinary rebound.
+        Relative, of the centres of mass, both above zero for an ordinary rebound.
     restitution [-]
         nan where the record ends before separation.
     restitution_from_impulse [-]
@@ -93,7 +92,7 @@ class ImpactMeasures:
         Contact dissipation, modal damping and friction of the whole record over the energy of
         approach.
     vibration_share [-]
-        ``1 - e^2 - dissipated_share``: energy of approach left in vibration.
+        ``1 - e^2 - dissipated_share``.
     impacts
         Clusters in the record.
     """
@@ -119,26 +118,26 @@ class ImpactMeasures:
     def cut_off(self) -> bool:
         """Whether the record ends before separation.
 
-        Peak force, contact time and impulse are then those of the part that was recorded.
+        Peak force, contact time and impulse are then those of the recorded part.
         """
         return self.restitution != self.restitution
 
 
 @dataclass(frozen=True, kw_only=True)
 class Deviation:
-    """Deviation of one history from another (candidate minus reference).
+    """Deviation of one history from another.
 
     Parameters
     ----------
     peak_force, contact_time, impulse [-]
-        Relative to the reference.
+        Relative.
     restitution [-]
         Absolute.
     history_l2 [-]
-        Root mean square force difference over the contact, first touch aligned, over the peak
-        force of the reference.
+        RMS force difference over the contact, first touch aligned, over the peak force of the
+        reference.
     third_octave_max_dB [dB]
-        Largest level difference over the bands of the reference within 40 dB of its highest band.
+        Largest, over the bands of the reference within 40 dB of its highest.
     third_octave_up_to_Hz [Hz]
         Middle frequency of the highest band compared.
     """
@@ -155,13 +154,9 @@ class Deviation:
 def find_contacts(history: ImpactHistory, *, threshold: float = 5e-3) -> tuple[ContactPhase, ...]:
     """Every contact of a record, in order.
 
-    A contact is a run of records with force above ``threshold`` times the peak force of the
-    history; chatter below it neither makes a contact nor prolongs one.  Its records extend
-    outwards while the force falls, so that the impulse is complete.
-
-    Parameters
-    ----------
-    threshold [-]
+    A contact is a run of records with force above ``threshold`` times the peak force; chatter
+    below it neither makes nor prolongs one. Its records extend outwards while the force falls, so
+    that the impulse is complete.
     """
     force = history.force
     peak = float(force.max(initial=0.0))
@@ -183,13 +178,7 @@ def find_contacts(history: ImpactHistory, *, threshold: float = 5e-3) -> tuple[C
 
 
 def measure_impact(history: ImpactHistory, *, threshold: float = 5e-3) -> ImpactMeasures:
-    """Numbers of the first impact in a history.
-
-    Parameters
-    ----------
-    threshold [-]
-        See :func:`find_contacts`.
-    """
+    """Measures of the first impact in a history; ``threshold`` as of :func:`find_contacts`."""
     phases = find_contacts(history, threshold=threshold)
     if not phases:
         raise InputError(
@@ -255,7 +244,7 @@ def _phase(history: ImpactHistory, first: int, last: int, threshold: float) -> C
 
 
 def _onset(force: NDArray, first: int, last: int, threshold: float, h: float) -> float:
-    """Time of touch of the contact in these records, from the beginning of ``force``."""
+    """Time of touch in these records, from the beginning of ``force``."""
     touch = (first + 1) * h - _time_since_touch(force[first : min(first + 3, last)], h)
     low = _crossing(force, first, last, threshold, h)
     high = _crossing(force, first, last, 10.0 * threshold, h)
@@ -266,7 +255,7 @@ def _onset(force: NDArray, first: int, last: int, threshold: float, h: float) ->
 
 
 def _crossing(force: NDArray, first: int, last: int, level: float, h: float) -> float:
-    """Time at which the mean force of the records first exceeds a level, by straight lines."""
+    """Time at which the mean force first exceeds a level, by straight lines."""
     k = first + int(np.argmax(force[first:last] > level))
     below, above = float(force[k - 1]) if k > 0 else 0.0, float(force[k])
     part = (level - below) / (above - below) if above > level > below else 0.0
@@ -274,7 +263,7 @@ def _crossing(force: NDArray, first: int, last: int, level: float, h: float) -> 
 
 
 def _time_since_touch(force: NDArray[np.float64], h: float) -> float:
-    """Part of the first record that was closed [s], from the first three mean forces."""
+    """Closed part of the first record [s], from the first three mean forces."""
     if force.size < 2 or not 0.0 < force[0] < force[1]:
         return h
     J = np.cumsum(force)  # J^(1/(1+n)) is a straight line in time that starts at touch
@@ -310,7 +299,7 @@ def _clusters(phases: tuple[ContactPhase, ...], longest_period: float) -> list[l
 
 
 def _outside_speed(history: ImpactHistory) -> NDArray[np.float64]:
-    """Speed that outside forces have given body a since the start, at the record ends [m/s]."""
+    """Speed that outside forces have given body a so far, at the record ends [m/s]."""
     gained = np.cumsum(history.external_force) * history.step / history.mass_a
     return np.concatenate(([0.0], gained))
 
@@ -325,7 +314,7 @@ def _velocity_before(history: ImpactHistory, first: int, touch: float) -> float:
 def _velocity_after(
     history: ImpactHistory, last: int, release: float, until: int, distance: float
 ) -> float:
-    """Relative velocity at separation: mean over the window, drift by outside forces removed."""
+    """Relative velocity at separation: mean over the window, less drift by outside forces."""
     edges = history.edges[last : until + 1]
     if edges.size < 2:
         return float("nan")

@@ -1,8 +1,8 @@
 """Contact points of two bodies of revolution on rings, for a needle that has left its axis.
 
 Every hat of the half section (:mod:`klack.contact.mortar`) becomes N points at equal angles, each
-with an N-th of the area of the ring.  The bodies are those of the centred position; the gaps are
-those of the surfaces where they are (:mod:`klack.contact.gap_update`).
+with an N-th of the area. The bodies are those of the centred position, the gaps those of the
+surfaces where they are (:mod:`klack.contact.gap_update`).
 """
 
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ __all__ = ["RingFriction", "RingSpace"]
 
 
 _CENTRAL = 3.0
-"""Element sizes from the axis up to which a hat is no ring."""
+"""Element sizes from the axis within which a hat is no ring."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -33,16 +33,16 @@ class RingSpace:
     Parameters
     ----------
     section
-        Hats of the half section, centred; its gaps do not count.
+        Of the half section, centred; its gaps do not count.
     count
-        N, angles of every ring.
+        N.
     ring, turn (nc,)
-        Hat of each point and number of its angle.
+        Hat of each point, number of its angle.
     gap (nc,) [m]
     rim (nc,)
-        Points with a neighbour that was left out, on their ring or beside it.
+        Points with an omitted neighbour, on their ring or beside it.
     beyond [m]
-        No point that was left out has a smaller gap.
+        Smallest gap of the omitted points.
     """
 
     section: ContactSpace
@@ -63,7 +63,7 @@ class RingSpace:
         where: str = "contact",
         more: str = "",
     ) -> Self:
-        """Points whose gap is at most ``limit`` [m].
+        """Points whose gap is at most ``limit`` [m]; rejects points around the axis, on no ring.
 
         Parameters
         ----------
@@ -72,13 +72,8 @@ class RingSpace:
         gap (hats, N) [m]
             Where the bodies are.
         limit [m]
-        where, more
-            Name of the contact, and what else may help, for a message.
-
-        Raises
-        ------
-        InputError
-            For points around the axis, which are on no ring.
+        more
+            What else may help, for a message.
         """
         keep = gap <= limit
         central = section.points[:, 0] < _CENTRAL * section.size
@@ -113,12 +108,12 @@ class RingSpace:
 
     @property
     def angles(self) -> Floats:
-        """Angles of every ring from x towards y, shape (N,) [rad]."""
+        """Of every ring from x towards y, shape (N,) [rad]."""
         return 2.0 * np.pi * np.arange(self.count) / self.count
 
     @property
     def points(self) -> Floats:
-        """Places of the points at the centred body, shape (nc, 3) [m]."""
+        """Places at the centred body, shape (nc, 3) [m]."""
         angle = self.angles[self.turn]
         r, z = self.section.points[self.ring].T
         return np.column_stack([r * np.cos(angle), r * np.sin(angle), z])
@@ -130,7 +125,7 @@ class RingSpace:
 
     @property
     def axial(self) -> Floats:
-        """Change of the gaps per translation of the upper body along +z, shape (nc,)."""
+        """Change of the gaps per lift of the upper body, shape (nc,)."""
         return np.asarray(self.section.axial[self.ring])
 
 
@@ -140,9 +135,9 @@ class RingFriction:
 
     Parameters
     ----------
-    meridian : pair of csr_array, shape (hats, 2 n_nodes)
-        Displacement of a past b in the half section, rows on the upper and on the lower body.
-    around, turned : pairs of csr_array, shape (hats, n_nodes), (hats, 2 n_nodes)
+    meridian (hats, 2 n_nodes)
+        Displacement of a past b in the half section, rows on the upper and the lower body.
+    around, turned (hats, n_nodes), (hats, 2 n_nodes)
         The same round the ring (:func:`klack.contact.mortar.around_rows`).
     """
 
@@ -161,15 +156,7 @@ class RingFriction:
         mesh_b: Mesh,
         surface_b: Surface,
     ) -> Self:
-        """Tangential rows of two surfaces, even without friction.
-
-        Parameters
-        ----------
-        section
-            Of these half sections.
-        mesh_a, surface_a, mesh_b, surface_b
-            As given to :func:`klack.contact.mortar.contact_space`.
-        """
+        """Tangential rows of two half sections, even without friction."""
         sides = (mesh_a, surface_a, mesh_b, surface_b)
         around, turned = around_rows(section, *sides)
         return cls(law=law, meridian=tangent_rows(section, *sides), around=around, turned=turned)

@@ -1,17 +1,17 @@
 r"""Law with memory of a reduced contact from its static loops.
 
-Closing, the law is that of the local law, point for point.  Opening, the full bodies slip back at
-a share *r* of the force of closing at the same approach, which holds at every depth where the slip
-is self-similar (Spence, J. Elasticity 5 (1975) 297); what the kept modes yield is taken off,
+Closing is the local law, point for point. Opening, the full bodies slip back at a share *r* of the
+force of closing at the same approach, at every depth where slip is self-similar (Spence, J.
+Elasticity 5 (1975) 297); what the kept modes yield is taken off,
 
 .. math:: d_{back} = \delta - c\, r P(\delta) .
 
-Half of the distance of the two curves is the strength of the sliders at each depth.  Their
-stiffness follows from the energy of the largest loop.  *r* itself is the one that suits all
-openings together with a stiffness of its own, before anything is taken off.
+Half of the distance of the two curves is the strength of the sliders at each depth; their
+stiffness follows from the energy of the largest loop. *r* is the one that suits all openings with
+a stiffness of its own, before anything is taken off.
 
-Limits: the modes carry the same share of a force in either direction of slip, though friction turns
-its radial part round; loops of other depths have errors, which :class:`RubbingFit` states.
+Limits: the modes carry the same share in either direction of slip, though friction turns its
+radial part round; loops of other depths have errors, see :class:`RubbingFit`.
 """
 
 from collections.abc import Sequence
@@ -35,12 +35,12 @@ _STIFFEST = 0.995  # (R - 1) / (R + 1) of sliders that hold hardly at all
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Loop:
-    """The full bodies close up to an approach and open again.
+    """Full bodies close up to an approach and open again.
 
     Parameters
     ----------
     approach (m,) [m]
-        While they open, falling to first touch.
+        Opening, falling to first touch.
     force (m,) [N]
     loss [J]
         Of the whole loop.
@@ -53,16 +53,16 @@ class Loop:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RubbingFit:
-    """A law with memory, and how far its loops are from those that it was made of.
+    """Law with memory, and how far its loops are from the given ones.
 
     Parameters
     ----------
     law : RubbingLaw or TableLaw
         Without memory where nothing is lost.
     reverse [-]
-        Force of slipping back over that of closing, at one approach.
+        r.
     loss [-]
-        Share of the work of the largest loop that is lost.
+        Lost share of the work of the largest loop.
     error [-]
         Largest error of the loss of a loop, over the work taken.
     """
@@ -74,19 +74,14 @@ class RubbingFit:
 
 
 def rubbing_fit(local: LocalLaw, loops: Sequence[Loop]) -> RubbingFit:
-    """Fit a law with memory.
+    """Fit a law with memory; rejects faces that lock.
 
     Parameters
     ----------
     local
-        Of the bodies while they close with friction.
+        Of bodies that close with friction.
     loops
         The last one from the end of ``local``.
-
-    Raises
-    ------
-    InputError
-        Where the faces lock.
     """
     closing = TableLaw(local.approach, local.force)
     taken = [float(closing.potential(loop.approach[0])) for loop in loops]
@@ -126,7 +121,7 @@ def _bed(knots: Vector, up: Vector, strength: Vector, *, ratio: float) -> Rubbin
 
 
 def _reverse(closing: TableLaw, loops: Sequence[Loop]) -> float:
-    """Force of slipping back over that of closing, by least squares over all openings."""
+    """Find r by least squares over all openings."""
     knots = float(closing.indentation[-1]) * (np.arange(_SPRINGS + 1) / _SPRINGS) ** 2
     up = closing.force(knots)
     size = float(up[-1])
@@ -153,7 +148,7 @@ def _back(closing: TableLaw, local: LocalLaw, reverse: float, knots: Vector) -> 
 
 
 def _under(x: Vector, y: Vector) -> Vector:
-    """Largest convex curve from the origin that is nowhere above y and nowhere falls."""
+    """Largest convex, rising curve from the origin that is nowhere above y."""
     y = np.minimum.accumulate(np.maximum(y, 0.0)[::-1])[::-1]
     kept: list[int] = []
     for i in range(len(x)):

@@ -1,9 +1,9 @@
 r"""Contact law with memory: what two faces with Coulomb friction do along the axis of motion.
 
-The bodies press each other along the axis, and their faces slip along the meridian: up the cone
-while the contact closes, down while it opens.  The law is a bed of springs, each touching at an
-indentation :math:`g_j` of its own.  Pressed in by :math:`x = \langle d - g_j \rangle` it has the
-force :math:`n_j x` of the pressure, and that of the friction, a spring :math:`k_j` with a slider,
+The faces slip along the meridian: up the cone while the contact closes, down while it opens. The
+law is a bed of springs, each touching at an indentation :math:`g_j`. Pressed in by :math:`x =
+\langle d - g_j \rangle` it has the force :math:`n_j x` of the pressure, and that of the friction,
+a spring :math:`k_j` with a slider,
 
 .. math::
     F = \sum_j n_j x_j + k_j (x_j - s_j), \qquad |k_j (x_j - s_j)| \le h_j x_j, \qquad
@@ -15,16 +15,14 @@ touch all sliders slip, :math:`F = \sum (n_j + h_j) x_j`; opening, each holds un
 
 .. math:: \frac{x}{x_{max}} = \frac{R - 1}{R + 1} ,
 
-and slips back below, :math:`F = \sum (n_j - h_j) x_j`.  The energy is
-:math:`\sum \tfrac12 n_j x_j^2 + \tfrac12 k_j (x_j - s_j)^2`, the rest of the work is lost, and no
-motion whatever gives any of it back.
+and slips back below, :math:`F = \sum (n_j - h_j) x_j`. The energy is :math:`\sum \tfrac12 n_j
+x_j^2 + \tfrac12 k_j (x_j - s_j)^2`; the rest of the work is lost.
 
 A rigid needle of half angle *a* on a cone with the stiffnesses :math:`k_n, k_t` at its ring is one
-such spring: :math:`n = k_n \sin^2 a`, :math:`h = \mu k_n \sin a \cos a`,
-:math:`k = k_t \cos^2 a`.  Springs of all depths make any law that stiffens, and each loses the same
-share of its work; this is what partial slip in a contact that grows comes to (Jaeger, Arch. Appl.
-Mech. 64 (1994) 235; Popov & Hess, Method of Dimensionality Reduction, 2015).  Of the work that one
-closing takes,
+such spring: :math:`n = k_n \sin^2 a`, :math:`h = \mu k_n \sin a \cos a`, :math:`k = k_t \cos^2 a`.
+Springs of all depths make any law that stiffens, each losing the same share of its work, as
+partial slip in a growing contact does (Jaeger, Arch. Appl. Mech. 64 (1994) 235; Popov & Hess,
+Method of Dimensionality Reduction, 2015). Of the work that one closing takes,
 
 .. math:: e^2 = 1 - \frac{2 H}{N + H}\,\frac{R - 1}{R + 1}
 
@@ -48,21 +46,18 @@ __all__ = ["RubbingLaw"]
 class RubbingLaw:
     """A bed of springs with sliders.
 
+    Rejects a contact that would not come apart by itself.
+
     Parameters
     ----------
     onset (n,) [m]
-        Indentation from which each spring is pressed, increasing, not negative.
+        Indentation :math:`g_j`, increasing, not negative.
     normal (n,) [N/m]
-        Stiffness of the pressure.
+        Of the pressure.
     strength (n,) [N/m]
-        What friction holds at most, per indentation; not negative.
+        What friction holds at most; not negative.
     ratio [-]
-        Stiffness of friction while it holds, over ``strength``; up to 1 nothing slips.
-
-    Raises
-    ------
-    InputError
-        Where the contact would not come apart by itself.
+        R; up to 1 nothing slips.
 
     Examples
     --------
@@ -101,22 +96,22 @@ class RubbingLaw:
             )
 
     def force(self, indentation: ArrayLike) -> Vector:
-        """Force [N] while the contact closes from first touch."""
+        """Force [N], closing from first touch."""
         return self._summed(self.normal + min(self.ratio, 1.0) * self.strength, indentation, 1)
 
     def returning(self, indentation: ArrayLike) -> Vector:
-        """Least force [N] at an indentation: all sliders slip back."""
+        """Least force [N]: all sliders slip back."""
         strength = self.strength if self.ratio > 1.0 else -self.ratio * self.strength
         return self._summed(self.normal - strength, indentation, 1)
 
     def potential(self, indentation: ArrayLike) -> Vector:
-        """Work [J] that closing from first touch takes."""
+        """Work [J], closing from first touch."""
         return self._summed(
             (self.normal + min(self.ratio, 1.0) * self.strength) / 2.0, indentation, 2
         )
 
     def tangent_stiffness(self, indentation: ArrayLike) -> Vector:
-        """Largest slope [N/m] at an indentation: all sliders hold."""
+        """Largest slope [N/m]: all sliders hold."""
         return self._summed(self.normal + self.ratio * self.strength, indentation, 0)
 
     def along(self, path: ArrayLike) -> Vector:
@@ -135,7 +130,7 @@ class RubbingLaw:
         return float(0.5 * (self.normal @ x**2 + held))
 
     def flat(self) -> FlatLaw:
-        """Return the law as plain numbers for the kernel: five of each spring, two of a slider."""
+        """Law as numbers for the kernel: five of each spring, two of a slider."""
         head = [float(self.onset.size), self.ratio]
         sliders = np.zeros(2 * self.onset.size)
         return FlatLaw(

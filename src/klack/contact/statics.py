@@ -10,8 +10,8 @@ with the flexibility F of each body (inertia relief for a free one).  For a rigi
 .. math:: g = g_0 - \delta\, a + C \lambda \ge 0, \qquad \lambda \ge 0, \qquad \lambda^T g = 0,
     \qquad P = a^T \lambda ,
 
-with the axial weights *a* of the contact space.  For a free body the approach is that of its centre
-of mass, as in a modal model with the rigid mode as one coordinate.
+with the axial weights *a* of the contact space. Of a free body it is the approach of its centre of
+mass, as in a modal model.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -56,10 +56,10 @@ _CHUNK = 64
 """Right-hand sides solved at once."""
 
 COARSE = 1.5
-"""Element size over half width of a contact that is too coarse to be judged."""
+"""Element size over half width of a contact too coarse to be judged."""
 
 _HALVES = 8
-"""Approaches below the first one that is asked for; at a 256th a contact has a few points."""
+"""Approaches below the first one wanted; at a 256th a contact has a few points."""
 
 _SECTORS = 6
 
@@ -76,17 +76,9 @@ def contact_compliance(
     *,
     faces: FaceFriction | None = None,
 ) -> NDArray[np.float64]:
-    """Condense the static compliance of both bodies to the contact points.
+    """Static compliance of both bodies at the contact points, symmetric, shape (nc, nc) [m/N].
 
-    Parameters
-    ----------
-    faces
-        With tangential rows, after those of the gaps.
-
-    Returns
-    -------
-    (nc, nc) [m/N]
-        Symmetric; with faces of all rows.
+    With ``faces``, tangential rows follow those of the gaps.
     """
     rows = space.G_a, space.G_b
     if faces is not None:
@@ -104,17 +96,9 @@ def compliances_of(
     flexibility_b: Flexibility,
     groups: Sequence[NDArray[np.int64]] = (),
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Condense the static compliance of each body to the contact points.
+    """Static compliance of each body at the contact points, symmetric, shape (nc, nc) [m/N] each.
 
-    Parameters
-    ----------
-    groups
-        Of points, see :func:`klack.bodies.elasticity.condensation.condensed_inverse`.
-
-    Returns
-    -------
-    C_a, C_b (nc, nc) [m/N]
-        Symmetric; their sum is :func:`contact_compliance`.
+    ``groups`` of points as in :func:`klack.bodies.elasticity.condensation.condensed_inverse`.
     """
     _require_memory(space.G_a, space.G_b)
     sides = ((flexibility_a, space.G_a), (flexibility_b, space.G_b))
@@ -128,16 +112,11 @@ def compliances_of(
 def condensed_compliance(
     rows_a: csr_array, rows_b: csr_array, flexibility_a: Flexibility, flexibility_b: Flexibility
 ) -> NDArray[np.float64]:
-    """Static compliance of both bodies at rows that act on both, gaps or offsets of their faces.
+    """Static compliance (n, n) [m/N] of both bodies at rows that act on both: gaps or offsets.
 
     Parameters
     ----------
     rows_a, rows_b (n, dofs of a), (n, dofs of b) [-]
-
-    Returns
-    -------
-    (n, n) [m/N]
-        Symmetric.
     """
     _require_memory(rows_a, rows_b)
     return _remembered_compliance(
@@ -149,10 +128,7 @@ def condensed_compliance(
 
 
 def _require_memory(rows_a: csr_array, rows_b: csr_array) -> None:
-    """Refuse more rows than fit: the compliance, those of both bodies, and a factor.
-
-    And what condensing the larger body to them takes.
-    """
+    """Reject more rows than fit: compliance, both bodies, a factor, and what condensing takes."""
     condensing = max(condensation_memory(*rows.shape) for rows in (rows_a, rows_b))
     count = rows_a.shape[0]
     require_memory(
@@ -183,8 +159,7 @@ def _remembered_compliance(
 class ReachError(InputError):
     """The contact grew to the border of the candidate points: their reach is too small.
 
-    ``held`` is the highest force [N] of the ladder whose contact stayed within the candidates, 0
-    where none did.
+    ``held`` is the highest force [N] of the ladder within the candidates, 0 for none.
     """
 
     held: float = 0.0
@@ -192,24 +167,24 @@ class ReachError(InputError):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StaticContact:
-    """Ladder of static contact states, from first touch upwards (first touch not included).
+    """Ladder of static contact states, from first touch (not included) upwards.
 
     Parameters
     ----------
     approach (n,) [m]
-        Rigid approach from first touch, increasing.
+        From first touch, increasing.
     force (n,) [N]
-        Axial force.
+        Axial.
     pressures (n, nc) [N]
-        Forces of the contact points; over ``space.area`` they are pressures.
+        Forces of the contact points.
     area (n,) [m^2]
         Sum of the hats that carry.
     active_count (n,)
     half_width (n,) [m]
-        Half width of a ring contact, or radius of a contact around one point, of the Hertzian
-        pressure with the same second moment.
+        Half width of a ring, or radius of a contact around one point, of the Hertzian pressure
+        with the same second moment.
     compliance (nc, nc) [m/N]
-        Static compliance of both bodies, condensed to the contact points.
+        As :func:`contact_compliance`.
     """
 
     space: ContactSpace
@@ -227,7 +202,7 @@ class StaticContact:
         return float(self.force[-1])
 
     def pattern_at(self, force: float) -> NDArray[np.float64]:
-        """Pressure pattern at an axial force [N], shape (nc,), scaled to a resultant of 1 N."""
+        """Pressure pattern at an axial force [N], shape (nc,), resultant 1 N."""
         if not 0 < force <= self.max_force * (1 + 1e-9):
             raise InputError(
                 "static contact: pattern_at",
@@ -245,7 +220,7 @@ class StaticContact:
         return lam / float(self.space.axial @ lam)
 
     def load_patterns(self, force: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Nodal loads on a and b, resultants +1 N and -1 N along z, in the pattern at ``force``."""
+        """Nodal loads on a and b, resultants +1 N and -1 N, in the pattern at ``force``."""
         lam = self.pattern_at(force)
         return self.space.G_a.T @ lam, self.space.G_b.T @ lam
 
@@ -261,18 +236,9 @@ def extended_compliance(
     flexibility_a: Flexibility,
     flexibility_b: Flexibility,
 ) -> NDArray[np.float64]:
-    """Condensed static compliance of a space that shares most of its points with a known one.
+    """Compliance (nc, nc) [m/N] of a space that shares most of its points with a known one.
 
-    Only the columns of the new points are solved for.
-
-    Parameters
-    ----------
-    space
-        Of the same surfaces and the same slave side as ``known.space``.
-
-    Returns
-    -------
-    array, shape (nc, nc) [m/N]
+    Only the columns of the new points are solved for; surfaces and slave side must be the same.
     """
     if space.slave != known.space.slave:
         return contact_compliance(space, flexibility_a, flexibility_b)
@@ -323,28 +289,21 @@ def static_contact(
     C (nc, nc) [m/N]
         From :func:`contact_compliance`.
     max_force [N]
-        The ladder ends at the first approach found that carries at least this much (up to 1 %
-        more).  Take it above the highest force of the impact.
-    count
-        Number of states.
+        The ladder ends at the first approach found that carries this much (up to 1 % more).  Take
+        it above the highest force of the impact.
     layer
-        Of the faces, in series with the bodies.
+        In series with the bodies.
 
     Raises
     ------
-    InputError
+    ReachError
         If a contact point at the rim of the candidates carries a force.
     """
     return ContactLadder(space, C, layer).contact(max_force, count)
 
 
 class ContactLadder:
-    """Pressures of one contact at one approach after the other; see :func:`static_contact`.
-
-    Parameters
-    ----------
-    C (nc, nc) [m/N]
-    """
+    """Pressures at one approach after the other; see :func:`static_contact`."""
 
     def __init__(
         self, space: ContactSpace, C: NDArray[np.float64], layer: AsperityLayer | None
@@ -362,7 +321,7 @@ class ContactLadder:
         return bool(self._solved)
 
     def contact(self, max_force: float, count: int = 24) -> StaticContact:
-        """Contact states up to an axial force [N], with their areas and widths."""
+        """Contact states up to a force [N], with areas and widths."""
         space = self.space
         approach, pressures = self.states(max_force, count)
         active = pressures > 0
@@ -380,7 +339,7 @@ class ContactLadder:
     def states(
         self, max_force: float, count: int = 24
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Approaches [m] and pressures [N], shape (count, nc), up to an axial force [N]."""
+        """Approaches [m] and pressures (count, nc) [N] up to a force [N]."""
         require_positive("static contact: max_force", max_force, "N")
         require_positive("static contact: count", count, "states")
         highest, lowest = _approach_for(self, max_force), self.first_touch
@@ -406,7 +365,7 @@ class ContactLadder:
 
 
 def _approach_for(ladder: ContactLadder, target: float) -> float:
-    """Approach whose force is between ``target`` and 1.01 ``target``: doubling, then secants."""
+    """Approach of a force between ``target`` and 1.01 ``target``: doubling, then secants."""
     first = int(np.argmin(np.where(ladder.space.axial > 1e-6, ladder.space.gap, np.inf)))
     low, low_force = ladder.first_touch, 0.0
     high = low + target * float(ladder.solver.A[first, first]) * 0.1
@@ -440,11 +399,10 @@ def _approach_for(ladder: ContactLadder, target: float) -> float:
 def half_widths(
     space: ContactSpace, pressures: Iterable[NDArray[np.float64]]
 ) -> NDArray[np.float64]:
-    """Half width [m] of each state of a contact from second moments of its pressures [N].
+    """Half width [m] of each state, from second moments of its pressures [N].
 
-    Semi-elliptic over a strip of half width b: variance b^2/4.  Hertzian over a circle of radius
-    a: mean square distance 2 a^2/5.  A single row of hats of elements of size h spreads its load
-    with a variance of h^2/24, the floor.
+    Semi-elliptic over a strip of half width b: variance b^2/4. Hertzian over a circle of radius a:
+    mean square distance 2 a^2/5. Floor: a single row of hats of size h, variance h^2/24.
     """
     meridians = _meridians(space)
     return np.array([_half_width(space, meridians, lam) for lam in pressures])
@@ -468,10 +426,7 @@ def _half_width(
 
 
 def _meridians(space: ContactSpace) -> list[NDArray[np.float64]]:
-    """Radius and height [m] of the points about each axis that a ring may have.
-
-    The axis of motion, and the middle of the candidates.
-    """
+    """Radius and height [m] of the points about z and about their middle."""
     axes = [np.zeros(space.dimension - 1)]
     if space.dimension == 3:
         axes.append(np.average(space.points[:, :2], axis=0, weights=space.area))
@@ -485,28 +440,25 @@ def _meridians(space: ContactSpace) -> list[NDArray[np.float64]]:
 def _closest_ring(
     weight: NDArray[np.float64], meridians: list[NDArray[np.float64]]
 ) -> tuple[float, float]:
-    """Spread of the pressure [m] and its mean radius [m] about the axis that suits it best."""
+    """Spread [m] and mean radius [m] of the pressure about the axis that suits it best."""
     return min(_about_axis(weight, meridian) for meridian in meridians)
 
 
 def _about_axis(weight: NDArray[np.float64], meridian: NDArray[np.float64]) -> tuple[float, float]:
-    """Spread of the pressure in the meridian plane [m] and its mean radius [m]."""
+    """The same about one axis."""
     mean = weight @ meridian
     return float(np.sqrt(weight @ _square(meridian - mean))), float(mean[0])
 
 
 def _square(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Squared lengths of few components, which NumPy sums slowly along rows."""
+    """Squared lengths of few components; NumPy sums slowly along rows."""
     return sum((column**2 for column in vectors.T[1:]), vectors[:, 0] ** 2)
 
 
 def check_rim(static: StaticContact) -> None:
-    """Refuse a contact that has grown to the border of the candidate points.
+    """Reject a contact that has grown to the border of the candidate points.
 
-    Raises
-    ------
-    InputError
-        It names the reach and the highest force without contact at the rim.
+    Names the reach and the highest force without contact at the rim.
     """
     _require_within(static.space, static.approach, static.pressures)
 
@@ -535,7 +487,7 @@ def check_state(
     needed: float,
     deepest: float,
 ) -> None:
-    """Refuse one state that has grown to the border of the candidate points.
+    """Reject one state that has grown to the border of the candidate points.
 
     Parameters
     ----------
@@ -544,10 +496,8 @@ def check_state(
     lam (nc,) [N]
     below [N]
         Highest force known to stay within.
-    needed [N]
-        That is asked for.
-    deepest [m]
-        Approach that is asked for.
+    needed, deepest [N], [m]
+        Wanted force and approach.
     """
     touched = bool(np.any(lam[space.rim] > 0))
     if not touched or space.complete_at(approach + min(space.clearance, space.touch)):
@@ -565,19 +515,10 @@ def check_state(
 
 
 def size_over_half_width(static: StaticContact, force: float | None = None) -> float:
-    """Element size across the contact over its half width, at an axial force.
+    """Element size over half width of the contact, at a force [N] or the end of the ladder.
 
     About one or less is good; above :data:`COARSE` the weighted gaps blur the contact.  On a mesh
     far too coarse the half width is that of one row of elements, and the ratio 2.4.
-
-    Parameters
-    ----------
-    force [N]
-        Without it the end of the ladder.
-
-    Returns
-    -------
-    float [-]
     """
     force = static.max_force if force is None else force
     width = static.half_width_at(force)
@@ -586,7 +527,7 @@ def size_over_half_width(static: StaticContact, force: float | None = None) -> f
 
 
 def points_across(static: StaticContact, force: float) -> int:
-    """Contact points that carry across the whole width of the contact at an axial force."""
+    """Contact points that carry across the width of the contact at a force."""
     space, lam = static.space, static.pattern_at(force)
     if space.dimension == 2:
         count = int(np.sum(lam > 0))
@@ -597,18 +538,13 @@ def points_across(static: StaticContact, force: float) -> int:
 
 
 def ring_radius(space: ContactSpace, lam: NDArray[np.float64]) -> float | None:
-    """Mean radius of a contact that is a narrow ring [m]; None for any other.
-
-    Parameters
-    ----------
-    lam (nc,) [N]
-    """
+    """Mean radius [m] of a contact that is a narrow ring; else None."""
     spread, mean = _closest_ring(lam / lam.sum(), _meridians(space))
     return mean if spread < _RING * mean else None
 
 
 def highest_load(space: ContactSpace, lam: NDArray[np.float64]) -> float:
-    """Force of the whole ring if every sector carried as much as the most loaded one [N]."""
+    """Force [N] if every sector carried as much as the most loaded one."""
     if space.dimension == 2:
         return float(lam.sum())
     centre = np.average(space.points[:, :2], axis=0, weights=lam)

@@ -1,7 +1,7 @@
-"""Constants of the laws and of the time step that generated code shares: C, Modelica and MATLAB.
+"""Constants of the laws and of the time step that C, Modelica and MATLAB exports share.
 
-Compiled and plain Python import them by name; the exports take name, value and meaning from
-:func:`shared_constants`.  None of them is written anywhere else.
+Python imports them by name, exports take them from :func:`shared_constants`; they are written
+nowhere else.
 """
 
 import sys
@@ -114,7 +114,7 @@ class SharedConstant(NamedTuple):
 
 
 def shared_constants(language: str) -> tuple[SharedConstant, ...]:
-    """Constants that "C", "Modelica" or "MATLAB" text is made with, in their order here."""
+    """Constants of "C", "Modelica" or "MATLAB" text, in their order here."""
     return tuple(
         SharedConstant(name, globals()[name], meaning)
         for name, hint in get_type_hints(sys.modules[__name__], include_extras=True).items()

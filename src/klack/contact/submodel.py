@@ -1,10 +1,10 @@
-r"""Stiffness of the contact region alone: the classical constant contact stiffness.
+"""Stiffness of the contact region alone: the classical constant contact stiffness.
 
-The usual recipe for reduced bodies takes the stiffness of the contact from a static model of a
-small region around it, fixed where it is cut out of the bodies, and fits a straight line: the
-"linear, 1e9 N/m" of the literature.  The number depends on the size of the region (a larger one
-yields more) and on the load, and the modes count part of it again.  It is offered so that users
-can reproduce it; the consistent law (:mod:`klack.contact.local_law`) needs no such choice.
+The usual recipe for reduced bodies takes it from a static model of a small region around the
+contact, fixed at its cut, and fits a straight line: the "linear, 1e9 N/m" of the literature.  It
+depends on the size of the region (a larger one yields more) and on the load, and the modes count
+part of it again.  It serves to reproduce the recipe; the consistent law
+(:mod:`klack.contact.local_law`) needs no such choice.
 """
 
 from dataclasses import dataclass, replace
@@ -31,10 +31,10 @@ class LocalStiffness:
     static
         Of the region.
     stiffness [N/m]
-        Slope of the least-squares line through the states within ``fit_range``.
+        Of the least-squares line within ``fit_range``.
     fit_range [N]
     size [m]
-        Distance from the contact up to which the bodies deform.
+        Up to which from the contact the bodies deform.
     """
 
     static: StaticContact
@@ -54,19 +54,16 @@ def local_stiffness(
 ) -> LocalStiffness:
     """Linear stiffness of the region within ``size`` of the contact, both bodies together.
 
-    Nodes farther than ``size`` from the contact points that carry at the end of the ladder are
-    held.
+    Nodes farther than ``size`` from the points that carry at the end of the ladder are held.
 
     Parameters
     ----------
     static
-        Of the full bodies; it says where the contact is and up to which force.
+        Of the full bodies: where the contact is, and up to which force.
     size [m]
         Some half widths of the contact; the result depends on it.
-    fit_share : pair of float [-]
-        Range of the fit as shares of the highest force.
-    cache
-        Keeps the compliance of the region for later runs.
+    fit_share [-]
+        Range of the fit over the highest force.
     """
     require_positive("contact submodel: size", size, "m")
     low, high = fit_share
@@ -107,7 +104,7 @@ def local_stiffness(
 
 
 def _region(body: ElasticBody, carrying: NDArray[np.float64], size: float) -> ElasticBody:
-    """Return the body with everything beyond ``size`` held."""
+    """Body with everything beyond ``size`` held."""
     distance, _ = scipy.spatial.cKDTree(carrying).query(body.mesh.points)
     beyond = np.flatnonzero(distance > size)
     free = body.mesh.node_count - len(beyond)

@@ -1,10 +1,10 @@
 r"""Edges of a contact surface: where the named surface ends, and where the skin has a corner.
 
 A contact that reaches the end of the *named* surface may continue beyond it; one on a sharp
-corner has no width of its own; at a blunt edge within a contact the pressure has no limit.  All
-are told by the angle between the outward normals of the two
-faces that meet: :math:`\cos\vartheta = n_1 \cdot n_2`, counted positive where the body is convex.
-In the half section of a body of revolution an edge is a point.
+corner has no width of its own; at a blunt edge within a contact the pressure has no limit.  The
+angle between the outward normals of two faces that meet tells,
+:math:`\cos\vartheta = n_1 \cdot n_2`, positive where the body is convex.  In a half section an
+edge is a point.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,32 +21,33 @@ from klack.mesh.mesh import FaceBlock, FaceTable, Mesh, Surface
 __all__ = ["SHARP", "SurfaceEdges", "surface_edges", "turned_away"]
 
 SHARP = np.radians(10.0 - 1e-6)
-"""Angle between two normals [rad] from which on an edge is a corner; a smooth surface on coarse
-quadratic faces has less."""
+"""Angle [rad] of two normals from which an edge is a corner; a smooth surface on coarse quadratic
+faces has less.
+"""
 
 _BLUNT = np.radians(1.0 - 1e-6)
-"""Angle [rad] from which on an edge is kept that turns twice as much as all beside it: those of the
-facets of a round face are alike."""
+"""Angle [rad] from which an edge is kept that turns twice as much as those beside it; facets of a
+round face are alike.
+"""
 
 _SHALLOW = np.sin(np.radians(0.5))
-"""Slope on both sides of a corner above which it is the corner that touches, not a face."""
+"""Slope on both sides from which the corner itself touches, not a face."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SurfaceEdges:
-    """Edges of a surface, each between one of its faces and another face of the skin.
+    """Edges between a face of a surface and another face of the skin.
 
     Parameters
     ----------
     line (m, 3, d) [m]
-        Begin, middle and end of each edge; three times the same point in a half section.
+        Begin, middle and end; three times one point in a half section.
     angle (m,) [rad]
         Between the outward normals; above 0 where the body is convex.
     along (m, 2, d) [-]
-        Unit tangents away from the edge into the face of the surface and into the other one.
+        Unit tangents away from the edge into the face of the surface and the other one.
     neighbour
-        Name of the surface that the other face belongs to; empty where it has none, None where it
-        belongs to the surface itself.
+        Surface of the other face; empty where it has none, None where it is the surface itself.
     """
 
     line: NDArray[np.float64]
@@ -56,7 +57,7 @@ class SurfaceEdges:
 
     @property
     def corners(self) -> NDArray[np.bool_]:
-        """Edges where a convex body has a corner, shape (m,)."""
+        """Corners of a convex body, shape (m,)."""
         return self.angle > SHARP
 
     @property
@@ -68,7 +69,7 @@ class SurfaceEdges:
     def distance(
         self, points: NDArray[np.float64], chosen: NDArray[np.int64]
     ) -> NDArray[np.float64]:
-        """Distance of points, shape (p, d), to some of the edges: shape (c, p) [m]."""
+        """Distance of points (p, d) to chosen edges, shape (c, p) [m]."""
         line = self.line[chosen]
         result = np.full((len(line), len(points)), np.inf)
         for i in (0, 1):
@@ -81,10 +82,10 @@ class SurfaceEdges:
 
 
 def surface_edges(mesh: Mesh, surface: Surface) -> SurfaceEdges:
-    """Find the edges of a surface at which it ends or has a corner.
+    """Edges at which a surface ends or has a corner.
 
-    Smooth edges between two of its own faces are left out, those of facets up to 10 degrees, and
-    places on the axis of a body of revolution.
+    Without smooth edges between its own faces, those of facets up to 10 degrees, and places on the
+    axis of a body of revolution.
     """
     own = _rims(mesh, surface.blocks)
     skin = _rims(mesh, _skin_beside(mesh, surface))
@@ -109,7 +110,7 @@ def surface_edges(mesh: Mesh, surface: Surface) -> SurfaceEdges:
             sides.setdefault(face, []).append(k)
 
     def beside(k: int) -> float:
-        """Twice the turn at the other sides of both faces, and within them."""
+        """Twice the turn beside and within both faces."""
         i, other, j, _ = rows[k]
         near = {*sides[own.faces[i]], *sides[other.faces[j]]} - {k}
         return 2.0 * max(own.turn[i], other.turn[j], *(abs(angle[n]) for n in near), 0.0)
@@ -131,7 +132,7 @@ def surface_edges(mesh: Mesh, surface: Surface) -> SurfaceEdges:
 
 @dataclass(frozen=True, slots=True)
 class _Rims:
-    """Sides of faces: corner nodes, normal there, tangent into the face, its turn to the middle."""
+    """Sides of faces: corner nodes, normal, tangent into the face, turn to its middle."""
 
     keys: list[tuple[int, ...]]
     faces: list[tuple[int, ...]]
@@ -190,7 +191,7 @@ def _angle(own: _Rims, i: int, other: _Rims, j: int) -> float:
 
 
 def _skin_beside(mesh: Mesh, surface: Surface) -> list[FaceBlock]:
-    """Faces of the skin outside of the surface that share a node with it."""
+    """Faces of the skin outside of the surface that touch it."""
     table = FaceTable.of(mesh.blocks)
     near = np.isin(table.keys, surface.nodes).any(axis=1)
     if mesh.dimension == 2:  # the axis is no skin
@@ -204,7 +205,7 @@ def _skin_beside(mesh: Mesh, surface: Surface) -> list[FaceBlock]:
 
 
 def _names(mesh: Mesh, faces: list[tuple[int, ...] | None]) -> list[str | None]:
-    """Name of the surface of each face, empty without one; None stays None."""
+    """Surface of each face, empty without one; None stays None."""
     wanted = {face for face in faces if face is not None}
     owner: Mapping[tuple[int, ...], str] = {
         face: name
@@ -220,7 +221,7 @@ def _names(mesh: Mesh, faces: list[tuple[int, ...] | None]) -> list[str | None]:
 
 
 def turned_away(edges: SurfaceEdges, mesh: Mesh, surface: Surface) -> NDArray[np.bool_]:
-    """Edges whose both faces lead away from the other surface, shape (m,)."""
+    """Edges whose faces both lead away from the other surface, shape (m,)."""
     if not edges.corners.any():
         return np.zeros(len(edges.line), dtype=bool)
     outward = -edges.along.sum(axis=1)

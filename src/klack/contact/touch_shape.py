@@ -7,16 +7,15 @@ Around the most loaded contact point the gap is, to second order in the tangent 
 taken on the curved faces, so a mesh much coarser than the contact gives it as well as a fine one.
 The eigenvalues of *H* are the relative curvatures of Hertz's theory.
 
-Force with which faces meet all at once: the pressure of plane waves on the area that closes.
+Force of faces that meet all at once: pressure of plane waves on the area that closes.
 
 A face that meets another at the speed v sends a plane wave into either body,
 
 .. math:: p = \frac{v}{1/z_a + 1/z_b}, \qquad z = \rho\, c_p = \sqrt{\rho\, M},
 
-with the density and the modulus M of uniaxial strain (Graff, Wave Motion in Elastic Solids, 1975,
-section 6.1), until waves from its edges arrive.  Points whose gaps differ by less than
-:math:`v \tau` have all met within the time :math:`\tau`.  So the force rises by p times their area
-in that time, whatever the bodies do elsewhere.
+with the modulus M of uniaxial strain (Graff, Wave Motion in Elastic Solids, 1975, section 6.1),
+until waves from its edges arrive. Points whose gaps differ by less than :math:`v \tau` meet within
+the time :math:`\tau`: the force rises by p times their area, whatever the bodies do elsewhere.
 """
 
 from math import sqrt
@@ -42,20 +41,16 @@ def relative_curvatures(
     pressures: NDArray[np.float64],
     sides: tuple[tuple[Mesh, Surface, CurvedFaces], tuple[Mesh, Surface, CurvedFaces]],
 ) -> NDArray[np.float64]:
-    """Principal relative curvatures [1/m] at the most loaded contact point, the largest first.
+    """Principal relative curvatures (d - 1,) [1/m] at the most loaded point, the largest first.
+
+    Convex positive: about 1/R for a sphere on a plane, 0 for flat on flat; nan where too little of
+    the faces has something to face.
 
     Parameters
     ----------
     pressures (nc,) [N]
-        Forces of the contact points.
-    sides : triples of mesh, surface and its faces
-        Of body a and of body b, as they touch.
-
-    Returns
-    -------
-    (d - 1,)
-        Convex positive: about 1/R for a sphere on a plane, 0 for flat on flat.  nan where too
-        little of the faces around that point has something to face.
+    sides
+        Of a and b, as they touch.
     """
     slave, master = sides if space.slave == "a" else (sides[1], sides[0])
     (mesh, surface, _), (*_, faces) = slave, master
@@ -86,7 +81,7 @@ def relative_curvatures(
 def _samples(
     mesh: Mesh, surface: Surface, node: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Positions and outward normals on the faces at a node, shape (p, d) each."""
+    """Positions and outward normals on the faces at a node, each (p, d)."""
     positions, normals = [], []
     for block in surface.blocks:
         lattice = face_lattice(block.family, _LATTICE)
@@ -108,19 +103,14 @@ def _tangents(normal: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def area_at_once(space: ContactSpace, travel: float) -> float:
-    """Area [m^2] that has met after a rigid travel [m] from first touch.
-
-    Parameters
-    ----------
-    travel [m]
-    """
+    """Area [m^2] that has met after a rigid travel [m] from first touch."""
     facing = space.axial > 1e-6
     height = space.gap[facing] / space.axial[facing]
     return float(space.area[facing][height <= np.min(height, initial=np.inf) + travel].sum())
 
 
 def front_pressure(speed: float, material_a: Material, material_b: Material) -> float:
-    """Pressure [Pa] of faces of these materials that meet at a speed [m/s].
+    """Pressure [Pa] of faces that meet at a speed [m/s].
 
     Examples
     --------

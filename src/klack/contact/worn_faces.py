@@ -1,4 +1,4 @@
-"""Faces that earlier impacts have worn: the gap that has stayed between them, over the radius."""
+"""Faces that earlier impacts have worn."""
 
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -19,10 +19,10 @@ class WornFaces:
     Parameters
     ----------
     radius (n,) [m]
-        Distance from the axis of motion, increasing.
+        From the axis of motion, increasing.
     opening (n,) [m]
-        Gap that has stayed between both faces, along their normal.  Linear between the radii,
-        constant beyond the first and the last.
+        Gap that has stayed between both faces, along their normal; linear between the radii,
+        constant outside.
     """
 
     radius: NDArray[np.float64]
@@ -30,15 +30,7 @@ class WornFaces:
 
 
 def opened_by(space: "ContactSpace", worn: WornFaces | None) -> "ContactSpace":
-    """Contact points of worn faces, which touch first where those as made did along the axis.
-
-    Parameters
-    ----------
-    space
-        Of faces as made; of two or three dimensions.
-    worn
-        None for faces as made.
-    """
+    """Contact points of worn faces, which touch first where those as made (``space``) did."""
     if worn is None:
         return space
     radius = np.linalg.norm(space.points[:, :-1], axis=1)

@@ -1,19 +1,18 @@
 r"""Contact law of faces that yield: closing once on one curve, opening on others.
 
-The largest indentation so far, :math:`d_m`, is all that the faces remember.  Below it they are
-elastic,
+The faces remember the largest indentation, :math:`d_m`. Below it they are elastic,
 
 .. math:: F = P(d_m)\, \varphi\Bigl(\frac{d - d_0(d_m)}{d_m - d_0(d_m)}; d_m\Bigr), \qquad
     \varphi(0) = 0, \quad \varphi(1) = 1 ,
 
-with the set :math:`d_0` that has stayed; beyond it they close along :math:`P(d)` and yield.  The
-plastic loss is the difference of the work of closing and of the elastic energy,
+with the set :math:`d_0`; beyond it they close along :math:`P(d)` and yield. The plastic loss, work
+of closing less elastic energy,
 
 .. math:: D(d_m) = \int_0^{d_m} P\, \mathrm dd - (d_m - d_0)\, P \int_0^1 \varphi\, \mathrm ds ,
 
-and never falls.  Linear between the states of the ladder, all three; so are the shapes between
-their points, for exact energies.  Beyond the last state closing goes straight on, and the faces
-open along its shape.
+never falls. All three are linear between the states of the ladder, shapes between their points,
+for exact energies. Beyond the last state closing continues straight, and the faces open along its
+shape.
 """
 
 from dataclasses import dataclass, replace
@@ -37,24 +36,21 @@ _LEAST_LOSS = -1e-6  # share of the work by which the loss may fall between two 
 class YieldingLaw:
     """Loading curve and elastic curves of faces that yield.
 
+    Rejects a loss that would fall as the faces are pressed further.
+
     Parameters
     ----------
     largest (m,) [m]
-        Indentations of the states, increasing; nothing has yielded at the first one.
+        Of the states, increasing; at the first nothing has yielded.
     set (m,) [m]
-        Indentation at which the faces part after each; 0 at the first.
+        Where the faces part after each; 0 at the first.
     closing (m,) [N]
-        Force of closing at ``largest``; increasing.
+        At ``largest``; increasing.
     shape (m, n) [-]
-        Elastic force over ``closing`` at ``n`` places from the set to the largest indentation,
-        ``(k / (n - 1))**2`` of the way; from 0 to 1.
+        Elastic force over ``closing``, from 0 to 1, at ``n`` places ``(k / (n - 1))**2`` of the
+        way from the set to the largest indentation.
     reached [m]
-        Largest indentation so far; up to the first state nothing has yielded.
-
-    Raises
-    ------
-    InputError
-        Where the loss would fall as the faces are pressed further.
+        Largest indentation so far.
     """
 
     largest: Floats
@@ -108,14 +104,14 @@ class YieldingLaw:
 
     @property
     def stiffest(self) -> float:
-        """Highest stiffness [N/m] of closing and of all openings."""
+        """Highest stiffness [N/m], closing or opening."""
         slope = np.max(np.diff(self.shape, axis=1) / np.diff(self.places), axis=1)
         opening = self.closing / (self.largest - self.set) * slope
         closing = np.diff(self.closing) / np.diff(self.largest)
         return float(max(opening.max(), closing.max()))
 
     def require(self, reached: float) -> None:
-        """Refuse an indentation [m] beyond the last state."""
+        """Reject an indentation [m] beyond the last state."""
         if reached > self.largest[-1] * (1.0 + 1e-9):
             raise InputError(
                 "law of faces that yield",
@@ -126,23 +122,23 @@ class YieldingLaw:
             )
 
     def after(self, reached: float) -> Self:
-        """Return the law of the same faces after they were pressed as far as ``reached`` [m]."""
+        """Law of the same faces after an indentation ``reached`` [m]."""
         return replace(self, reached=max(reached, self.reached))
 
     def force(self, indentation: ArrayLike) -> Floats:
-        """Force [N] of the faces as they are now, along the elastic curve and beyond it."""
+        """Force [N] of the present faces, along the elastic curve and beyond."""
         return self._along(indentation)[0]
 
     def potential(self, indentation: ArrayLike) -> Floats:
-        """Work [J] that closing the faces as they are now takes."""
+        """Work [J] of closing the present faces."""
         return self._along(indentation)[1]
 
     def tangent_stiffness(self, indentation: ArrayLike) -> Floats:
-        """Largest slope [N/m] of all states, whatever the indentation; 0 while open."""
+        """Largest slope [N/m] of all states; 0 while open."""
         return np.where(np.asarray(indentation, dtype=float) > 0.0, self.stiffest, 0.0)
 
     def _along(self, indentation: ArrayLike) -> tuple[Floats, Floats]:
-        """Force and work of closing the faces as they are now."""
+        """Force and work of closing the present faces."""
         d = np.asarray(indentation, dtype=float)
         deep = max(self.reached, float(self.largest[0]))
         at = np.interp(deep, self.largest, np.arange(self.largest.size))
@@ -164,23 +160,23 @@ class YieldingLaw:
         return np.where(d > deep, closing, elastic), np.where(d > deep, full + work - taken, stored)
 
     def _closing(self, d: Floats) -> tuple[Floats, Floats]:
-        """Force and work of the closing curve, which goes straight on behind its last state."""
+        """Force and work of the closing curve, straight behind its last state."""
         i = np.clip(np.searchsorted(self.largest, d) - 1, 0, self.largest.size - 2)
         slope = (np.diff(self.closing) / np.diff(self.largest))[i]
         x = d - self.largest[i]
         return self.closing[i] + slope * x, self.taken[i] + x * (self.closing[i] + 0.5 * slope * x)
 
     def set_after(self, reached: float) -> float:
-        """Set [m] after the faces were pressed as far as ``reached`` [m]."""
+        """Set [m] after an indentation ``reached`` [m]."""
         beyond = max(reached - float(self.largest[-1]), 0.0)
         return float(np.interp(reached, self.largest, self.set)) + beyond
 
     def loss_after(self, reached: float) -> float:
-        """Plastic loss [J] after the faces were pressed as far as ``reached`` [m]."""
+        """Plastic loss [J] after an indentation ``reached`` [m]."""
         return float(np.interp(reached, self.largest, self.loss))
 
     def flat(self) -> FlatLaw:
-        """Return the law as plain numbers for the kernel."""
+        """Law as numbers for the kernel."""
         integrals = np.concatenate(
             [
                 np.zeros((len(self.shape), 1)),

@@ -1,1 +1,1 @@
-"""Elastic-plastic contact: bodies that yield under their own contact forces."""
+"""Bodies that yield under their own contact forces."""

@@ -5,10 +5,10 @@ With the plastic gap :math:`g_p` of both bodies (:mod:`klack.contact.plasticity.
 .. math:: g = g_0 + g_p(\lambda; \text{history}) - \delta a + C \lambda \ge 0, \quad
     \lambda \ge 0, \quad \lambda^T g = 0 .
 
-Newton's method takes the tangent of the plastic gap and solves the complementarity problem exactly
-in every round, starts on the line of the last two states, and goes as far as the energy of the
-bodies falls.  Once the load falls the plastic gap stays as it is: the contact opens elastically
-on the deformed faces, which :func:`klack.contact.statics.static_contact` solves.
+Newton's method with the tangent of the plastic gap solves the complementarity problem exactly in
+every round, starts on the line of the last two states, and goes as far as the energy of the bodies
+falls. When the load falls the plastic gap stays: the contact opens elastically on the deformed
+faces.
 """
 
 from collections.abc import Callable, Sequence
@@ -33,19 +33,15 @@ _EXACT = 1e-4  # of the step
 
 
 def lowest_share(slope: Callable[[float], float], noise: float) -> float:
-    """Share of a step, at most 1, at which a convex function is lowest.
+    """Share of a step, at most 1, at which a convex function is lowest, within 1e-4.
 
     Parameters
     ----------
     slope
-        Of the function along the step, which rises with the share.
+        Along the step, rising with the share.  The whole step is taken where the slope there is
+        at most half of the first one.
     noise
-        Slopes below it are round-off, and the whole step is taken.
-
-    Returns
-    -------
-    float [-]
-        Within 1e-4, or 1 where the slope there is at most half of the first one.
+        Slopes below are round-off, and the whole step is taken.
     """
     first, last = slope(0.0), slope(1.0)
     if last <= _ENOUGH * abs(first) or max(abs(first), last) <= noise or first >= 0.0:
@@ -74,7 +70,7 @@ class LoadingState:
     plastic_work [J]
         Of both bodies since the beginning.
     plastic_strain [-]
-        Largest equivalent one of both.
+        Largest equivalent one.
     rounds
         Of Newton's method.
     """
@@ -90,14 +86,14 @@ class LoadingState:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Trial:
-    """Contact forces [N], and displacements [m] of each body beyond those of elastic bodies."""
+    """Contact forces [N], and displacements [m] beyond those of elastic bodies."""
 
     approach: float
     lam: Floats
     w: tuple[Floats, ...]
 
     def towards(self, other: "_Trial", share: float) -> "_Trial":
-        """State on the line to another one; beyond it for a share above 1."""
+        """State on the line to another, beyond it above 1."""
         return _Trial(
             approach=self.approach + share * (other.approach - self.approach),
             lam=self.lam + share * (other.lam - self.lam),
@@ -111,9 +107,9 @@ class YieldingContact:
     Parameters
     ----------
     C (nc, nc) [m/N]
-        Elastic compliance of both.
+        Elastic, of both.
     bodies
-        Those that may yield.
+        That may yield.
     """
 
     def __init__(self, space: ContactSpace, C: Floats, bodies: Sequence[YieldingBody]) -> None:
@@ -127,9 +123,7 @@ class YieldingContact:
         self._active: NDArray[np.bool_] | None = None
 
     def load(self, approach: float) -> LoadingState:
-        """Press the bodies together by ``approach`` [m] from first touch.
-
-        A step too large for Newton's method is halved.
+        """Press the bodies together by ``approach`` [m] from first touch, in parts where needed.
 
         Raises
         ------
@@ -164,7 +158,7 @@ class YieldingContact:
         )
 
     def _step(self, approach: float) -> int | None:
-        """Rounds of Newton's method that the step took; None where it found nothing."""
+        """Rounds of Newton's method; None where it found nothing."""
         space = self.space
         q = space.gap - (self._start + approach) * space.axial
         now, active = self._ahead(approach), self._active
@@ -199,7 +193,7 @@ class YieldingContact:
         return self._before.towards(self._now, (approach - self._before.approach) / way)
 
     def _widened(self, found: "_Trial") -> bool:
-        """Whether a body yields outside of its zone, which is wider now."""
+        """Whether a body yields outside of its zone, now widened."""
         outgrown = [
             body
             for body, w in zip(self.bodies, found.w, strict=True)
@@ -229,10 +223,9 @@ class YieldingContact:
     def _lowest(self, now: "_Trial", new: "_Trial") -> "_Trial":
         r"""State between two where the energy of the bodies is lowest.
 
-        Both keep the gaps closed or open, and so do all between them.  With the gaps opened on the
-        way, :math:`\Delta g`, the energy of the step of time rises there by
-        :math:`\lambda^T \Delta g + (\hat K w - f_p)^T \Delta u`; it is convex, so that Newton's
-        method with this line search finds its minimum from anywhere.
+        All between them keep the gaps closed or open. With the gaps opened on the way,
+        :math:`\Delta g`, the energy of the step of time rises by :math:`\lambda^T \Delta g + (\hat
+        K w - f_p)^T \Delta u`; it is convex, so this line search finds the minimum from anywhere.
         """
         pressed = new.lam - now.lam
         opened = self.C @ pressed
@@ -252,7 +245,7 @@ class YieldingContact:
         return now.towards(new, lowest_share(slope, noise))
 
     def first_yield(self, deepest: float) -> float | None:
-        """Approach [m] at which the first point yields; None where none does up to ``deepest``."""
+        """Approach [m] of first yield; None where none is up to ``deepest``."""
         if self._over_yield(deepest) < 0.0:
             return None
         lowest = max(self.space.touch - self._start, 1e-6 * deepest)
@@ -261,7 +254,7 @@ class YieldingContact:
         return float(scipy.optimize.brentq(self._over_yield, lowest, deepest, rtol=1e-3))
 
     def _over_yield(self, approach: float) -> float:
-        """Largest von Mises stress over the yield stress, less one, of bodies still elastic."""
+        """Largest von Mises stress over yield stress, less one, of bodies still elastic."""
         lam, _, _ = self._elastic.solve(
             self.space.gap - (self._start + approach) * self.space.axial, None
         )

@@ -1,24 +1,23 @@
 r"""Static loops of two bodies that yield: closing once, opening from every depth.
 
-Closing goes along the ladder of :mod:`klack.contact.plasticity.ladder`.  From each of its states
-the contact opens elastically on the faces as they are then,
+Closing follows :mod:`klack.contact.plasticity.ladder`. From each of its states the contact opens
+elastically on the faces as they are then,
 
 .. math:: g = g_0 + g_p(P_m) - \delta a + C \lambda \ge 0, \quad \lambda \ge 0, \quad
     \lambda^T g = 0 ,
 
-and closes again on the same curve up to the largest force :math:`P_m` so far.  Of the work of
-closing :math:`W_L(P_m) = \int P\, d\delta`, opening gives back :math:`W_e(P_m)`; the plastic loss
-:math:`D = W_L - W_e` is heat for the most part, and about a tenth of it stays in the bodies as
-energy of residual stress.
+and closes again on the same curve up to the largest force :math:`P_m`. Of the work of closing
+:math:`W_L(P_m) = \int P\, d\delta`, opening gives back :math:`W_e(P_m)`; the plastic loss is
+:math:`D = W_L - W_e`.
 
-Second and later cycles to the same force are elastic: plastic work on unloading and reloading is
-below 1e-3 of that of the first loading (Johnson, Contact Mechanics, 1985, section 6.5 on
-shakedown), so that the largest force is all that the faces remember.
+Later cycles to the same force are elastic: their plastic work is below 1e-3 of that of the first
+loading (Johnson, Contact Mechanics, 1985, section 6.5 on shakedown), so that the faces remember
+the largest force alone.
 
 Law of faces that yield from the static loops of the two full bodies.
 
-Of every approach the kept modes carry their share, :math:`d = \delta - c P`, closing and opening
-alike: the share is linear, so that it drops out of every loop.
+The kept modes carry their share of every approach, :math:`d = \delta - c P`: linear, it drops out
+of every loop.
 """
 
 from dataclasses import dataclass
@@ -54,7 +53,7 @@ _GROWTH = 1.15
 """Force from one state of the ladder to the next."""
 
 _STRAIN = 0.3
-"""Plastic strain at which loops end: theirs is small strain."""
+"""Plastic strain at which loops end, as strains are small."""
 
 _FEWEST, _MOST = 5, 400
 """States: a law needs some, even where the energy ends just above first yield."""
@@ -67,7 +66,7 @@ class Opening:
     Parameters
     ----------
     approach (n,) [m]
-        Rising from the set, the approach at which the faces part, to the largest one.
+        Rising from the set to the largest one.
     force (n,) [N]
     """
 
@@ -93,23 +92,23 @@ class YieldingLoops:
     Parameters
     ----------
     first_yield [N]
-        Force at which the first point yields.
+        Force at first yield.
     elastic
         Of the faces as made.
     states
-        From first yield upwards; none where nothing yields.
+        From first yield; none where nothing yields.
     taken (n,) [J]
-        Work of closing up to each state.
+        Work of closing.
     half_width (n,) [m]
-        Of the contact at each state: half the width of the land that it leaves.
+        Of the contact at each state: half the land that it leaves.
     radius (nc,) [m]
-        Of the contact points, from the axis.
+        Of the contact points from the axis.
     limit
         Why they end before an opening gives back the energy of the impact, so that running-in may
-        go beyond them; empty where they do not.
+        exceed them; else empty.
     pressure_limit
-        With which points that yield for themselves take the same force and loss; None where it has
-        not been fitted, or nothing yields.
+        With which points that yield for themselves take the same force and loss; None if not
+        fitted, or nothing yields.
     """
 
     first_yield: float
@@ -129,7 +128,7 @@ class YieldingLoops:
         return np.asarray(np.maximum.accumulate(np.maximum(self.taken - stored, 0.0)))
 
     def plastic_gap_after(self, force: float) -> Floats:
-        """Plastic gap [m] of the contact points after a largest force [N], shape (nc,)."""
+        """Plastic gap [m] after a largest force [N], shape (nc,)."""
         gaps = scipy.interpolate.PchipInterpolator(
             self.force, [state.plastic_gap for state in self.states]
         )
@@ -144,14 +143,13 @@ class YieldingLoops:
 def opening(
     space: ContactSpace, solver: ComplementaritySolver, plastic_gap: Floats, approach: float
 ) -> Opening:
-    """Elastic curve up to an approach, counted from first touch of the faces as made.
+    """Elastic curve up to an approach [m] from first touch of the faces as made.
 
     Parameters
     ----------
     solver
         Of the elastic compliance.
     plastic_gap (nc,) [m]
-    approach [m]
     """
     start = min(space.clearance, space.touch)
     gap = space.gap + plastic_gap
@@ -168,14 +166,12 @@ def opening(
 def yielding_loops(
     contact: YieldingContact, *, deepest: float, energy: float, closing: float
 ) -> YieldingLoops:
-    """Close until an opening gives back what an impact has, so that running-in ends on the curve.
+    """Close until an opening gives back what an impact has: there running-in ends.
 
     Parameters
     ----------
-    contact
-        Fresh.
     deepest [m]
-        Approach of the same impact of bodies that do not yield, or more.
+        At least the approach of the same impact of elastic bodies.
     energy [J]
         Of the impact.
     closing [N]
@@ -320,26 +316,21 @@ def loops_of_entry(entry: Entry) -> YieldingLoops:
 
 
 _FINE, _PLACES = 129, 65
-"""Of the tables: the elastic curve within 1e-4 of the force, the loss within 1e-4 of itself."""
+"""Of the tables: elastic curve within 1e-4 of the force, loss within 1e-4 of itself."""
 
 _LITTLE = 1e-2
-"""Of the work of closing: what the loss may fall between two states of a coarse mesh."""
+"""Share of the work of closing by which the loss may fall between two states."""
 
 
 def yielding_law(loops: YieldingLoops, modal_compliance: float) -> YieldingLaw:
-    """Law for a reduced model.
+    """Law for a reduced model; rejects modes that leave a rest that is not monotone.
 
     Parameters
     ----------
     loops
         With at least four states.
     modal_compliance [m/N]
-        Of the kept modes, see :func:`klack.contact.local_law.consistent_law`.
-
-    Raises
-    ------
-    InputError
-        If the modes carry so much that the rest is not monotone.
+        See :func:`klack.contact.local_law.consistent_law`.
     """
     force = loops.force
     largest = np.array([s.approach for s in loops.states]) - modal_compliance * force
@@ -378,7 +369,7 @@ def yielding_law(loops: YieldingLoops, modal_compliance: float) -> YieldingLaw:
 def _rising_loss(
     largest: Floats, parted: Floats, force: Floats, shape: Floats, places: Floats
 ) -> Floats:
-    """Sets [m] with which the loss does not fall, where it falls by little on a coarse mesh."""
+    """Sets [m] with which the loss never falls, as it may by little on a coarse mesh."""
     full = force * np.trapezoid(shape, places, axis=1)  # per way from the set
     stored = full * (largest - parted)
     more = np.diff(largest) * (force[1:] + force[:-1]) / 2.0

@@ -8,8 +8,7 @@ With the deviator of the stress tried elastically, :math:`\xi = s^{tr} - \alpha`
     \Delta\varepsilon_p = \sqrt{3/2}\,\Delta\bar\varepsilon\, n, \quad n = \xi/|\xi|, \qquad
     \Delta\alpha = \tfrac23 H_k \Delta\varepsilon_p .
 
-The step is implicit (backward Euler).  What yielding takes off the elastic stiffness is, consistent
-with the step,
+The step is implicit (backward Euler). What yielding consistently takes off the elastic stiffness,
 
 .. math::
     D - D_{ep} = 2 G\,[(1 - \theta)\, P + \bar\theta\, n \otimes n], \quad
@@ -17,11 +16,10 @@ with the step,
     \bar\theta = \frac{3 G}{3 G + H_i + H_k} - (1 - \theta) ,
 
 with the deviatoric projection P (Simo & Hughes, Computational Inelasticity, 1998, sections 3.3 and
-3.4).  It is symmetric and positive semi-definite.
+3.4), is symmetric and positive semi-definite.
 
-Tensors of a body of revolution are rows (rr, zz, tt, rz) with the *tensor* shear, so that the
-product of two of them counts rz twice; a stiffness maps strains with the *engineering* shear to
-such rows.
+Tensors of a body of revolution are rows (rr, zz, tt, rz) with the *tensor* shear: their product
+counts rz twice. A stiffness maps strains with the *engineering* shear to such rows.
 """
 
 from dataclasses import dataclass
@@ -47,9 +45,9 @@ class PlasticState:
     Parameters
     ----------
     strain (n, 4) [-]
-        Plastic strain (rr, zz, tt, rz), without change of volume.
+        (rr, zz, tt, rz), without change of volume.
     equivalent (n,) [-]
-        Equivalent plastic strain, which never falls.
+        Never falls.
     """
 
     strain: Floats
@@ -103,13 +101,13 @@ def radial_return(
     Parameters
     ----------
     strain (n, 4) [-]
-        Whole strain at the end of the step.
+        Whole strain at the end.
     before
-        At its beginning.
+        At the beginning.
     shear_modulus [Pa]
     loading
-        Points that are on the yield surface count as yielding: the tangent of a step of further
-        loading, before anything of it is known.
+        Points on the yield surface count as yielding: the tangent of a step of further loading,
+        before anything of it is known.
     """
     G, H_i, H_k = shear_modulus, hardening.isotropic, hardening.kinematic
     xi = 2.0 * G * _deviator(strain - before.strain) - (2.0 / 3.0) * H_k * before.strain

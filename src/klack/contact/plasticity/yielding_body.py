@@ -27,15 +27,7 @@ __all__ = ["Answer", "LoadedBody", "YieldingBody"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LoadedBody:
-    """One of the two bodies of a contact.
-
-    Parameters
-    ----------
-    body
-        In the meridian plane.
-    materials
-        Of its solids; those with hardening yield.
-    """
+    """A body of a contact, in the meridian plane; its solids with hardening yield."""
 
     body: ElasticBody
     flexibility: Flexibility
@@ -48,7 +40,7 @@ class LoadedBody:
 
     @property
     def plastic_numbers(self) -> tuple[str | float, ...]:
-        """Names of its solids that may yield, each with yield stress and both slopes [Pa]."""
+        """Solids that may yield, each with yield stress and both slopes [Pa]."""
         found: list[str | float] = []
         for solid, material in sorted(self.materials.items()):
             if material.hardening is not None:
@@ -56,7 +48,7 @@ class LoadedBody:
         return tuple(found)
 
     def elements_near(self, place: Floats, radius: float) -> NDArray[np.bool_]:
-        """Elements that may yield, within a radius of a place [m], shape (n_elements,)."""
+        """Elements that may yield within a radius of a place [m], shape (n_elements,)."""
         near = []
         for block in self.body.mesh.blocks:
             middle = self.body.mesh.points[block.connectivity].mean(axis=1)
@@ -81,11 +73,11 @@ class Answer:
     compliance (nc, nc) [m/N]
         Symmetric, positive semi-definite.
     step (nz,) [m]
-        Change of w at the present forces.
+        Change of w.
     along (nz, nc) [m/N]
-        Change of w per contact force.
+        Of w per contact force.
     residual [-]
-        Forces out of balance over the plastic ones; where these begin, over a thousandth of the
+        Forces out of balance over the plastic ones; at their begin over a thousandth of the
         contact force of a point.
     """
 
@@ -97,10 +89,10 @@ class Answer:
 
 
 class YieldingBody:
-    """One of the two bodies; the state of the last accepted step, and of the step being tried.
+    """State of the last accepted step, and of the step being tried.
 
     Only a zone about the contact may yield.  Where the rest would, the zone is widened, and keeps
-    what has yielded so far.
+    what has yielded.
 
     Parameters
     ----------
@@ -109,7 +101,7 @@ class YieldingBody:
     place (2,) [m]
         Middle of the contact.
     radius [m]
-        Of the first zone about it.
+        Of the first zone.
     """
 
     def __init__(self, body: LoadedBody, rows: csr_array, place: Floats, radius: float) -> None:
@@ -130,7 +122,7 @@ class YieldingBody:
         self._rest = strain_points(one.body.mesh, one.materials, beyond, one.body.name)
 
     def rest_is_elastic(self, lam: Floats, w: Floats) -> bool:
-        """Whether no point outside of the zone is beyond its yield stress."""
+        """Whether no point outside of the zone yields."""
         if not self._rest:
             return True
         load = self._rows.T @ lam
@@ -148,7 +140,7 @@ class YieldingBody:
         Raises
         ------
         ConvergenceError
-            Where the zone is as wide as no local contact is.
+            Where it is as wide as no local contact is.
         """
         if self._radius * _WIDER > self._widest:
             raise ConvergenceError(
@@ -165,14 +157,9 @@ class YieldingBody:
         self.states = [_carried(block, former, states) for block in self.zone.points]
 
     def answer(self, lam: Floats, w: Floats, *, loading: bool) -> Answer:
-        """Linear answer about forces ``lam`` [N] and displacements ``w`` [m].
+        """Linear answer about forces ``lam`` (nc,) [N] and displacements ``w`` (nz,) [m].
 
-        Parameters
-        ----------
-        lam (nc,)
-        w (nz,)
-        loading
-            As in :func:`klack.contact.plasticity.radial_return.radial_return`.
+        ``loading`` as in :func:`klack.contact.plasticity.radial_return.radial_return`.
         """
         kept = self.zone.kept
         f, J = self._plastic(lam, w, loading=loading)
@@ -195,7 +182,7 @@ class YieldingBody:
         )
 
     def out_of_balance(self, lam: Floats, w: Floats) -> Floats:
-        """Forces [N] that hold ``w`` less those of the plastic strain, shape (nz,)."""
+        """Forces that hold ``w`` less those of the plastic strain, shape (nz,) [N]."""
         return np.asarray(self.zone.K @ w - self._plastic_forces(lam, w))
 
     def opened(self, w: Floats) -> Floats:
@@ -203,7 +190,7 @@ class YieldingBody:
         return np.asarray(self.U.T @ (self.zone.K @ w))
 
     def elastic_utilisation(self, lam: Floats) -> float:
-        """Largest von Mises stress over the yield stress in the zone, were it all elastic."""
+        """Largest von Mises stress over yield stress in the zone, were it elastic."""
         u = np.append(self.U @ lam, 0.0)
         return max(
             float(von_mises_of_strain(block.strain(u), block.material.shear_modulus).max())
@@ -220,7 +207,7 @@ class YieldingBody:
         self.w = w
 
     def plastic_gap(self) -> Floats:
-        """Plastic gap of the accepted history at the contact points, shape (nc,) [m]."""
+        """Plastic gap of the accepted history, shape (nc,) [m]."""
         return self.U.T @ self.plastic_forces()
 
     def plastic_forces(self) -> Floats:
@@ -233,7 +220,7 @@ class YieldingBody:
         return max(float(state.equivalent.max(initial=0.0)) for state in self.states)
 
     def _plastic_forces(self, lam: Floats, w: Floats) -> Floats:
-        """Forces [N] of the plastic strain at a state that is being tried, shape (nz,)."""
+        """The same at a tried state."""
         returned = self._returned(lam, w, loading=False)
         return self._forces([result.state.strain for result in returned])
 
@@ -269,7 +256,7 @@ class YieldingBody:
 def _carried(
     block: StrainPoints, former: Sequence[StrainPoints], states: Sequence[PlasticState]
 ) -> PlasticState:
-    """History of points that were partly in a smaller zone."""
+    """History of points partly in a smaller zone."""
     state = PlasticState.none(block.volume.size)
     strain = state.strain.reshape(*block.volume.shape, 4)
     equivalent = state.equivalent.reshape(block.volume.shape)

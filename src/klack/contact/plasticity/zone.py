@@ -4,9 +4,9 @@ Yielding enters as forces of the plastic strain on a body that stays elastic,
 
 .. math:: K u = G^T \lambda + f_p, \qquad f_p = \int B^T 2 G\, \varepsilon_p \, dV ,
 
-whose resultant is zero, so that a free body has no more inertia forces than before.  With
-:math:`u = U \lambda + w`, U the elastic displacements under unit contact forces, only w is not
-known, and all its forces act in the zone,
+whose resultant is zero: no further inertia forces of a free body. With :math:`u = U \lambda + w`,
+U the elastic displacements under unit contact forces, only w is unknown, and all its forces act in
+the zone,
 
 .. math:: \hat K w = f_p(U \lambda + w), \qquad
     \hat K = K_{zz} - K_{zr} K_{rr}^{-1} K_{rz} .
@@ -14,15 +14,15 @@ known, and all its forces act in the zone,
 The gaps of the contact move by :math:`G w = U^T f_p`: the *plastic gap*.
 
 Plastic flow keeps its volume and would lock elements that follow it at every point of their
-stiffness.  It follows their linear part only.  With functions :math:`\chi_i` that are linear (of
+stiffness; it follows their linear part only. With functions :math:`\chi_i` that are linear (of
 quadrilaterals bilinear) and orthonormal in the volume of the element, each next to one point,
 
 .. math:: \bar\varepsilon_i = \frac{1}{c_i} \int \chi_i\, \varepsilon\, dV, \qquad
     c_i = \int \chi_i \, dV, \qquad V_i = c_i^2
 
-are the strains that yield, in volumes :math:`V_i`.  By Bessel's inequality
-:math:`\sum V_i \bar\varepsilon_i D \bar\varepsilon_i \le \int \varepsilon D \varepsilon\, dV`:
-whatever yields, the stiffness that is left stays positive.
+are the strains that yield, in volumes :math:`V_i`. By Bessel's inequality :math:`\sum V_i
+\bar\varepsilon_i D \bar\varepsilon_i \le \int \varepsilon D \varepsilon\, dV`: the stiffness left
+stays positive.
 """
 
 from collections.abc import Mapping
@@ -46,7 +46,7 @@ __all__ = ["PlasticZone", "StrainPoints", "plastic_zone", "strain_points"]
 
 
 _LINEAR = {"tri6": "tri3", "quad8": "quad4"}
-"""Second-order elements, and the strain that their plastic flow follows."""
+"""Second-order elements, and the strain of their plastic flow."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -56,13 +56,13 @@ class StrainPoints:
     Parameters
     ----------
     dofs (e, 2 n)
-        Degrees of freedom of each element.
+        Of each element.
     B (e, q, 4, 2 n) [1/m]
         Strain (rr, zz, tt, rz) with engineering shear per displacement.
     volume (e, q) [m^3]
         Of the whole ring.
     elements (e,)
-        Their numbers in the mesh, in the order of its blocks.
+        Numbers in the mesh, in the order of its blocks.
     """
 
     dofs: Ints
@@ -72,7 +72,7 @@ class StrainPoints:
     elements: Ints
 
     def strain(self, u: Floats) -> Floats:
-        """Strain [-] of displacements [m], shape (e q, 4), with the tensor's shear."""
+        """Strain [-] of displacements [m], shape (e q, 4), tensor shear."""
         found = np.einsum("eqij,ej->eqi", self.B, u[self.dofs]).reshape(-1, 4)
         found[:, 3] *= 0.5
         return found
@@ -85,7 +85,7 @@ class StrainPoints:
         return summed.astype(np.float64)
 
     def stiffness(self, taken: Floats, yielding: Ints, count: int) -> csr_array:
-        """Sum of B^T taken B over some of the points, shape (count, count) [N/m]."""
+        """Sum of B^T taken B over some points, shape (count, count) [N/m]."""
         e, q = np.divmod(yielding, self.volume.shape[1])
         B = self.B[e, q]
         blocks = np.matmul(
@@ -104,19 +104,12 @@ def strain_points(
 ) -> list[StrainPoints]:
     """Points of the chosen elements of a meridian mesh, block by block.
 
+    Rejects elements of first order, which lock when they yield.
+
     Parameters
     ----------
-    materials
-        Of each solid.
     chosen (n_elements,)
         In the order of the blocks.
-    name
-        Of the body, for words.
-
-    Raises
-    ------
-    InputError
-        For elements of first order, which lock when they yield.
     """
     found, at = [], 0
     for block in mesh.blocks:
@@ -159,14 +152,14 @@ def _strain_points(
 
 
 def _near_points(family: str, xi: Floats) -> Floats:
-    """Linear functions that are 1 at one of the stress points and 0 at the others, at ``xi``."""
+    """Linear functions, 1 at one stress point and 0 at the others, at ``xi``."""
     linear = _LINEAR[family]
     at_points = shape_functions(linear, stress_points(family))[0]
     return np.asarray(np.linalg.solve(at_points.T, shape_functions(linear, xi)[0].T))
 
 
 def _orthonormal(functions: Floats, volume: Floats) -> Floats:
-    """The orthonormal functions closest to given ones (Lowdin), shape (e, i, q)."""
+    """Orthonormal functions closest to given ones (Lowdin), shape (e, i, q)."""
     M = np.einsum("iq,eq,jq->eij", functions, volume, functions, optimize=True)
     size, V = np.linalg.eigh(M)
     root = np.einsum("eia,ea,eja->eij", V, size**-0.5, V, optimize=True)
@@ -180,13 +173,13 @@ class PlasticZone:
     Parameters
     ----------
     dofs (nz,)
-        Sorted degrees of freedom of the body that are free and belong to the zone.
+        Sorted free degrees of freedom of the zone.
     K (nz, nz) [N/m]
-        With the rest condensed onto the border; of a free body one is held (``kept``).
+        The rest condensed onto the border; of a free body one is held (``kept``).
     kept
-        Positions in ``dofs`` that are solved for.
+        Positions in ``dofs`` to solve for.
     points
-        With degrees of freedom numbered as ``dofs``; held ones come last, as number nz.
+        Numbered as ``dofs``; held ones last, as nz.
     """
 
     dofs: Ints
@@ -198,16 +191,7 @@ class PlasticZone:
 def plastic_zone(
     body: ElasticBody, materials: Mapping[str, Material], chosen: NDArray[np.bool_]
 ) -> PlasticZone:
-    """Condense a body onto the elements that may yield.
-
-    Parameters
-    ----------
-    body
-        In the meridian plane.
-    materials
-        Of each solid; those of the chosen elements harden.
-    chosen (n_elements,)
-    """
+    """Condense a body (meridian plane) onto the elements that may yield, which must harden."""
     points = strain_points(body.mesh, materials, chosen, body.name)
     used = np.unique(np.concatenate([block.dofs.ravel() for block in points]))
     inside = np.intersect1d(used, body.free)
