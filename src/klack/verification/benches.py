@@ -1,4 +1,4 @@
-"""Benches of many checks: two fluids, a network in steps of one length, a step of one branch."""
+"""Benches of many checks: a network in steps of one length, a step of one branch."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -42,7 +42,7 @@ MU_HEPTANE, MU_OIL = (float(fluid.viscosity(AMBIENT.pressure)) for fluid in (HEP
 
 
 def component(word: str, **numbers: Any) -> Any:
-    """A component by its word in case files, its numbers in SI units."""
+    """A component by its word in case files, numbers in SI."""
     return component_class(word)(**numbers)
 
 
@@ -57,9 +57,8 @@ def run_network(
 ) -> NetworkResult:
     """Run a network in surroundings of one atmosphere and 20 degC; bodies may fly freely.
 
-    ``still`` adds a mass on a spring that nothing touches, as every network has a body.  ``run``
-    are the numbers of :func:`simulate_network`; without others, all steps have one length and
-    bodies start free.
+    ``still`` adds a mass on a spring that nothing touches, as every network has a body. ``run``
+    goes to :func:`simulate_network`; by default, all steps have one length and bodies start free.
     """
     own: dict[str, Component] = {}
     if still:
@@ -108,7 +107,7 @@ def branch_step(
     state: Sequence[float] | np.ndarray | None = None,
     ports: Sequence[float] = (),
 ) -> np.ndarray:
-    """What one step gives out: flow, its slopes, forces, next state, energies."""
+    """Results of one step: flow, slopes, forces, next state, energies."""
     start = row.state if state is None else state
     return evaluate(
         row.step,

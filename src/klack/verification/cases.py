@@ -20,7 +20,7 @@ _NIST = "Thompson & Taylor, NIST SP 811 (2008), App. B.8"
 
 
 def checks() -> list[Check]:
-    """Units by their definitions, formulas of the trade, copies of a part in closed motions."""
+    """Return the checks."""
     return [*_expressions(), *_oscillators(), *_written_out()]
 
 
@@ -151,7 +151,7 @@ include:
 
 
 def _written_out() -> Iterator[Check]:
-    """Four included injectors against the same network written out, number by number."""
+    """Four included injectors against the same network written out."""
     included = _RAIL.format(head=_HEAD, components="", inlets="injector*.inlet", connections="")
     runs = [
         simulate_network(case.network.network().rows(), duration=600e-6, record=1e-6)
@@ -175,7 +175,7 @@ def _written_out() -> Iterator[Check]:
 
 
 def _by_hand() -> str:
-    """Network of four injectors without parameters and parts."""
+    """The same without parameters and parts."""
     components, connections, inlets = "", "", []
     head, tail = _INJECTOR.split("components:\n")[1].split("connections:\n")
     for number in range(1, 5):
@@ -195,7 +195,7 @@ def _by_hand() -> str:
 
 
 def _case(text: str, parts: dict[str, str]) -> ValveCase:
-    """Case with its parts in its text, as a result keeps it."""
+    """Case with its parts in its text."""
     kept = "".join(
         f"  {name}: |\n" + "".join(f"    {line}\n" for line in part.splitlines())
         for name, part in parts.items()

@@ -1,4 +1,4 @@
-"""One comparison of a computed number with a known one, its texts, and all groups of them."""
+"""One comparison of a computed number with a known one, and all groups of them."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ __all__ = [
 
 
 LARGEST_HEADROOM = 100.0
-"""A tolerance that is more than so many times the deviation needs a reason."""
+"""A tolerance of more than so many deviations needs a reason."""
 
 _UNIT = re.compile(r"\[([^\[\]]+)\]$")
 
@@ -46,16 +46,9 @@ _ROUND_OFF = 1e-15  # a few units in the last place; no deviation counts for les
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ComparedCurve:
-    """The whole curve of which a check compares one number.
+    """Whole curve of which a check compares one number: abscissae and values, known and computed.
 
-    Parameters
-    ----------
-    x_label, y_label
-        With the unit: ``"time [us]"``.
-    expected : tuple of two arrays, shapes (n,)
-        Abscissae and values of the known curve (few points where a table is quoted).
-    computed : tuple of two arrays, shapes (m,)
-        The same of klack, on its own abscissae.
+    Labels have units: ``"time [us]"``; both have abscissae of their own.
     """
 
     x_label: str
@@ -73,20 +66,18 @@ class Check:
     Parameters
     ----------
     group, name
-        Domain (``"elasticity"``) and what is compared (one line, with the unit).
+        Domain (``"elasticity"``) and what is compared (with the unit).
     deviation
-        Relative to ``expected``, or absolute where ``expected`` is zero or ``absolute`` was asked.
+        Relative to ``expected``, or absolute where that is zero or ``absolute`` was given.
     tolerance
-        Largest accepted magnitude of ``deviation``.
+        Of the magnitude of ``deviation``.
     source
         Author, year, equation or table; or the closed formula.
     reason
-        Why the tolerance is as wide as it is, where :attr:`headroom` is above
-        :data:`LARGEST_HEADROOM`: the digits of a printed table, the scatter of a standard.
+        Why the tolerance is as wide as it is, above :data:`LARGEST_HEADROOM`: the digits of a
+        printed table, the scatter of a standard.
     curve
-        Where the number belongs to a curve; several checks may share one object.
-    is_absolute
-        Whether ``deviation`` has the unit of the numbers.
+        Several checks may share one.
     """
 
     group: str
@@ -117,16 +108,16 @@ class Check:
 
     @property
     def deviation_unit(self) -> str:
-        """``"relative"``, the unit of an absolute deviation, or else ``"absolute"``."""
+        """``"relative"``, the unit, or else ``"absolute"``."""
         if not self.is_absolute or "relative" in self.name or " over " in self.unit:
             return "relative"
         return self.unit or "absolute"
 
     @property
     def headroom(self) -> float:
-        """Ratio of the tolerance to the present deviation.
+        """Tolerance over deviation; nan for a check not run.
 
-        Deviations below round-off count as round-off; nan for a check that did not run.
+        Deviations below round-off count as round-off.
         """
         return float(self.tolerance / max(abs(self.deviation), _ROUND_OFF))
 
@@ -148,7 +139,7 @@ def compare(
     absolute: bool = False,
     reason: str = "",
 ) -> Check:
-    """Build a :class:`Check`; relative unless ``absolute`` or the expected value is zero."""
+    """Build a :class:`Check`; relative unless ``absolute`` or an expected zero."""
     difference = computed - expected
     is_absolute = absolute or expected == 0
     deviation = difference if is_absolute else difference / abs(expected)
@@ -167,11 +158,11 @@ def compare(
 
 
 check = partial(compare, "")
-"""The same without its group, which the registry knows."""
+"""The same without its group."""
 
 
 def summary(checks: Sequence[Check]) -> str:
-    """Number of passed checks, and of wide tolerances without a reason."""
+    """Passed checks, and wide tolerances without a reason."""
     passed = sum(check.passed for check in checks)
     wide = sum(check.is_wide for check in checks)
     return f"{passed} of {len(checks)} checks passed" + (
@@ -185,7 +176,7 @@ def number_text(value: float) -> str:
 
 
 def deviation_text(check: Check) -> str:
-    """With sign, and with what it is: ``+1.2e-06 relative``, ``-3.0e-09 m``.
+    """With sign and kind: ``+1.2e-06 relative``, ``-3.0e-09 m``.
 
     >>> from klack.verification.check import compare
     >>> deviation_text(compare("a", "gap [m]", expected=0, computed=1e-9, tolerance=1, source=""))
@@ -203,7 +194,7 @@ def tolerance_text(check: Check) -> str:
 
 
 def headroom_text(check: Check) -> str:
-    """Tolerance over deviation, two digits: ``x 3.2``; ``exact`` where neither is above zero."""
+    """Tolerance over deviation: ``x 3.2``; ``exact`` where neither is above zero."""
     if not isfinite(check.headroom):
         return "none"
     if check.tolerance == 0:
@@ -280,13 +271,13 @@ COVERS = {
 """Group -> what it covers, in one sentence."""
 
 GROUPS = tuple(COVERS)
-"""Modules in this package, by name, with hyphens; each has ``checks() -> list[Check]``."""
+"""Modules of this package, with hyphens; each has ``checks() -> list[Check]``."""
 
 
 def run_checks(groups: Iterable[str] | None = None) -> list[Check]:
     """Run the checks of the given groups (all by default).
 
-    A group that stops with an error counts as one failed check; the others still run.
+    A group that stops with an error counts as one failed check.
     """
     return [check for _, checks in iterate_checks(groups) for check in checks]
 
@@ -294,7 +285,7 @@ def run_checks(groups: Iterable[str] | None = None) -> list[Check]:
 def iterate_checks(
     groups: Iterable[str] | None = None, started: Callable[[str], None] = lambda group: None
 ) -> Iterator[tuple[str, list[Check]]]:
-    """Yield group after group with its checks, as they finish; ``started`` receives each name."""
+    """Group after group with its checks, as they finish; ``started`` gets each name."""
     for group in _known(groups):
         started(group)
         module = import_module(f"klack.verification.{group.replace('-', '_')}")
@@ -323,7 +314,7 @@ def _known(groups: Iterable[str] | None) -> tuple[str, ...]:
 
 
 def _place(error: Exception) -> str:
-    """Origin of an unexpected error: the innermost lines of this package."""
+    """Innermost lines of this package in an unexpected error."""
     frames = extract_tb(error.__traceback__)
     return " < ".join(f"{Path(f.filename).name}:{f.lineno}" for f in reversed(frames[-4:]))
 

@@ -1,12 +1,12 @@
-r"""Checks of coils of one magnet on drivers of their own: a transformer, and two coils of a valve.
+r"""Coils of one magnet on drivers of their own: a transformer, and two coils of a valve.
 
 Without iron the linkages are linear in the currents, :math:`\psi = L i` with
 
 .. math:: L = \begin{pmatrix} N_1^2(\Lambda + \Lambda_1) & N_1 N_2 \Lambda \\
                               N_1 N_2 \Lambda & N_2^2(\Lambda + \Lambda_2) \end{pmatrix},
 
-and currents follow from matrix exponentials.  With iron the linkages themselves are integrated by
-SciPy, the main flux being the root of one equation by Froehlich's formula.
+and currents follow from matrix exponentials. With iron the linkages are integrated by SciPy, the
+main flux being the root of one equation by Froehlich's formula.
 """
 
 from itertools import pairwise
@@ -253,7 +253,7 @@ def _static() -> list[Check]:
 
 
 def _main_flux(linkage: np.ndarray, x: float) -> tuple[float, np.ndarray]:
-    """Flux of the iron [Wb] and currents [A] that belong to linkages [Wb], by one root."""
+    """Flux of the iron [Wb] and currents [A] at linkages [Wb], by one root."""
     share = linkage / _TURNS
     a, b = 1.0 / (_MU0 * (_INITIAL - 1.0)), 1.0 / _SATURATION
 
@@ -475,11 +475,10 @@ def _run_shared(
 
 
 def _boosted(start: float, time: float) -> float:
-    r"""Capacitor [V] after one coil was at it for a time, and has returned its energy.
+    r"""Capacitor [V] after one coil was at it for a time and returned its energy.
 
-    A coil without iron at the capacitor is a damped oscillator; with :math:`q = C U`, the capacitor
-    at one coil, :math:`L\,\mathrm di/\mathrm dt = k U - R i`, :math:`C\,\mathrm dU/\mathrm dt
-    = -k i`: a matrix exponential for each stretch of time.
+    Without iron a damped oscillator, :math:`L\,\mathrm di/\mathrm dt = k U - R i`,
+    :math:`C\,\mathrm dU/\mathrm dt = -k i`: a matrix exponential for each stretch of time.
     """
 
     def matrix(k: float) -> np.ndarray:
@@ -491,7 +490,7 @@ def _boosted(start: float, time: float) -> float:
 
 
 def _in_sequence() -> list[Check]:
-    """Two discharges one after the other; and the recharge before and between them."""
+    """Two discharges in sequence; the recharge before and between them."""
     first, second, time = (0.0, 40e-6), (0.4e-3, 0.46e-3), 0.8e-3
     run = _run_shared(
         (_driver(*first), _driver(*second)),
@@ -605,7 +604,7 @@ def _overlapping() -> list[Check]:
 
 
 def _alike() -> list[Check]:
-    """Two equal drivers at 20 uF, against one at 10 uF of its own; whole shots with switching."""
+    """Two equal drivers at 20 uF, against one at 10 uF; whole shots with switching."""
     shot = _driver(0.0, 0.4e-3, peak=8.0).model_copy(
         update={"diode_resistance": 0.02, "switch_resistance": 0.03}
     )

@@ -55,7 +55,7 @@ def _straight(p: np.ndarray, q: np.ndarray) -> Piece:
 
 
 def needle_pieces(kind: str) -> list[Piece]:
-    """Pieces of the contour, the corner of both cones at height 0, drawn apart."""
+    """Pieces of the contour, drawn apart; the corner of both cones at height 0."""
     tip, shank = np.array([sin(_TIP), cos(_TIP)]), np.array([sin(_SHANK), cos(_SHANK)])
     edge = np.array([_EDGE, 0.0])
     apex, far = edge - _EDGE / sin(_TIP) * tip, edge + 10e-3 * shank
@@ -78,7 +78,7 @@ def needle_pieces(kind: str) -> list[Piece]:
 
 
 def smallest_mantle(kind: str, lift: float, upper: float = _UPPER) -> tuple[float, float]:
-    """Area [m^2] of the smallest mantle by search, and the radius [m] where the needle seals."""
+    """Area [m^2] of the smallest mantle by search, and sealing radius [m]."""
     pieces = needle_pieces(kind)
     seat = _straight(np.array([_LOWER, 0.0]), np.array([upper, (upper - _LOWER) / tan(_SEAT)]))
     normal = np.array([cos(_SEAT), -sin(_SEAT)])
@@ -406,7 +406,7 @@ def _areas() -> Iterator[Check]:
 def _between(
     seat: ConicalSeat, needle: RigidMass, spring: Spring, room: Component, sac: Component
 ) -> tuple[dict[str, Component], list[list[str]]]:
-    """A needle on its seat between two pressures, with faces that follow the acting area."""
+    """Needle on its seat between two pressures, with faces that follow the acting area."""
     seal = seat.sealing_diameter
     parts: dict[str, Component] = {
         "needle": needle,

@@ -31,18 +31,14 @@ __all__ = [
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class IndentationProblem:
-    """Two bodies and the contact points between them.
-
-    Two bodies of revolution so large that they act as half-spaces; the gap between them is a
-    profile over the radius.  Used by the checks and the tests of the contact.
-    """
+    """Two bodies of revolution that act as half-spaces, and the contact points between them."""
 
     body_a: ElasticBody
     body_b: ElasticBody
     space: ContactSpace
 
     def compliance(self) -> np.ndarray:
-        """Condensed static compliance of the contact points [m/N]."""
+        """Condensed compliance of the contact points [m/N]."""
         with Flexibility(self.body_a) as a, Flexibility(self.body_b) as b:
             return contact_compliance(self.space, a, b)
 
@@ -81,21 +77,18 @@ def half_spaces(
     far: float = 1000.0,
     reach: float,
 ) -> IndentationProblem:
-    """Two steel half-spaces of revolution with a gap ``profile(r - ring)`` between them.
+    """Two steel half-spaces of revolution with a gap ``profile(r - ring)`` [m] between them.
 
     Parameters
     ----------
-    profile : function of distances [m] to gaps [m]
     contact [m]
-        Expected half width of the contact.
+        Expected half width.
     cells
-        Cells of a and of b per ``contact``.
+        Of a and of b per ``contact``.
     ring [m]
-        Radius of the contact ring, 0 for a contact on the axis.
-    family
-        Axisymmetric element family.
+        0 for a contact on the axis.
     far
-        Size of the bodies over ``contact`` (at least; on a ring twenty times ``ring``).
+        Least size of the bodies over ``contact`` (on a ring twenty times ``ring``).
     reach [m]
     """
     size = max(far * contact, 20.0 * ring)
@@ -148,12 +141,10 @@ def uniform_compression(
 
     Parameters
     ----------
-    family_a, family_b
-        Solid element families.
     cells
-        Cells per edge of a and of b; unequal ones do not match.
+        Per edge of a and of b; unequal ones do not match.
     skew [m]
-        Amplitude by which inner nodes of a are displaced sideways.
+        By which inner nodes of a are displaced sideways.
     """
 
     def shape(x: np.ndarray) -> np.ndarray:
@@ -182,21 +173,16 @@ def sphere_on_cone(
 ) -> tuple[Mesh, Mesh, Callable[[np.ndarray], np.ndarray]]:
     """Spherical shell that touches a conical one of 45 deg along a ring; a third of the circle.
 
+    Returns the meshes, with the surfaces bottom and top, and the exact gaps [m] along the radius
+    of points (n, 3) on the sphere.
+
     Parameters
     ----------
-    family
-        Solid element family.
     layers
-        Element borders around the third of the circle, for the sphere and the cone.
+        Element borders around, for the sphere and the cone.
     h [m]
         Element size along the meridian.
     radius [m]
-
-    Returns
-    -------
-    sphere, cone : Mesh
-        Touching with the surfaces bottom and top.
-    exact : function of points (n, 3) on the sphere [m] to gaps [m] along its radius
     """
     ring = radius / np.sqrt(2.0)
 

@@ -51,7 +51,7 @@ class _Coil(Component):
 
 
 def checks() -> list[Check]:
-    """Loops of coil and mass, sensors, state machines, a function of the user, energy."""
+    """Return the checks."""
     return [
         *_current(),
         *_hysteresis(),
@@ -247,7 +247,7 @@ def _position() -> Iterator[Check]:
 
 
 def _pid_motion(most: float, waits: bool, count: int) -> np.ndarray:
-    """Displacement [um] of the controlled mass at the samples, from the equations of the page."""
+    """Controlled mass [um] at the samples, from the equations of the page."""
     place, speed, integral, slope, before = 0.0, 0.0, 0.0, 0.0, 0.0
     out = [0.0]
     for k in range(count - 1):
@@ -362,7 +362,7 @@ def _sensors() -> list[Check]:
 
 
 def _in_parts() -> list[Check]:
-    """A run stored and continued, with a late, noisy sensor and a law that remembers."""
+    """A run stored and continued, with a late, noisy sensor and a law with memory."""
     sensor = Sensor(
         channel="mass.body displacement", unit="um", delay=2.3 * SAMPLE, noise=0.4, seed=5,
         quantisation=0.1,

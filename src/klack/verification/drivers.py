@@ -37,18 +37,18 @@ class CoilRun:
     Parameters
     ----------
     time (n + 1,) [s]
-        Ends of the steps, from 0.
+        Ends of the steps.
     current, flux (n + 1,) [A], [Wb]
-        At those ends; flux of the main branch (linkage of a map).
+        Flux of the main branch (linkage of a map).
     voltage, force (n,) [V], [N]
-        Means over the steps; the force on the armature along +z.
+        Means over the steps; force on the armature along +z.
     state (n + 1,)
-        Number of the driver's state.
+        Of the driver.
     fluxes (n + 1, loops) [Wb]
     electric, ohmic, eddy, hysteresis, work [J]
-        Supply, losses, and work done on the armature.
+        Supply, losses, and work on the armature.
     residual [-]
-        Energy that does not balance, over the largest amount, that at the end of any step included.
+        Energy that does not balance, at the end of any step, over the largest amount.
     """
 
     time: np.ndarray
@@ -66,7 +66,7 @@ class CoilRun:
     residual: float
 
     def switches(self) -> np.ndarray:
-        """Ends of the steps in which the driver changed its state [s]."""
+        """Ends of the steps in which the driver switched [s]."""
         return self.time[1:][np.diff(self.state) != 0]
 
 
@@ -120,7 +120,6 @@ def run_coil(
 
     Parameters
     ----------
-    plant : MagneticCircuit or FluxMap
     resistance [ohm]
     gap [m]
         At lift zero; the lift closes it.
@@ -129,11 +128,6 @@ def run_coil(
         At the ends of the steps; straight between.
     fluxes [Wb]
         Loop fluxes at the start.
-
-    Raises
-    ------
-    ConvergenceError
-        If a step fails.
     """
     y = np.array(lift, dtype=float)
     par = flux_numbers(plant, resistance=resistance, driver=driver, gap=gap)
@@ -198,7 +192,7 @@ def checks() -> list[Check]:
 
 
 def linear_coil(eddy: float = 0.0) -> MagneticCircuit:
-    """Coil of constant inductance: a main and a leakage path, and perhaps a shorted turn [S]."""
+    """Coil of constant inductance: main and leakage path, perhaps a shorted turn [S]."""
     main, leak = LinearReluctance(_MAIN), LinearReluctance(_LEAK)
     return MagneticCircuit(
         branches=(
@@ -250,7 +244,7 @@ def _program(voltage: float, **more: float) -> DriveProgram:
 
 
 def _linear() -> list[Check]:
-    """Checks of a coil of constant inductance without eddy currents."""
+    """A coil of constant inductance without eddy currents."""
     tau = _INDUCTANCE / 1.0
     rise = run_coil(
         linear_coil(), _program(12.0), resistance=1.0, gap=_GAP, step=20e-9, lift=np.zeros(20001)
@@ -347,7 +341,7 @@ def _switching() -> list[Check]:
 
 
 def _eddy() -> list[Check]:
-    """A shorted turn: two states, exact by the matrix exponential; a core: Bessel's series."""
+    """A shorted turn: matrix exponential of two states; a core: Bessel's series."""
     S, R, u, n = 1250.0, 0.8, 14.0, _TURNS
     run = run_coil(
         linear_coil(S), _program(u), resistance=R, gap=_GAP, step=20e-9, lift=np.zeros(10001)

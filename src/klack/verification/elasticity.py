@@ -31,7 +31,7 @@ _RITZ = (
 _AXIAL = {1: 86117.56, 2: 171706.49, 4: 338712.02, 8: 623091.92, 12: 752468.26}
 """Circumferential order 0: number of the mode -> frequency [Hz]."""
 _AXIAL_TOLERANCE = {1: 1e-6, 2: 5e-8, 4: 2e-6, 8: 2e-5, 12: 1e-4}
-"""Error of the mesh, which grows with the fourth power of the wave number."""
+"""Mesh error, of the fourth power of the wave number."""
 _BENDING = {1: 19587.12, 2: 50362.64, 3: 90819.01}
 """Circumferential order 1; each is a pair."""
 _RESIDUAL = {1: 0.13069097, 5: 0.03674371, 10: 0.01928473}
@@ -365,7 +365,7 @@ _ROOTS = (4.730040744862704, 7.853204624095838, 10.995607838001671)
 def free_bar_frequencies(
     material: Material, radius: float, length: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    r"""Frequencies of the first three modes after Euler-Bernoulli, and after Timoshenko.
+    r"""First three frequencies (3,) [Hz] after Euler-Bernoulli, and after Timoshenko.
 
     Frequency equation of the free beam with shear and rotary inertia: Huang 1961.  Shear
     coefficient of the circle: Hutchinson 2001,
@@ -374,11 +374,7 @@ def free_bar_frequencies(
     Parameters
     ----------
     radius, length [m]
-        At least 15 radii long: the search for the roots is not made for shorter bars.
-
-    Returns
-    -------
-    euler, timoshenko (3,) [Hz]
+        At least 15 radii long: roots of shorter bars are not searched for.
     """
     nu = material.poisson
     shear = 6.0 * (1.0 + nu) ** 2 / (7.0 + 12.0 * nu + 4.0 * nu**2)

@@ -1,7 +1,7 @@
 """Into other programs and back: meshes, matrices, reduced models, FMUs, results.
 
-One small body goes through every file form, and the numbers that come back are compared with those
-that left.  Programs and packages that are not installed are skipped.
+One small body goes through every file form and back. Programs and packages that are not installed
+are skipped.
 """
 
 import shutil
@@ -56,7 +56,7 @@ FINE, USUAL = 1e-9, 20e-9  # [s]
 
 
 def checks() -> list[Check]:
-    """Frequencies through meshes and matrices, models and FMUs against native runs."""
+    """Return the checks."""
     body = _block()
     frequencies = eigenmodes(body, count=MODES).frequency
     with TemporaryDirectory(prefix="klack-exchange-") as name:
@@ -128,7 +128,7 @@ def _matrices(body: ElasticBody, frequencies: np.ndarray, folder: Path) -> Itera
 
 
 def _calculix(folder: Path) -> Iterator[Check]:
-    """Hexahedra: the mass of quadratic tetrahedra has four points in CalculiX, fewer than here."""
+    """Hexahedra: CalculiX integrates the mass of quadratic tetrahedra with four points."""
     if shutil.which("ccx") is None:
         return
     line = np.linspace(-1e-3, 1e-3, 3)
@@ -177,7 +177,7 @@ def _needle() -> ReducedBody:
 
 
 def _models(folder: Path) -> Iterator[Check]:
-    """A rod as state space in files and back: frequencies, and what the modes miss."""
+    """A rod as state space in files and back."""
     from klack.exchange.matlab_model import write_matlab
     from klack.exchange.text_model import write_text
 
@@ -318,15 +318,7 @@ _TYPES = {"tet10": "C3D10", "hex20": "C3D20"}
 
 
 def calculix_frequencies(mesh: Mesh, material: Material, count: int, folder: Path) -> np.ndarray:
-    """Elastic frequencies [Hz] of a free body, computed by CalculiX.
-
-    Parameters
-    ----------
-    mesh
-        Of ``tet10`` or ``hex20``.
-    folder
-        Made for its files.
-    """
+    """Elastic frequencies [Hz] of a free body of ``tet10`` or ``hex20``, computed by CalculiX."""
     folder.mkdir()
     lines = ["*NODE"]  # fields have 20 columns at most
     lines += [f"{i},{x:.12e},{y:.12e},{z:.12e}" for i, (x, y, z) in enumerate(mesh.points * 1e3, 1)]
@@ -379,11 +371,11 @@ def fmu_peak_and_lift(
     Parameters
     ----------
     model
-        A pair with one contact.
-    fmi : 2 or 3
-    kind : "CoSimulation" or "ModelExchange"
+        With one contact.
+    kind
+        ``"CoSimulation"`` or ``"ModelExchange"``.
     step [s]
-        Communication and output step of co-simulation.
+        Of communication and output.
     """
     import fmpy
 

@@ -1,7 +1,7 @@
-"""Matrices and meshes written in every form that klack reads, to bring them back and compare.
+"""Matrices and meshes written in every form that klack reads.
 
-Matrix Market, Harwell-Boeing, MATLAB and NumPy files come from the libraries of others (scipy,
-h5py); Abaqus, Nastran and CalculiX files are written here as their manuals describe them.
+Matrix Market, Harwell-Boeing, MATLAB and NumPy files come from scipy and h5py; Abaqus, Nastran and
+CalculiX files are written as their manuals describe them.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -22,12 +22,12 @@ __all__ = ["MATRIX_WRITERS", "MESH_WRITERS", "MatrixFiles", "write_matrices", "w
 
 @dataclass(frozen=True, kw_only=True)
 class MatrixFiles:
-    """Input of a case to read the matrices again.
+    """Case input that reads the matrices again.
 
     Parameters
     ----------
     dofs
-        Table of node and direction, where the files do not say them.
+        Table of node and direction, where the files have none.
     """
 
     stiffness: Path
@@ -51,7 +51,7 @@ class _System:
         return zip(self.node.tolist(), self.direction.tolist(), strict=True)
 
     def written(self, folder: Path, stiffness: str, mass: str = "") -> MatrixFiles:
-        """Both matrices by the names of their files, and a table of the rows beside them."""
+        """Both matrices by their file names, and a table of the rows."""
         table = folder / "rows.csv"
         lines = [f"{i}, {'xyz'[d - 1]}" for i, d in self.rows()]
         table.write_text("\n".join(["node, direction", *lines]) + "\n", encoding="ascii")
@@ -71,15 +71,11 @@ def write_matrices(
     node: np.ndarray,
     direction: np.ndarray,
 ) -> MatrixFiles:
-    """Write K and M.
+    """Write K and M, both triangles, in a form of :data:`MATRIX_WRITERS`.
 
     Parameters
     ----------
-    form
-        Key of :data:`MATRIX_WRITERS`.
-    K, M (n, n)
-        Both triangles.
-    node, direction : int arrays, shape (n,)
+    node, direction (n,)
         Of each row; directions are 1, 2, 3.
     """
     return MATRIX_WRITERS[form](folder, _System(K=K, M=M, node=node, direction=direction))
@@ -108,7 +104,7 @@ def _lower_columns(A: csr_array) -> csc_array:
 
 
 def _boeing_symmetric(folder: Path, system: _System) -> MatrixFiles:
-    """Lower triangle with 16 digits, as HBMAT writes it, numbers touching; mapping of the rows."""
+    """Lower triangle with 16 digits, as by HBMAT, numbers touching; row mapping."""
     for name, A in system.pairs():
         columns, n = _lower_columns(A), A.shape[0]
         sections = [
@@ -355,18 +351,7 @@ _Writer_mesh = Callable[[Path, Mesh], Path]
 
 
 def write_mesh(form: str, folder: Path, mesh: Mesh) -> Path:
-    """Write a mesh of one block of quadratic tetrahedra.
-
-    Parameters
-    ----------
-    form
-        Key of :data:`MESH_WRITERS`.
-
-    Returns
-    -------
-    Path
-        Of the file.
-    """
+    """Write a mesh of one block of quadratic tetrahedra, in a form of :data:`MESH_WRITERS`."""
     return MESH_WRITERS[form](folder, mesh)
 
 
@@ -427,7 +412,7 @@ def _fortran(value: float) -> str:
 
 
 MESH_WRITERS: Mapping[str, _Writer_mesh] = {"ANSYS .cdb": _ansys, "Nastran .bdf": _nastran}
-"""Form: its writer; those of meshio only where it is installed."""
+"""Writer of each form; those of meshio only where installed."""
 
 if find_spec("meshio") is not None:
     MESH_WRITERS = {

@@ -35,7 +35,7 @@ IDENTITY = "discrete gradient (Gonzalez 1996): energy identity at every step siz
 
 
 def checks() -> list[Check]:
-    """Geometry, rough faces, motion of a mass, series compliance, energy and order."""
+    """Return the checks."""
     return [
         *_geometry(),
         *_roughness(),
@@ -111,7 +111,7 @@ def _cone_dissipation(cone: ConeFilm, axial: float, speed: float, mu: float) -> 
     slide = speed * np.cos(cone.half_angle)
 
     def rate(s: float, y: float) -> float:
-        """``mu (du/dy)^2`` of the flow that the squeeze drives to both edges, and of the shear."""
+        """``mu (du/dy)^2`` of the flow squeezed to both edges, and of the shear."""
         pressed = 6.0 * normal * s / height**3 * (2.0 * y - height)
         sheared = slide / height
         return float(mu * (pressed + sheared) ** 2)

@@ -25,7 +25,7 @@ _BETWEEN = "cubic splines between the columns of the library, 20 K apart"
 
 
 def checks() -> list[Check]:
-    """Water over temperature, alkanes over temperature, and viscosity under pressure."""
+    """Return the checks."""
     return [*_water(), *_alkanes(), *_laws(), *_gap(), *_file(), *_grades()]
 
 
@@ -79,7 +79,7 @@ def _water() -> Iterator[Check]:
 
 
 def _alkanes() -> Iterator[Check]:
-    """At temperatures between the columns of the library, 1 atm (hot ones 5 bar) and 200 bar."""
+    """The same, 1 atm (hot ones 5 bar) and 200 bar."""
     source = {
         "n-heptane": "Span and Wagner 2003; Michailidou et al. 2014 (CoolProp 8.0.0)",
         "n-dodecane": "Lemmon and Huber 2004; Huber et al. 2004 (CoolProp 8.0.0)",
@@ -121,7 +121,7 @@ _ALKANES = (  # degC, Pa, sound speed [m/s] there, viscosity [Pa s] at 200 bar
 
 
 def _laws() -> Iterator[Check]:
-    """Laws of Barus and Roelands as their authors wrote them, and means over a gap."""
+    """Laws of Barus and Roelands as their authors wrote them; means over a gap."""
     mu, alpha, rise = 0.04, 18e-9, HIGH - ATMOSPHERE
     barus, roelands = PressureViscosity.barus(alpha), PressureViscosity.roelands(mu, alpha)
     z = alpha * 1.962e8 / (log(mu) + 9.67)
@@ -257,7 +257,7 @@ def _file() -> list[Check]:
 
 
 def _grades() -> list[Check]:
-    """Oils and fuels of the library at the values that their standards state."""
+    """Oils and fuels at the values that their standards state."""
     glycol, atf = library_fluid("water-glycol").at(313.15), library_fluid("ATF").at(373.15)
     nu = [float(f.viscosity(ATMOSPHERE) / f.liquid.density(ATMOSPHERE)) for f in (glycol, atf)]
     return [

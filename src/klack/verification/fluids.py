@@ -22,7 +22,7 @@ NSRDS = "NSRDS functions (Daubert and Danner; coefficients as in OpenFOAM), 30 d
 
 
 def checks() -> list[Check]:
-    """Reference data, laws of mixtures, conservation of mass and energy, and the table."""
+    """Return the checks."""
     return [
         *_water(),
         *_heptane(),
@@ -141,7 +141,7 @@ def _bubbly(fraction: float) -> Fluid:
 
 
 def _wood(fraction: float, p: np.ndarray) -> np.ndarray:
-    """Wood's law, with the volumes of both phases written out [m/s]."""
+    """Wood's law by the volumes of both phases [m/s]."""
     n, above = 1.4, p - 1e5
     K_l = 1.4e9 + 10.0 * above
     gas = fraction * (p / 1e5) ** (-1.0 / n)

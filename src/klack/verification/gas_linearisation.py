@@ -39,7 +39,7 @@ def gas_linearisation() -> list[Check]:
 def _network(supply: GasSource | None = None, injected: float = INJECTED) -> Network:
     """A chamber with a piston on a spring, between a supply and the surroundings.
 
-    A choked orifice from a tank adds a mass flow that the chamber does not change.
+    A choked orifice from a tank adds a constant mass flow.
     """
     parts: dict[str, Component] = {
         "piston": component("rigid-mass", mass=MASS),
@@ -81,7 +81,7 @@ def place(signals: tuple[Any, ...], name: str) -> int:
 
 
 def _step(system: LinearSystem, source: str, target: str, time: np.ndarray) -> np.ndarray:
-    """Answer of an output to a step of one unit."""
+    """Response of an output to a unit step."""
     n, u = len(system.A), place(system.inputs, source)
     y = place(system.outputs, target)
     whole = np.zeros((n + 1, n + 1))

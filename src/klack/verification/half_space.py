@@ -8,10 +8,9 @@ the integrals over the cell
     I_{xy} = \int \frac{x y \, dA}{r^3}, \quad L_x = \int \frac{x \, dA}{r^2}
 
 a pressure moves it in by :math:`(1-\nu^2) I / (\pi E)` and towards the cell by
-:math:`(1+\nu)(1-2\nu) L_x / (2 \pi E)`, a traction along x moves it by
-:math:`(1+\nu) [(1-\nu) I + \nu I_{xx}] / (\pi E)` along and by
-:math:`(1+\nu) \nu I_{xy} / (\pi E)` across.  What pressures move sideways cancels between like
-bodies.
+:math:`(1+\nu)(1-2\nu) L_x / (2 \pi E)` (which cancels between like bodies), a traction along x by
+:math:`(1+\nu) [(1-\nu) I + \nu I_{xx}] / (\pi E)` along and :math:`(1+\nu) \nu I_{xy} / (\pi E)`
+across.
 """
 
 from dataclasses import dataclass
@@ -50,7 +49,7 @@ def half_space_compliance(
     points (n, 2) [m]
         Centres of the cells.
     size [m]
-        Side of the cells.
+        Their side.
     """
     n = len(points)
     x, y = (points[:, None, :] - points[None, :, :]).transpose(2, 0, 1)  # from cell j to point i
@@ -82,22 +81,22 @@ def half_space_compliance(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ObliqueImpact:
-    """What an oblique impact of a sphere leaves.
+    """State after an oblique impact of a sphere.
 
     Parameters
     ----------
     centre [m/s]
-        Tangential speed of the centre.
+        Tangential, of the centre.
     spin [rad/s]
-        About the axis across the plane of motion; positive where it rolls on.
+        Across the plane of motion; positive where it rolls on.
     surface [m/s]
-        Tangential speed of the point of contact.
+        Tangential, of the point of contact.
     normal [m/s]
-        Speed of rebound.
+        Of rebound.
     lost [J]
         In friction.
     peak [-]
-        Largest tangential force over friction times the largest normal force.
+        Largest tangential over friction times the largest normal force.
     """
 
     centre: float
@@ -110,7 +109,7 @@ class ObliqueImpact:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SphereImpact:
-    """Rigid motion of a sphere that hits a half-space, both elastic at the contact.
+    """Rigid motion of a sphere that hits a half-space.
 
     Parameters
     ----------
@@ -118,9 +117,9 @@ class SphereImpact:
     speed [m/s]
         Along the normal.
     cells [-]
-        Contact points over the radius of the largest contact.
+        Over the radius of the largest contact.
     inertia [-]
-        m R^2 / I; 2.5 for a solid sphere, 0 for a body that does not turn.
+        m R^2 / I; 2.5 for a solid sphere, 0 without turning.
     """
 
     radius: float
@@ -149,7 +148,7 @@ class SphereImpact:
 
     @property
     def kappa(self) -> float:
-        """Tangential over normal stiffness of the contact (Mindlin 1949) [-]."""
+        """Tangential over normal contact stiffness (Mindlin 1949) [-]."""
         shear = sum(
             (2.0 - m.poisson) * 2.0 * (1.0 + m.poisson) / m.young
             for m in (self.sphere, self.ground)
@@ -158,7 +157,7 @@ class SphereImpact:
         return float(4.0 * modulus / shear)
 
     def model(self, friction: Friction, turn: float = 0.0) -> InterfaceModel:
-        """Interface-level model with tangential directions turned by an angle [rad]."""
+        """Interface-level model, tangential directions turned by an angle [rad]."""
         R, size = self.radius, sqrt(self.radius * self.approach) / self.cells
         count = int(_BEYOND * self.cells) + 1
         line = size * np.arange(-count, count + 1)
@@ -203,7 +202,7 @@ class SphereImpact:
     def hit(
         self, tangential: float, friction: Friction, *, steps: int = 300, turn: float = 0.0
     ) -> ObliqueImpact:
-        """Impact with a tangential speed [m/s] of a sphere that does not spin before."""
+        """Impact with a tangential speed [m/s], without spin before."""
         model = self.model(friction, turn)
         run = simulate_interface(
             model,
@@ -242,7 +241,7 @@ _STEEP = 15.0  # degrees; nearer to the normal the measurement is not that of li
 
 
 def alumina_on_glass(normal: float, cells: float = 6.0) -> SphereImpact:
-    """Sphere of 5 mm on a thick plate, with a speed normal to it [m/s]."""
+    """Sphere of 5 mm on a thick plate, at a normal speed [m/s]."""
     alumina = Material(name="alumina", young=380e9, poisson=0.23, density=4000.0)
     return SphereImpact(
         radius=2.5e-3,
@@ -254,7 +253,7 @@ def alumina_on_glass(normal: float, cells: float = 6.0) -> SphereImpact:
 
 
 def oblique_spheres() -> list[Check]:
-    """Return the checks of alumina on glass.
+    """Alumina on glass.
 
     Linear elasticity with one coefficient of friction does not hold near the normal.
     """

@@ -219,7 +219,7 @@ def _far_apart() -> list[Check]:
 
 
 def _sources() -> list[Check]:
-    """Heat from a table that warms a radiating body; and one that has no way out."""
+    """Table heat into a radiating body; and heat that has no way out."""
     eps, A, P = 0.9, 1e-3, 1.0
     network = _network(
         {
@@ -256,12 +256,12 @@ def _sources() -> list[Check]:
 
 
 def _copper(loss: Callable[[float], float]) -> Callable[[np.ndarray], np.ndarray]:
-    """Mean heat of one node of copper, over the factor of its resistance from 20 degC."""
+    """Mean heat of a copper node over the factor of its resistance from 20 degC."""
     return lambda T: np.array([loss(1.0 + ALPHA * (float(T[0]) - AMBIENT))])
 
 
 def _self_heating() -> list[Check]:
-    """Copper of 8 W at 20 degC on 0.05 W/K; at constant current, at constant voltage, and 13 W."""
+    """Copper of 8 W at 20 degC on 0.05 W/K; constant current, constant voltage, 13 W."""
     C, G, P = 10.0, 0.05, 8.0
     network = _node(C, G)
     fine = SlowSettings(tolerance=0.02)
@@ -420,7 +420,7 @@ run: {duration: 7 ms, step: 100 ns, record: 10 us, variants: [dry]}
 
 @cache
 def _warmed() -> tuple[float, Any, float]:
-    """Rise of the copper over 50 strokes, each computed; the averaged warm-up; heat in all."""
+    """Rise of the copper over 50 computed strokes; averaged warm-up; total heat."""
     case = read_valve_case(SMALL, Path("small.yaml"))
     valve, roles = build_valve(case), find_roles(case)
     thermal = case.thermal
@@ -437,7 +437,7 @@ def _warmed() -> tuple[float, Any, float]:
 
 
 def _all_strokes() -> list[Check]:
-    """A warm-up by a few strokes against the same with every stroke computed."""
+    """A warm-up by a few strokes against every stroke."""
     rise, study, heat = _warmed()
     copper = study.temperature[0].values
     source = "each of the 50 strokes computed at its own temperature"

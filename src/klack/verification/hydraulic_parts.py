@@ -28,7 +28,7 @@ __all__ = ["checks"]
 
 
 def checks() -> list[Check]:
-    """Valves by characteristic, accumulator, areas, pump, edges, walls; then networks."""
+    """Return the checks."""
     return [
         *_check_valve(),
         *_relief_valve(),

@@ -34,7 +34,7 @@ RADIUS, LIFT, ANGLE = 0.75e-3, 60e-6, 0.8  # of the seats: [m], [m], [rad]
 
 
 def checks() -> list[Check]:
-    """Orifice, gap, seats, flow force, annulus, land; chambers and columns over time."""
+    """Return the checks."""
     return [
         *_orifice(),
         *_gap(),

@@ -1,4 +1,4 @@
-"""Checks of hysteretic iron: loops of the law alone, and a coil on such a core in time."""
+"""Hysteretic iron: loops of the law alone, and a coil on such a core in time."""
 
 import numpy as np
 from scipy.integrate import quad
@@ -55,7 +55,7 @@ def _follow(table: np.ndarray, kept: np.ndarray, course: np.ndarray, out: np.nda
 
 
 def _run(width: LoopWidth, course: np.ndarray) -> np.ndarray:
-    """Stops of a cube of 1 m on a course of flux densities: rows of force, work, heat, storage."""
+    """Stops of a cube of 1 m: rows of force, work, heat, storage."""
     part = width.stops(1.0, 1.0)
     n = part.share.size
     pairs = np.column_stack((part.stiffness, part.share)).ravel()
@@ -147,9 +147,9 @@ def _law() -> list[Check]:
 
 
 def _elastic(width: LoopWidth, tip: float) -> float:
-    """What a cycle loses less than its branches enclose, as each stop is first elastic [J/m^3].
+    """Loss per cycle that its branches do not enclose, as each stop is first elastic [J/m^3].
 
-    ``tip``: half width of the loop at its tips [A/m], with which the stops move there.
+    ``tip``: half width of the loop at its tips [A/m].
     """
     part = width.stops(1.0, 1.0)
     return float(4.0 * np.sum((part.share * tip) ** 2 / part.stiffness))
@@ -200,7 +200,7 @@ def _branches() -> list[Check]:
 
 
 def _measured() -> list[Check]:
-    """Loops of which the falling branch is given: a formula, and the published one of an alloy."""
+    """Loops given by a falling branch: a formula, and the published one of an alloy."""
     B = np.linspace(-1.4, 1.4, 281)
     curve = froehlich(1.9, 4000.0)
     given = curve.field(B) - 60.0 * (1.0 - (B / 1.4) ** 2) ** 2
@@ -271,7 +271,7 @@ def _pair(width: LoopWidth | None, gap: float = 1.0) -> MagneticCircuit:
 
 
 def _pulse(circuit: MagneticCircuit, gap: float, lift: np.ndarray | None = None) -> CoilRun:
-    """A pulse that saturates the iron, and a coil that is short-circuited afterwards."""
+    """A pulse that saturates the iron, then a short-circuited coil."""
     driver = VoltageTable(time=(0.0, 1.5e-3, 1.5e-3), voltage=(12.0, 12.0, 0.0)).program()
     return run_coil(
         circuit,
@@ -284,7 +284,7 @@ def _pulse(circuit: MagneticCircuit, gap: float, lift: np.ndarray | None = None)
 
 
 def _core() -> list[Check]:
-    """A coil on hysteretic iron in time: what remains without current, and its energy."""
+    """A coil on hysteretic iron: remanence, and energy."""
     width, iron = _falling(), _iron()
     circuit = _pair(width)
     held = _pulse(circuit, _GAP)
@@ -354,6 +354,6 @@ def _core() -> list[Check]:
 
 
 def _stored(width: LoopWidth, flux: np.ndarray) -> float:
-    """Energy that the stops of the core hold at the end of a course of fluxes [J]."""
+    """Energy held by the stops after a course of fluxes [J]."""
     run = _run(width, flux / _AREA)
     return float(run[:, 3].sum()) * _LENGTH * _AREA

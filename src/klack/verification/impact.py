@@ -46,7 +46,7 @@ ZENER_SOURCE = "Zener 1941, s'' + (1 + lambda d/dt) s^1.5 = 0, integrated with t
 
 
 def checks() -> list[Check]:
-    """Hertz, Gonthier, St Venant, needle on a spring, modal convergence, sphere on a rod."""
+    """Return the checks."""
     return [
         *_hertz(),
         *_gonthier(),

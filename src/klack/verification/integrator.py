@@ -19,7 +19,7 @@ IDENTITY = "discrete gradient (Gonzalez 1996): energy identity at every step siz
 
 
 def checks() -> list[Check]:
-    """Propagator, half sine, order of convergence, energy and momentum."""
+    """Return the checks."""
     return [*_propagator(), *_half_sine(), *_order(), *_energy(), *_momentum()]
 
 

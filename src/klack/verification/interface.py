@@ -371,7 +371,7 @@ def _sphere_on_beam() -> Iterator[Check]:
 
 
 def _metal_bar() -> list[Check]:
-    """Rigid and elastic bar of the showcase; the wall of the rigid one is a spring of 1e12 N/m."""
+    """Rigid and elastic bar of the showcase; the rigid one on a wall of 1e12 N/m."""
     speed, energy = 227.0, 239.61
     mass = 2.0 * energy / speed**2
     rigid = modal_model(
@@ -602,7 +602,7 @@ def _bounce(model: InterfaceModel, force: float, impacts: int) -> InterfaceResul
 
 
 def _largest_deviation(run: InterfaceResult, force: float) -> float:
-    """Of the total energy at the start of each impact from that of the start of the run."""
+    """Of the total energy at the start of each impact from the initial one."""
     lift = np.array([impact.position[2] for impact in run.impacts]) - run.motion.position[0, 2]
     energy = np.array([impact.history.ledger.initial for impact in run.impacts]) + force * lift
     energy = np.append(energy, run.energy.final - run.energy.work)
@@ -706,9 +706,9 @@ def _centred(pair: NeedleOnRing) -> Check:
 
 
 def gaps_of_sphere_over_cone(pair: NeedleOnRing, count: int, placement: np.ndarray) -> np.ndarray:
-    """Mean gaps of the hats of a spherical tip over a cone z = r - c, shape (hats, count) [m].
+    """Mean gaps of the hats of a sphere over a cone z = r - c, shape (hats, count) [m].
 
-    A line from the sphere along its radius is cut with the cone by Newton's method.
+    Radial lines are cut with the cone by Newton's method.
     """
     gaps = pair.gaps(count)
     centre = np.array([0.0, 0.0, pair.sides[0].points[:, 1].min() + _TIP])

@@ -1,8 +1,4 @@
-"""Interface-level models whose motion is known: rigid bodies, rods, points, a sphere on a beam.
-
-A model is nothing but arrays, so simple bodies are written down by hand; others are reduced from
-finite elements here.
-"""
+"""Interface-level models whose motion is known: rigid bodies, rods, points, a sphere on a beam."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -83,8 +79,8 @@ def modal_model(
     gap (nc,) [m]
     rigid (6, M) [1/sqrt(kg)]
     more
-        Other fields of the model.  Without them all coordinates belong to the moving body and are
-        undamped, and one contact on 1 m^2 for each point lies below that body, on its axis.
+        Other fields. By default all coordinates belong to the moving body and are undamped, and
+        one contact on 1 m^2 for each point lies below it, on its axis.
     """
     nc, modes = traces.shape
     if rigid is None:
@@ -132,8 +128,8 @@ def rigid_body(
     Parameters
     ----------
     mass [kg]
-    inertia : three floats [kg m^2]
-        About x, y, z through the centre of mass.
+    inertia [kg m^2]
+        About x, y, z.
     points (nc, 3) [m]
         From the centre of mass.
     stiffness, gap [N/m], [m]
@@ -157,7 +153,7 @@ def rigid_body(
 
 
 def free_rod(modes: int, *, stiffness: float, gap: float = 0.0) -> InterfaceModel:
-    """Steel rod D4 x L30 mm with exact modes over a rigid wall with a linear contact spring."""
+    """Steel rod D4 x L30 mm with exact modes over a rigid wall with a linear spring."""
     both = rod_between_stops(modes, stiffness=stiffness, gaps=(gap, 1.0))
     return modal_model(
         masses=both.masses,
@@ -173,16 +169,8 @@ def rod_between_stops(modes: int, *, stiffness: float, gaps: tuple[float, float]
 
     .. math:: \omega_n = n \pi c / L, \qquad \varphi_n = \sqrt{2/m} \cos(n \pi x / L)
 
-    and the static flexibility with inertia relief L/(3EA) at one end, -L/(6EA) across.
-
-    Parameters
-    ----------
-    modes
-        Elastic ones.
-    stiffness [N/m]
-        Of the contact spring at either end.
-    gaps : pair of float [m]
-        Below and above.
+    and the static flexibility with inertia relief L/(3EA) at one end, -L/(6EA) across. Contact
+    springs of ``stiffness`` [N/m] at ``gaps`` [m] below and above.
     """
     mass = _DENSITY * _ROD_AREA * _ROD_LENGTH
     n = np.arange(1, modes + 1)
@@ -221,9 +209,9 @@ def lateral_guide(
     Parameters
     ----------
     clearance, stiffness [m], [N/m]
-    heights, offset : sequence of float, of (x, y) [m]
+    heights, offset [m]
+        Offset (x, y) at each height.
     friction, viscous [-], [N s/m]
-        At each height.
     radius [m]
         Of the shaft, which friction turns.
     """
@@ -250,7 +238,7 @@ def lateral_guide(
 def reduce_bodies(
     bodies: Sequence[ElasticBody], contacts: Sequence[InterfaceContact], counts: Sequence[int]
 ) -> tuple[InterfaceModel, tuple[InterfaceBody, ...]]:
-    """Undamped model of finite-element bodies with some of their lowest modes, or none."""
+    """Undamped model of finite-element bodies with some of their lowest modes."""
     items = []
     for body, count in zip(bodies, counts, strict=True):
         flexibility = Flexibility(body)
@@ -280,7 +268,7 @@ def momenta(items: Sequence[InterfaceBody], v: np.ndarray) -> tuple[np.ndarray, 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ModalState:
-    """Where a model is: coordinates, velocities and point forces."""
+    """Coordinates, velocities and point forces."""
 
     q: np.ndarray
     v: np.ndarray
@@ -290,7 +278,7 @@ class ModalState:
 def advance(
     model: InterfaceModel, q: np.ndarray, v: np.ndarray, *, step: float, steps: int
 ) -> ModalState:
-    """Take ``steps`` steps of the compiled loop from an open contact, without outside forces."""
+    """Steps of the compiled loop from an open contact, without outside forces."""
     n, M = model.count, model.mode_count
     P = modal_propagator(model.omega, model.damping, step)
     yields, rough = model.limit is not None, model.layer is not None
@@ -342,20 +330,19 @@ class BeamImpact:
     .. math:: \omega_n = \left(\frac{n \pi}{L}\right)^2 \sqrt{\frac{E I}{\rho A}}, \qquad
         \varphi_n(L/2) = \sqrt{2 / m_b} \, \sin(n \pi / 2), \quad n \text{ odd},
 
-    rigid sphere, Hertz contact in pieces: parallel springs with gaps :math:`a_i` and stiffnesses
-    :math:`k_i` that meet :math:`K \delta^{3/2}` at :math:`\delta = a_i`.  Each spring is one
-    contact point of the interface level.  The other solution here knows nothing of klack: the
-    equations of motion in the hands of an explicit Runge-Kutta method of order 8.
+    rigid sphere, Hertz contact in pieces: parallel springs (contact points) with gaps :math:`a_i`
+    and stiffnesses :math:`k_i` that meet :math:`K \delta^{3/2}` at :math:`\delta = a_i`. The other
+    solution is an explicit Runge-Kutta method of order 8.
 
     Parameters
     ----------
     mass [kg]
         Of the sphere.
     omega, shapes (m,) [rad/s], [1/sqrt(kg)]
-        Frequencies of the beam and its modes at the middle.
+        Of the beam, at the middle.
     gaps, stiffness (n,) [m], [N/m]
     hertz [N/m^1.5]
-        K of the law that the springs follow.
+        K.
     """
 
     mass: float
@@ -390,9 +377,9 @@ class BeamImpact:
         ----------
         speed, duration [m/s], [s]
         smooth
-            Take Hertz' law itself instead of the springs.
+            Take Hertz' law itself.
         samples
-            Instants at which the force is looked at.
+            Instants of the force.
         """
         m = len(self.omega)
 
@@ -438,13 +425,12 @@ def _touches(t: np.ndarray, force: np.ndarray) -> tuple[Touch, ...]:
 def sphere_on_beam(*, modes: int = 20, springs: int = 30) -> BeamImpact:
     """Sphere R70 mm above the middle of a beam of 60 x 27.8 x 780 mm, both of steel.
 
-    Several sub-impacts were measured on this arrangement (Adv. Mech. Eng. 2016, 8(9),
-    10.1177/1687814016668089).
+    Sub-impacts were measured on it (Adv. Mech. Eng. 2016, 8(9), 10.1177/1687814016668089).
 
     Parameters
     ----------
     modes
-        Symmetric ones of the beam.
+        Symmetric ones.
     springs
         Pieces of Hertz' law, up to a depth of 80 um.
     """
@@ -469,11 +455,10 @@ LAYER = AsperityLayer.of_summits(rms=0.2e-6, radius=50e-6, density=0.05, modulus
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MassOnLayer:
-    r"""A rigid mass on one point with a layer of asperities, and its impact in closed form.
+    r"""A rigid mass on one point with a layer of asperities, in closed form.
 
     The pressure is straight between points of the curve, so the mass moves on arcs of oscillators:
-    from the closure :math:`c_j` with the pressure :math:`p_j`, its slope :math:`s_j` and the speed
-    :math:`v_j` on
+    from the pressure :math:`p_j` with the slope :math:`s_j` and the speed :math:`v_j` on
 
     .. math:: R_j = \sqrt{p_j^2 + s_j \tfrac{m}{A} v_j^2}, \qquad
         t = \sqrt{\frac{m}{A s_j}} \left(\arcsin\frac{p}{R_j} - \arcsin\frac{p_j}{R_j}\right) .
@@ -483,7 +468,7 @@ class MassOnLayer:
     mass [kg]
     area [m^2]
     stiffness [N/m]
-        Of the bodies behind the layer, in series.
+        In series with the layer.
     """
 
     layer: AsperityLayer = LAYER
@@ -504,15 +489,15 @@ class MassOnLayer:
         )
 
     def peak(self, speed: float) -> float:
-        """Highest force [N] on rigid bodies: all energy is in the layer."""
+        """Highest force [N] on rigid bodies."""
         return self.area * self._arcs(speed)[1]
 
     def time_above(self, force: float, speed: float) -> float:
-        """Time [s] for which rigid bodies press harder than a force, in and out."""
+        """Time [s] for which rigid bodies exceed a force."""
         return 2.0 * self._arcs(speed, force / self.area)[0]
 
     def _arcs(self, speed: float, above: float = 0.0) -> tuple[float, float]:
-        """Time [s] from a pressure to the highest one, and the latter [Pa]."""
+        """Time [s] from a pressure to the highest one [Pa]."""
         curve, per_area = self.layer, self.mass / self.area
         slope = np.diff(curve.pressure) / np.diff(curve.closure)
         energy = curve.state(curve.closure)[2]
@@ -532,7 +517,7 @@ class MassOnLayer:
 
 
 def time_above(force: float, history: np.ndarray, step: float) -> float:
-    """Time [s] for which mean forces of steps, straight between their middles, exceed a force."""
+    """Time [s] above a force, straight between the middles of steps."""
     is_above = np.flatnonzero(history > force)
     first, last = is_above[0], is_above[-1]
     before = (history[first] - force) / (history[first] - history[first - 1])
@@ -541,12 +526,12 @@ def time_above(force: float, history: np.ndarray, step: float) -> float:
 
 
 def rough_rod(modes: int = 10) -> InterfaceModel:
-    """Steel rod D4 x L30 mm whose end is rough, over a rigid wall with a spring of 1e9 N/m."""
+    """Steel rod D4 x L30 mm with a rough end, over a rigid wall with a spring of 1e9 N/m."""
     return replace(free_rod(modes, stiffness=1e9, gap=0.1e-6), area=np.array([1e-6]), layer=LAYER)
 
 
 def rough_checks() -> list[Check]:
-    """Return the checks of contact points with a layer of asperities."""
+    """Contact points with a layer of asperities."""
     return [*_mass_on_layer(), *_rod()]
 
 
@@ -612,7 +597,7 @@ def _rod() -> list[Check]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PointRebound:
-    """Velocities of the point after an impact, tangential and normal [m/s], and the loss [J]."""
+    """Tangential and normal velocity of the point after an impact [m/s], loss [J]."""
 
     tangential: float
     normal: float
@@ -626,12 +611,12 @@ class PointImpact:
     Parameters
     ----------
     along, coupling, normal [1/kg]
-        Inverse mass at the point: tangential, tangential per normal force, normal.
+        Inverse mass: tangential, tangential per normal force, normal.
     friction [-]
     tangential, approach [m/s]
-        Velocity of the point before, along the face and into it.
+        Of the point before, along the face and into it.
     spring, stiffer [N/m], [-]
-        Normal spring, and the tangential one over it.
+        Normal, and the tangential one over it.
     """
 
     along: float
@@ -644,7 +629,7 @@ class PointImpact:
     stiffer: float = 0.8235294
 
     def hit(self, time: float, *, steps: int = 400) -> PointRebound:
-        """Impact that lasts about ``time`` [s], in so many steps."""
+        """Impact of about ``time`` [s]."""
         root = np.asarray(
             np.linalg.cholesky([[self.normal, self.coupling], [self.coupling, self.along]]),
             dtype=float,
@@ -676,7 +661,7 @@ class PointImpact:
 
 
 def seat_restitution(half_angle: float, friction: float, stiffer: float, steps: int = 800) -> float:
-    """Restitution of a rigid needle on a frictional cone, compliance at the ring alone."""
+    """Restitution of a rigid needle on a frictional cone, compliant at the ring alone."""
     s, c = np.sin(half_angle), np.cos(half_angle)
     model = modal_model(
         masses=(1.0, inf),

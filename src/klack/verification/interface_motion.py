@@ -28,20 +28,18 @@ class InterfaceMotion:
     Parameters
     ----------
     step [s]
-    gap, law_gap : array (n + 1,) [m]
-        Of the bodies, and what contact and film feel behind the series compliance, at the ends
-        of the steps.
-    contact_force, film_force : array (n,) [N]
+    gap, law_gap (n + 1,) [m]
+        Of the bodies, and behind the series compliance.
+    contact_force, film_force (n,) [N]
         Means over the steps.
-    contact_loss, film_loss : array (n,) [J]
+    contact_loss, film_loss (n,) [J]
     kinetic [J]
-        Modal energy of both bodies at the start.
+        Modal, of both bodies at the start.
     residual [-]
-        Residual of the energy balance, over ``kinetic`` or the work of the force, whichever is
-        larger.
+        Of the energy balance, over ``kinetic`` or the work of the force, whichever is larger.
     upper_speed [m/s]
-        Of the centre of mass of the upper body at the end.
-    state : array (2 m,)
+        Of the centre of mass at the end.
+    state (2 m,)
         Modal displacements and velocities at the end.
     """
 
@@ -81,13 +79,13 @@ def interface_motion(
     Parameters
     ----------
     upper, lower
-        Undamped, so that the energy balance close without the modes.
+        Undamped, so that the energy balance closes without the modes.
     series [m/N]
     gap [m]
     speed [m/s]
-        Of ``upper``, down.
+        Downwards.
     press [N]
-        Pushes ``upper`` down, as a body force on its rigid mode.
+        On the rigid mode of ``upper``, down.
     step [s]
     """
     flat = law.flat() if law else FlatLaw(kind=NO_LAW, parameters=np.zeros(1))
@@ -214,7 +212,7 @@ def squeeze_by_volumes(inner: float, outer: float, cells: int) -> float:
     Parameters
     ----------
     inner, outer [m]
-        Radii; an inner one of 0 makes a disc.
+        An inner radius of 0 makes a disc.
     """
     edges = np.linspace(inner, outer, cells + 1)
     r, dr = 0.5 * (edges[1:] + edges[:-1]), edges[1] - edges[0]
@@ -241,8 +239,8 @@ def film_by_ode(
 
     .. math:: \dot e = -\dot g - \frac{e/D}{B/x^3 + C/x}, \qquad x = g + e + h_r
 
-    Implicit Runge-Kutta (Radau IIA, order 5) with an analytic Jacobian.  Holds while the film
-    keeps the faces apart (``g + e > 0``) and does not cavitate.
+    Radau IIA of order 5 with an analytic Jacobian.  Holds while the film keeps the faces apart
+    (``g + e > 0``) and does not cavitate.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Structured meshes of boxes for checks: any family, any map of the box into space.
 
-All nodes, mid nodes too, are points of one lattice with two steps per cell, so a map moves them
-onto curved surfaces exactly.
+All nodes are points of one lattice with two steps per cell: a map moves mid nodes onto curved
+surfaces exactly.
 """
 
 from collections.abc import Callable, Sequence
@@ -61,20 +61,17 @@ def lattice_mesh(
 ) -> Mesh:
     """Box cut along ``lines`` in each direction and mapped into space.
 
+    It has the surfaces left, right (x), front, back (y), bottom, top (z), or, with two directions,
+    inner, outer (r), bottom, top (z).
+
     Parameters
     ----------
     family
-        Element family; triangles, wedges and tetrahedra split the cells.
-    lines : arrays, one per direction [m]
-        Ascending coordinates of the cell borders.
-    shape : function of points (n, d) to points (n, d), optional
-        Map that keeps the orientation; it is applied to mid nodes as well.
-
-    Returns
-    -------
-    Mesh
-        With the surfaces left, right (x), front, back (y), bottom, top (z), or inner, outer (r),
-        bottom, top (z) when there are two directions.
+        Triangles, wedges and tetrahedra split the cells.
+    lines [m]
+        Ascending borders of the cells in each direction.
+    shape
+        Map of points (n, d) that keeps the orientation.
     """
     topology = FAMILIES[family]
     counts = [2 * len(line) - 1 for line in lines]

@@ -1,7 +1,7 @@
 """Lines that meet without a volume: scattering, dead ends, cavities, and the chamber that vanishes.
 
-The other side knows two delays per line and nothing else: ring buffers of waves, whose junctions
-are solved by the formula of parallel impedances (a method of characteristics written apart).
+The other side is a method of characteristics: two delays per line, and junctions by the formula of
+parallel impedances.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -37,7 +37,7 @@ APART = "method of characteristics written apart: delays and parallel impedances
 
 
 def line_junctions() -> list[Check]:
-    """Scattering, a network of lines, equal networks, an orifice, a cavity, a vanishing chamber."""
+    """Return the checks."""
     return [
         *_scattering(),
         *_network(),
@@ -78,7 +78,7 @@ def _run(
 
 
 def _at(result: NetworkResult, name: str) -> np.ndarray:
-    """Wave pressure of a node over time [Pa], from its start."""
+    """Wave pressure of a node over time, from its start [Pa]."""
     p = result.channels[f"{name} pressure"].values
     return np.array([wave_pressure(x) for x in p]) - wave_pressure(BEFORE)
 
@@ -100,7 +100,7 @@ _BORES = {2: (2e-3, 3e-3), 3: (2e-3, 1.2e-3, 3e-3), 5: (1e-3,) * 5}
 
 
 def _scattering() -> Iterator[Check]:
-    """A jump of the pressure runs through the first of several lines into the others."""
+    """A jump of the pressure runs through one line into others."""
     for count, bores in _BORES.items():
         lines: dict[str, Component] = {f"l{k}": bore(200, d) for k, d in enumerate(bores)}
         ends = [f"e{k}" for k in range(1, count)]
@@ -147,7 +147,7 @@ class _Bore:
 def _characteristics(
     bores: Sequence[_Bore], given: str, pressure: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """Pressure of every node over the steps; ``given`` has the prescribed one."""
+    """Pressure of every node over the steps; ``given`` is prescribed."""
     nodes = {node for line in bores for node in (line.a, line.b)}
     found = {node: np.zeros(pressure.size) for node in nodes}
     for n in range(pressure.size):
@@ -299,7 +299,7 @@ def _orifice() -> list[Check]:
 
 
 def _cavity() -> list[Check]:
-    """A pressure that falls pulls a column off the closed end of a line; it comes back."""
+    """A falling pressure pulls a column off the closed end of a line; it comes back."""
     fall = PressureSource(pressure=BEFORE, step=PressureStep(to=2 * BAR, at=1e-6, rise=1e-9))
     n, steps = 200, 3000
     result = _run(
@@ -354,7 +354,7 @@ def _cavity() -> list[Check]:
 
 
 def _vanishing_chamber() -> list[Check]:
-    """The pressure at a tee with a chamber tends to that without one as its volume does."""
+    """The pressure at a tee with a chamber tends to that without one."""
     sums = []
     for tee in (
         *(component("chamber", volume=v, pressure=BEFORE) for v in (40e-9, 20e-9, 10e-9)),
@@ -447,7 +447,7 @@ def _closing(
 
 
 def darcy(reynolds: float) -> float:
-    """Factor of Hagen-Poiseuille below Re = 2300, of Colebrook (by iteration) above 4000 [-]."""
+    """Hagen-Poiseuille below Re = 2300, Colebrook (by iteration) above 4000 [-]."""
     if reynolds <= 2300.0:
         return 64.0 / reynolds
     root = 8.0  # 1/sqrt(f)
@@ -483,7 +483,7 @@ def _steady() -> Iterator[Check]:
 def _grid(time: np.ndarray, flow: np.ndarray, reaches: int) -> np.ndarray:
     """Wave pressure at the end over time: characteristics with friction in every reach.
 
-    ``flow`` [kg/s] leaves at the end; explicit first-order friction (Wylie & Streeter 1993, 3.6).
+    ``flow`` [kg/s] leaves; explicit first-order friction (Wylie & Streeter 1993, 3.6).
     """
     speed = _line("none", 1).wave_speed(HEPTANE)
     h = LENGTH / speed / reaches
@@ -524,7 +524,7 @@ def _grid(time: np.ndarray, flow: np.ndarray, reaches: int) -> np.ndarray:
 
 
 def _any_darcy(reynolds: float) -> float:
-    """Factor with the straight line in ``Re sqrt(f)`` from Re = 2300 to 4000 [-]."""
+    """The same with the straight line in ``Re sqrt(f)`` between."""
     if reynolds <= 2300.0 or reynolds >= 4000.0:
         return darcy(reynolds)
     low, high = sqrt(64.0 * 2300.0), 4000.0 * sqrt(darcy(4000.0))

@@ -40,7 +40,7 @@ ROUND_OFF = "both are the same to round-off"
 
 
 def checks() -> list[Check]:
-    """Single masses, coils, needles on fluid, relief valves with a volume and with a pipe."""
+    """Return the checks."""
     return [
         *_oscillator(),
         *_coil(),
@@ -67,7 +67,7 @@ def _rows(network: Network) -> Rows:
 
 
 def _about(network: Network, **drives: Network) -> tuple[LinearNetwork, OperatingPoint, Rows]:
-    """Linear network about its operating point; drives by input, one volt more."""
+    """Linear network about its operating point; drives one volt more by input."""
     rows = _rows(network)
     point = operating_point(rows)
     compiled, _ = compiled_at(rows, point)
@@ -122,7 +122,7 @@ def _oscillator() -> list[Check]:
 
 
 def _coil() -> list[Check]:
-    """A coil with leakage, its armature on a stiff spring, at constant voltage."""
+    """A coil with leakage, armature on a stiff spring, at constant voltage."""
     turns, radius, gap, current, leak = 100.0, 3e-3, 150e-6, 1.0, 2e-8
     R, stiffness, preload = 2.0, 1e6, 3.0
     parts: dict[str, Component] = {
@@ -510,7 +510,7 @@ def _decay(valve: _Valve, damping: float) -> tuple[float, float]:
 
 
 def _kicked(network: Network, speed: float, duration: float) -> tuple[np.ndarray, np.ndarray]:
-    """Displacement of the first body from its operating point after a small kick."""
+    """First body about its operating point after a small kick."""
     rows = _rows(network)
     point = operating_point(rows)
     state = {name: array.copy() for name, array in point.state.items()}
@@ -523,7 +523,7 @@ def _kicked(network: Network, speed: float, duration: float) -> tuple[np.ndarray
 
 
 def _rate(time: np.ndarray, values: np.ndarray, near: complex) -> complex:
-    """Pole of a record that is the nearest to a number: matrix pencil, Hua & Sarkar 1990."""
+    """Nearest pole of a record to a number: matrix pencil, Hua & Sarkar 1990."""
     every = max(1, round(2.0 * pi / near.imag / 24.0 / (time[1] - time[0])))
     y = values[::every]
     hankel = np.lib.stride_tricks.sliding_window_view(y, len(y) // 2)
@@ -570,7 +570,7 @@ def _line(length: float, friction: str = "none") -> Line:
 
 
 def _impedance(line: Line) -> tuple[float, float]:
-    """Impedance in the variables of the network [Pa s/m^3], and delay [s]."""
+    """Impedance in network variables [Pa s/m^3], and delay [s]."""
     a, rho = line.wave_speed(HEPTANE), float(HEPTANE.density(PIPE_PRESSURE))
     return rho * a / (0.25 * pi * BORE**2) * (RHO_HEPTANE / rho) ** 2, line.length / a
 
@@ -595,7 +595,7 @@ def _blocked(line: Line, volume: float) -> LinearSystem:
 
 
 def _pipe() -> list[Check]:
-    """Resonances of a pipe that is closed by a volume, and what drives it at any frequency."""
+    """Resonances of a pipe closed by a volume, and its drive at any frequency."""
     line, volume = _line(1.2), 1e-6
     Z, T = _impedance(line)
     rho, slope = _slope(PIPE_PRESSURE)
@@ -644,7 +644,7 @@ def _pipe() -> list[Check]:
 
 
 def _pipe_friction() -> list[Check]:
-    """The first resonance with friction: lumps of the line in a chain of two-ports."""
+    """First resonance with friction: lumps in a chain of two-ports."""
     line, volume = _line(1.2, "kagawa"), 1e-6
     Z, T = _impedance(line)
     rho, slope = _slope(PIPE_PRESSURE)
@@ -691,7 +691,7 @@ def _on_pipe(length: float, damping: float) -> Network:
 
 
 def _valve_on_pipe() -> Iterator[Check]:
-    """A relief valve at the end of a pipe: delay theory, and runs about its boundary."""
+    """Relief valve at the end of a pipe: delay theory, and runs about its boundary."""
     valve, damping = _Valve(PIPE_PRESSURE), 1.5
     Z, T = _impedance(_line(1.0))
 
@@ -742,7 +742,7 @@ def _valve_on_pipe() -> Iterator[Check]:
 
 
 def _fastest(network: Network) -> complex:
-    """Oscillation below 2 kHz that grows the fastest, or decays the slowest."""
+    """Oscillation below 2 kHz that grows fastest."""
     found = modes(_about(network)[0].system, 2e3)[0]
     return max((m.root for m in found if m.root.imag > 0.0), key=lambda s: s.real)
 
@@ -796,7 +796,7 @@ def _passive() -> list[Check]:
 
 
 def _sine() -> Iterator[Check]:
-    """A small force that swings: frequency response against a run in time."""
+    """A small swinging force: frequency response against a run in time."""
     f, force = 150.0, 0.02
     linear, _, _ = _about(_fed(3.0 * _Valve().boundary()))
     periods, per = 14, 200

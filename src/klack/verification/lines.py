@@ -38,7 +38,7 @@ STEP = DELAY / STEPS
 
 
 def checks() -> list[Check]:
-    """Joukowsky, echoes, slow closure, piston, friction, cavities, energy, junctions."""
+    """Return the checks."""
     return [
         *_closure(),
         *_slow_closure(),
@@ -198,7 +198,7 @@ def _piston() -> list[Check]:
 
 
 def _pulse() -> list[Check]:
-    """Pulse of flow through a delay of 130.37 steps while fine and coarse steps alternate."""
+    """Flow pulse through a delay of 130.37 steps while fine and coarse steps alternate."""
     step, steps, coarse = 20e-9, 130.37, 16
     lengths = np.where((np.arange(400) // 8) % 2 == 0, 1, coarse)
     time = step * (np.cumsum(lengths) - lengths)
@@ -310,7 +310,7 @@ def _first_mode() -> list[Check]:
 
 
 def _start_up() -> list[Check]:
-    """Oil at rest under a pressure difference of 1 bar that stays: the flow grows to its end."""
+    """Oil at rest under a lasting pressure difference of 1 bar."""
     length, radius, rho, speed, viscosity = 0.06, 1.25e-3, 870.0, 1370.0, 0.04
     nu, area = viscosity / rho, pi * radius**2
     resistance = laminar_resistance(length, 2.0 * radius, viscosity)
@@ -356,7 +356,7 @@ def _start_up() -> list[Check]:
 
 
 def _cavity() -> list[Check]:
-    """Both ends pull, a cavity opens in the middle; then they push, and it collapses."""
+    """Both ends pull, a cavity opens in the middle; they push, and it collapses."""
     Z, half, p, vapour = IMPEDANCE, 200, 5e5, -1e5
     out, into = 4e-6, 1e-6
     n = 7 * half

@@ -40,7 +40,7 @@ RIEMANN = "u = int dp/(rho a) along a simple wave; Riemann 1860"
 
 
 def local_lines() -> list[Check]:
-    """Simple wave, shock, closing and opening, small waves, walls, gas, friction, balances."""
+    """Return the checks."""
     return [
         *_simple_wave(),
         *_shock(),
@@ -78,7 +78,7 @@ def _pressure(energy: float, fluid: NetworkFluid) -> float:
 
 
 def _speed_behind(low: float, high: float) -> float:
-    """Change of velocity along a simple wave between two pressures [m/s]."""
+    """Change of velocity [m/s] along a simple wave between two pressures."""
 
     def by_p(x: float) -> float:
         return 1.0 / float(HEPTANE.density(x) * HEPTANE.sound_speed(x))
@@ -230,7 +230,7 @@ def _shock() -> list[Check]:
 
 
 def _hammer() -> list[Check]:
-    """Flow that stops at once, and a flow that is drawn off at once, at an end of fluid."""
+    """Flow stopped, and drawn off, at once."""
     start, u, cells = 100 * BAR, 40.0, 100
     parameters = _numbers(_line(cells))
     h = 0.2 * LENGTH / cells / 1500.0
@@ -277,7 +277,7 @@ def _hammer() -> list[Check]:
 def _ring(
     parameters: np.ndarray, start: float, speed: float, periods: int, fluid: NetworkFluid = HEPTANE
 ) -> tuple[CellRun, float]:
-    """Run of a line that is open at a and closed at b, from its first mode; ``B`` at rest."""
+    """Run of a line, open at a, closed at b, from its first mode; ``B`` at rest."""
     cells = int(parameters[0])
     shape = np.sin(0.5 * pi * _middles(cells) / LENGTH)
     h = 0.4 * LENGTH / cells / speed
@@ -293,7 +293,7 @@ def _ring(
 
 
 def _frequency(run: CellRun, rest: float) -> float:
-    """Frequency [Hz] of the closed end, from its falls through the level at rest."""
+    """Frequency [Hz] of the closed end, by its falls through rest."""
     y, t = run.total[:, 1] - rest, run.time
     k = np.flatnonzero((y[:-1] > 0.0) & (y[1:] <= 0.0))
     zeros = t[k] + (t[1] - t[0]) * y[k] / (y[k] - y[k + 1])
@@ -388,7 +388,7 @@ def _decay() -> list[Check]:
 
 
 def _lost(fluid: NetworkFluid, friction: str, length: float, top: float, flow: float) -> float:
-    """Energy [J/kg] that a steady flow loses, with its outflow, by integration of its pressure."""
+    """Energy [J/kg] lost by a steady flow and its outflow, by integration of its pressure."""
 
     def speed(p: float) -> float:
         return flow / (float(fluid.density(p)) * AREA)
@@ -409,7 +409,7 @@ def _lost(fluid: NetworkFluid, friction: str, length: float, top: float, flow: f
 
 
 def _steady_friction() -> Iterator[Check]:
-    """Steady flow down a fall of pressure over which density and viscosity change."""
+    """Steady flow down a fall of pressure; density and viscosity change."""
     for friction, fluid, length, flow, tolerance in (
         ("steady", library_fluid("ISO VG 46").at(313.15), 2.0, 0.02, 5e-4),
         ("turbulent", HEPTANE, 5.0, 0.06, 5e-3),
@@ -437,7 +437,7 @@ def _steady_friction() -> Iterator[Check]:
 
 
 def _balances() -> list[Check]:
-    """Random ends, a wall, friction with memory: what must balance to round-off."""
+    """Random ends, a wall, friction with memory: balances to round-off."""
     rng = np.random.default_rng(5)
     parameters, steps = _numbers(_line(30, "turbulent", stretch=1e-9)), 4000
     rough = np.repeat(rng.uniform(_energy(250 * BAR), _energy(400 * BAR), steps // 40), 40)
@@ -476,7 +476,7 @@ def _balances() -> list[Check]:
 
 
 def _closing(pieces: int, cells: int, supply: float, area: float, properties: str) -> NetworkResult:
-    """A pressure, a line of half a metre in pieces, a small chamber, a valve that closes."""
+    """A pressure, half a metre of line in pieces, a small chamber, a closing valve."""
     parts: dict[str, Component] = {
         "source": component("pressure-source", pressure=supply),
         "room": component("chamber", volume=20e-9),

@@ -1,7 +1,7 @@
-r"""Checks of magnetic networks given in a case, against node potentials and equations of time.
+r"""Magnetic networks given in a case, against node potentials and equations of time.
 
-klack solves loop fluxes; here node potentials are solved: a tube of iron carries
-:math:`A\,B(\Delta/l)` at the potential difference :math:`\Delta`, by Froehlich's formula itself.
+klack solves loop fluxes; here, node potentials: a tube of iron carries :math:`A\,B(\Delta/l)` at
+the potential difference :math:`\Delta`, by Froehlich's formula itself.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -39,7 +39,7 @@ def _network(elements: Mapping[str, object], gap: float = _GAP) -> MagneticNetwo
 
 @cache
 def _e_core() -> MagneticNetwork:
-    """Middle leg with the coil and the working gap, two outer legs, one of them with a magnet."""
+    """Middle leg with coil and working gap, two outer legs, one with a magnet."""
     return _network(
         {
             "middle": {"kind": "iron", "between": ["top", "m"], "material": _IRON, "length": 20e-3,
@@ -66,7 +66,7 @@ def _iron_flux(drop: float, length: float, area: float) -> float:
 
 
 def _nodal(current: float, gap: float) -> tuple[float, float]:
-    """Linkage [Wb] and flux of the working gap [Wb] of the E core, by node potentials."""
+    """Linkage and working flux [Wb] of the E core, by node potentials."""
     gap_permeance = 1.1 * _MU0 * 30e-6 / (gap + _RESIDUAL)
     magnet = 0.3e-3 / (_MU0 * 1.05)  # [m^2/Wb A] over the area
 
@@ -136,7 +136,7 @@ def _at_rest() -> list[Check]:
 
 
 def _transformer() -> list[Check]:
-    """Mutual inductance: voltage on one coil, the other closed through a resistance."""
+    """Mutual inductance: voltage on one coil, a resistance at the other."""
     N1, N2, R1, R2, main, leak1, leak2 = 50.0, 20.0, 0.8, 0.3, 40e-9, 6e-9, 4e-9
     network = _network(
         {
@@ -188,7 +188,7 @@ def _secondary_heat(A: np.ndarray, final: np.ndarray, resistance: float, t: floa
 
 
 def _polarised() -> list[Check]:
-    """Two gaps, one closing as the other opens, with a magnet between: linear, in closed form."""
+    """Two opposite gaps with a magnet between: linear, in closed form."""
     area, turns, half, residual = 20e-6, 60.0, 100e-6, 50e-6
     length, remanence = 2e-3, 1.2
     network = _network(
@@ -226,7 +226,7 @@ def _polarised() -> list[Check]:
 
 
 def _voltage_step() -> list[Check]:
-    """Iron, a moving gap and a damping ring in time, with the armature on a given way."""
+    """Iron, a gap moving on a given course, and a damping ring in time."""
     turns, R, S, leak, area, length = 80.0, 0.8, 4e3, 25e-9, 30e-6, 60e-3
     network = _network(
         {
@@ -304,9 +304,9 @@ Rows = Iterable[tuple[float, float, float, float]]
 def linkage_of(i: np.ndarray | float, x: np.ndarray | float) -> np.ndarray:
     r"""Linkage of the coil [Wb].
 
-    The coil :math:`\psi = L_0 i + \frac{c}{x + x_0}\tanh\frac{i}{i_s}` has the co-energy
-    :math:`\tfrac12L_0i^2 + \frac{c\,i_s}{x + x_0}\ln\cosh\frac{i}{i_s}`, whose slopes are its
-    linkage and its force.
+    :math:`\psi = L_0 i + \frac{c}{x + x_0}\tanh\frac{i}{i_s}` is a slope of the co-energy
+    :math:`\tfrac12L_0i^2 + \frac{c\,i_s}{x + x_0}\ln\cosh\frac{i}{i_s}`; the other one is the
+    force.
     """
     return np.asarray(_L0 * i + _C / (x + _X0) * np.tanh(i / _IS))
 
@@ -364,7 +364,7 @@ def _matrix(value: Callable[..., np.ndarray], head: str) -> str:
 
 
 def written(folder: Path) -> dict[str, MapFile]:
-    """Write the coil in each layout below a folder and read it again."""
+    """Write the coil in each layout and read it again."""
     layouts = {
         "Ansys Maxwell, one row per point": (_maxwell(_points()), {}),
         "FEMM, no head": (
@@ -470,7 +470,7 @@ def _virtual_work() -> list[Check]:
 
 
 def _lifting_magnet() -> Iterator[Check]:
-    """Published linkages and forces of finite elements, at one current and wide gaps."""
+    """Published finite-element linkages and forces, at one current and wide gaps."""
     made = FluxMap.of(
         current=[0.0, published.CURRENT],
         gap=published.GAP,

@@ -1,4 +1,4 @@
-"""Checks of parts of a magnetic circuit: magnets, remanence, solid iron; then loops and maps."""
+"""Parts of a magnetic circuit: magnets, remanence, solid iron; loops and maps."""
 
 from collections.abc import Iterator
 from functools import cache
@@ -177,7 +177,7 @@ def _solenoid() -> Solenoid:
 
 
 def _load_line() -> Iterator[Check]:
-    """Falling branch of constant width against the gap, with and without a current."""
+    """Falling branch of constant width against the gap, with and without current."""
     for current in (0.0, 0.3):
 
         def lacking(field: float, mmf: float = 60.0 * current) -> float:
@@ -263,9 +263,9 @@ def _slope(field: np.ndarray) -> np.ndarray:
 def _diffusion(field: float) -> tuple[float, ...]:
     r"""Mean flux density [T] at the times, after a step of the surface field [A/m].
 
-    In a sheet of solid iron the field obeys :math:`\sigma\,\partial B/\partial t =
-    \partial^2H/\partial y^2`; here with Froehlich's curve, in 400 volumes from the surface to the
-    middle, by SciPy.  The shells stand in a circuit whose coil keeps its current.
+    In a sheet of solid iron :math:`\sigma\,\partial B/\partial t = \partial^2H/\partial y^2`; with
+    Froehlich's curve, in 400 volumes from surface to middle, by SciPy. klack's shells are in a
+    circuit of constant current.
     """
     cells = 400
     edges = 0.5 * _THICK * np.linspace(0.0, 1.0, cells + 1) ** 2  # finest at the surface
@@ -319,7 +319,7 @@ def _circuit_solid(part: IronPart) -> MagneticCircuit:
 def _flux_density(
     circuit: MagneticCircuit, field: float, times: np.ndarray, step: float
 ) -> np.ndarray:
-    """Mean flux density [T] at the times, the coil fed through 1 Mohm."""
+    """Mean flux density [T] at times, the coil fed through 1 Mohm."""
     run = run_coil(
         circuit,
         VoltageStep(voltage=1e6 * field * _LENGTH_SOLID).program(),
@@ -352,7 +352,7 @@ def _nonlinear() -> Iterator[Check]:
 
 
 def _linear() -> list[Check]:
-    """Weak field, where the permeability is the initial one: the known series."""
+    """Weak field, at the initial permeability: the known series."""
     out, share = [], np.array([0.05, 0.1, 0.2])
     series = {
         "sheet": ((0.5040878, 5e-6), (0.6978819, 5e-6), (0.8874029, 5e-6)),

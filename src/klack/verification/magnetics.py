@@ -1,4 +1,4 @@
-"""Checks of magnetic circuits at rest, magnetisation curves, edge fields and eddy ladders."""
+"""Magnetic circuits at rest, magnetisation curves, edge fields and eddy ladders."""
 
 from collections.abc import Iterator
 from math import pi
@@ -26,7 +26,7 @@ _CORE = {"conductivity": 2e6, "length": 20e-3, "radius": 2e-3, "permeability": 1
 
 
 def checks() -> list[Check]:
-    """Return all checks of magnetic circuits at rest."""
+    """Return the checks."""
     return [
         *_two_poles(),
         *_energy(),

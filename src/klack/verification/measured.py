@@ -1,8 +1,8 @@
 """Checks against measurements of others: struck bars, oblique impacts, bounces in a liquid.
 
-The recordings are shipped with the case ``struck-bar``; its README says what is known of them.  The
-end face of the strikers and the low pass of the amplifier are not: one dome and one low pass for
-all shots, chosen here once, and the same comparison without the dome beside it.
+Recordings: case ``struck-bar``, see its README. End face of the strikers and low pass of the
+amplifier are not known: one dome and one low pass for all shots, chosen once, and the same
+comparison without the dome.
 """
 
 from dataclasses import dataclass
@@ -43,7 +43,7 @@ _LINE = "{line: [10, 0], name: end}"
 
 @dataclass(frozen=True, slots=True)
 class Shot:
-    """A recording, the length of its striker [mm], and the speed that its plateau stands for."""
+    """Recording, striker length [mm], and the speed that its plateau stands for."""
 
     name: str
     striker: int
@@ -109,13 +109,7 @@ def checks() -> list[Check]:
 
 
 def struck_bar(shot: Shot, *, flat: bool = False) -> MeasuredImpactStudy:
-    """Compute one shot and compare it with its recording.
-
-    Parameters
-    ----------
-    flat
-        With a flat end of the striker.
-    """
+    """Compute one shot, perhaps with a flat striker, and compare it with its recording."""
     # a flat impact is linear: its speed is the factor
     study = _impact(shot.striker, 10.0 if flat else shot.speed, flat)
     return compare_impact(

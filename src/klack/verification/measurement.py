@@ -22,7 +22,7 @@ FINE, STEP, NOISE, RECORDS = 50e-9, 2e-6, 1e-6, 12  # [s], [s], [m]
 
 
 def checks() -> list[Check]:
-    """Sensor, differentiator, exact flights, noisy flights, maximum over n."""
+    """Return the checks."""
     return [*_sensor(), *_velocity(), *_flights(), *_noisy(), *_maximum()]
 
 

@@ -35,7 +35,7 @@ MAXWELL = "complex modulus of the generalised Maxwell model, closed form"
 
 
 def checks() -> list[Check]:
-    """Motion under each part against a closed or an independent solution."""
+    """Return the checks."""
     return [
         *_nonlinear(),
         *_surging(),
@@ -138,7 +138,7 @@ def _nonlinear() -> Iterator[Check]:
 
 
 def _rod_motion(time: np.ndarray, k: float, m: float, tip: float, speed: float) -> np.ndarray:
-    """Tip mass on a rod held at its other end, thrown with a speed: sum of the exact modes."""
+    """Tip mass thrown on a rod held at its other end: sum of exact modes."""
     motion = np.zeros_like(time)
     for j in range(300):
         beta = brentq(
@@ -254,7 +254,7 @@ def _surging() -> list[Check]:
 
 
 def _ringing(spring: SurgingSpring, mode: int) -> tuple[float, float]:
-    """Frequency [Hz] and decay per radian of one mode, both ends held, from its zeros and peaks."""
+    """Frequency [Hz] and decay per radian of one mode, ends held, by zeros and peaks."""
     row = (
         Network(
             {"mass": component("rigid-mass", mass=1.0), "spring": spring},
@@ -327,7 +327,7 @@ def _rubber() -> Iterator[Check]:
 
 
 def _complex_stiffness(rubber: RubberStop, frequency: float) -> complex:
-    """Complex stiffness [N/m] of the compiled step under a sine, after the start has decayed."""
+    """Complex stiffness [N/m] of the compiled step under a steady sine."""
     row = (
         Network(
             {"mass": component("rigid-mass", mass=1.0), "stop": rubber},
@@ -356,7 +356,7 @@ def _complex_stiffness(rubber: RubberStop, frequency: float) -> complex:
 
 
 def _dropped(stop: RubberStop, speed: float) -> tuple[float, float]:
-    """Restitution and deepest indentation [m] of a mass on rubber, without klack's step."""
+    """Restitution and deepest indentation [m] of a mass on rubber, by SciPy."""
 
     def elastic(s: float) -> float:
         a = stop.higher[1] / (stop.reference or 1.0) ** 2
@@ -395,7 +395,7 @@ _PAPER = LuGreFriction(
 
 
 def _bristles(v: float, z: float, part: LuGreFriction = _PAPER) -> tuple[float, float]:
-    """Rate of the deflection [m/s] and friction [N] of the paper, written apart."""
+    """Rate of the deflection [m/s] and friction [N] of the paper."""
     excess = (part.breakaway or part.coulomb) - part.coulomb
     g = part.coulomb + excess * np.exp(-((v / part.stribeck_speed) ** 2))
     rate = v - part.bristle_stiffness * abs(v) / g * z
@@ -412,7 +412,7 @@ def _rubbed(
     longest: float = np.inf,
     part: LuGreFriction = _PAPER,
 ) -> np.ndarray:
-    """Displacement, speed and deflection of 1 kg under a force over time and place, by SciPy."""
+    """Displacement, speed, deflection of 1 kg under a force over time and place, by SciPy."""
 
     def rates(t: float, y: np.ndarray) -> list[float]:
         rate, friction = _bristles(y[1], y[2], part)
@@ -433,7 +433,7 @@ def _rubbed(
 
 
 def _pushed(time: tuple[float, ...], force: tuple[float, ...], at: np.ndarray) -> np.ndarray:
-    """The same under a force drawn with straight lines over time."""
+    """The same under a force of straight lines over time."""
     return _rubbed(lambda t, _: float(np.interp(t, time, force)), at, longest=0.02)
 
 

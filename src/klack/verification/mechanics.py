@@ -19,7 +19,7 @@ NEWTON = "Newton's second law, closed form"
 
 
 def checks() -> list[Check]:
-    """Motion under each component against its closed solution, and the energy balance."""
+    """Return the checks."""
     return [
         *_falls(),
         *_oscillates(),

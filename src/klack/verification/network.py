@@ -70,20 +70,20 @@ def whole_valve(
     driver: Driver | None = None,
     gas_fraction: float = 1e-4,
 ) -> Network:
-    """Return a normally closed valve at 5 bar in n-heptane: about 1 ms to open, 0.3 ms to close.
+    """Normally closed valve at 5 bar in n-heptane: about 1 ms to open, 0.3 ms to close.
 
-    Needle (3 g), housing with the seat and pole with the stop are rods with their exact modes.
-    Line, inlet chamber, ball seat, sac, nozzle; solenoid with two poles, iron, leakage and one eddy
-    term.  Both end stops have a contact, a film and a compliance in series.
+    Needle (3 g), housing and pole are rods with exact modes. Line, inlet chamber, ball seat, sac,
+    nozzle; solenoid with two poles, iron, leakage and one eddy term. End stops have a contact, a
+    film and a compliance in series.
 
     Parameters
     ----------
     modes
         Of needle (one of them rigid), housing and pole.
     damping [-]
-        Of every elastic mode.
+        Elastic.
     driver
-        :func:`peak_and_hold` by default.
+        Default: :func:`peak_and_hold`.
     gas_fraction [-]
     """
     parts: dict[str, Component] = {
@@ -183,7 +183,7 @@ NEVER = 1e9  # [N] suction that is never reached
 
 
 def checks() -> list[Check]:
-    """A whole valve, then one law after the other in the smallest network that shows it."""
+    """A whole valve, then single laws in the smallest network that shows each."""
     valve = whole_valve(damping=0.0, driver=peak_and_hold(end=0.6e-3))
     wet, dry = (_run(network, 1.6e-3, coarse=16) for network in (valve, valve.dry()))
     return [
@@ -568,7 +568,7 @@ def _films() -> list[Check]:
 
 
 def _surge() -> list[Check]:
-    """A flow that starts at one end of a line whose other end holds its pressure."""
+    """Flow starts at one end of a line whose other end holds its pressure."""
     pressure, flow, duration = 5e5, 2e-6, 70e-6
     fluid = library_fluid("n-heptane").at(293.15)
     line = component("line", length=0.06, diameter=2.5e-3, pressure=pressure, friction="none")

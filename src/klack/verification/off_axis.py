@@ -1,4 +1,4 @@
-"""Checks of a rigid needle in space: its films, guide, magnet, and the network that drives it."""
+"""A rigid needle in space: films, guide, magnet, and the network that drives it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -94,9 +94,9 @@ def needle_on_ring(gap: float = 0.0) -> InterfaceModel:
 def needle_on_cone(
     half_angle: float, friction: float, *, stiffer: float, gap: float = 0.0
 ) -> InterfaceModel:
-    """The same in a cone whose faces rub: ``stiffer`` springs across the normals, over those along.
+    """The same in a rubbing cone: ``stiffer`` springs across the normals over those along.
 
-    Tangents are those along the meridian, upwards, and round the axis; ``gap`` is along it [m].
+    Tangents along the meridian, upwards, and round the axis; ``gap`` [m] along it.
     """
     flat, s, c = needle_on_ring(), sin(half_angle), cos(half_angle)
     angle, nothing = 2.0 * np.pi * np.arange(_POINTS) / _POINTS, np.zeros(_POINTS)
@@ -125,7 +125,7 @@ def needle_on_cone(
 
 
 def needle_valve(model: InterfaceModel, **more: Any) -> SpatialValve:
-    """The needle at its stop in a network, its tip 6 mm below its centre of mass."""
+    """The needle at its stop in a network, tip 6 mm below its centre of mass."""
     return SpatialValve(
         model=model,
         components=("needle",),
@@ -157,10 +157,10 @@ def film_of(model: InterfaceModel, *, sectors: int = 36) -> TiltingFilm:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ended:
-    """Coordinates and velocities at the end of a motion, and its energies [J].
+    """Coordinates, velocities and energies [J] after a motion.
 
-    Films have lost, bulk and contact hold, and the contact has still to pay so much.  Mean forces
-    of the contact and of the films along the axis, step by step.
+    Lost in films, held by bulk and contact, and owed by the contact; mean axial forces of contact
+    and films, step by step.
     """
 
     q: np.ndarray
@@ -185,10 +185,9 @@ def fly_in_films(
     sectors: int = 36,
     series: float = 0.0,
 ) -> Ended:
-    """Motion in a film at the contact, or films in the guide, without any other force.
+    """Motion in a film at the contact, or films in the guide, alone.
 
-    ``series`` is the compliance [m/N] of the bulk under film and contact, of which the springs have
-    as much at each point.
+    ``series`` is the compliance [m/N] of the bulk under film and contact.
     """
     none = np.zeros(0)
     films: Films = film_arrays(
@@ -256,8 +255,8 @@ def fly_in_network(
 ) -> NetworkResult:
     """A needle over its stop in a network: in space, or along its axis without ``valve``.
 
-    Ports of ``parts`` meet it on its axis, or ``arm`` [m] along x from there; ``joints`` are
-    further connections.  ``wet`` has a fluid, and with ``film`` one at the contact.
+    Ports of ``parts`` meet it on its axis, or ``arm`` [m] along x; ``joints`` are further
+    connections. ``wet`` has a fluid, with ``film`` also at the contact.
     """
     rigid = np.diag([MASS**-0.5] * 3 + [J**-0.5 for J in INERTIA])
     tip = rigid[2]
@@ -314,7 +313,7 @@ _LEAN = np.array([0.0, 0.0, 0.0, 4e-4, 6e-4, 0.0])  # [rad]
 
 
 def checks() -> list[Check]:
-    """Films that tilt, films in a guide, drops and starts in a network, magnets, faces, rings."""
+    """Return the checks."""
     return [
         *_films(),
         *_bearing(),
@@ -339,7 +338,7 @@ def _coordinates(rigid: np.ndarray) -> np.ndarray:
 
 
 def _squeezed(steps: int, lean: np.ndarray) -> tuple[np.ndarray, Ended]:
-    """Fall through the film from 8 um, 6 us; lift and tilts of the face before."""
+    """Fall through the film from 8 um, 6 us; lift and tilts before."""
     v = _coordinates(np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0]))
     ended = fly_in_films(
         needle_on_ring(8e-6), _ROW, _coordinates(lean), v, step=6e-6 / steps, steps=steps
@@ -495,7 +494,7 @@ def _bearing() -> list[Check]:
 
 
 def _driven() -> list[Check]:
-    """An eccentric drop under a constant force, as the interface level has it; a force aside."""
+    """An eccentric drop under a constant force, as of the interface level; a force aside."""
     model, tilt = needle_on_ring(5e-6), np.array([0.0, 0.0, 0.0, 0.0, 3e-4, 0.0])
     alone = simulate_interface(
         model, speed=0.3, duration=120e-6, step=_STEP, force=6.0, offset=tilt, flight=False
@@ -573,7 +572,7 @@ def _centred() -> list[Check]:
 
 
 def _rest() -> Check:
-    """A needle pressed aside stands on its springs as a plate does on an elastic bed."""
+    """A needle pressed aside: a plate on an elastic bed."""
     push, arm = 40.0, 0.3e-3
     valve = needle_valve(
         needle_on_ring(),
@@ -618,7 +617,7 @@ def _energy() -> Check:
 
 
 def _rubbing() -> list[Check]:
-    """A needle in a cone whose faces rub: centred, and off its axis in a network."""
+    """A needle in a rubbing cone: centred, and off-axis in a network."""
     half_angle, mu, stiffer = 0.25 * pi, 0.1, 0.8
 
     model = needle_on_cone(half_angle, mu, stiffer=stiffer, gap=5e-6)
@@ -699,7 +698,7 @@ _ROUND_OFF_PULLED = "round-off of sums over hundreds of steps"
 
 
 def held_coil(bore: ArmatureBore | None, *, tilts: bool = False, current: float = 5.0) -> Solenoid:
-    """Coil with a steady current, one working gap and one ring around its armature."""
+    """Coil of steady current, one working gap and one ring around its armature."""
     return Solenoid(
         turns=60,
         resistance=0.6,
@@ -723,8 +722,7 @@ def pulled_needle(
 ) -> NetworkResult:
     """A needle in the field of a coil whose armature port is ``held``: its flux is constant.
 
-    Else the coil pulls along z as well, 2 mm from the axis.  ``guided`` by a guide with a film;
-    else it is free.
+    Else the coil pulls along z as well, 2 mm from the axis. ``guided``: with a film; else free.
     """
     below = 1e-2 if held else 1e-3  # to the stop
     model = needle_on_ring(below)

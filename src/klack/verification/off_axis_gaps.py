@@ -1,4 +1,4 @@
-"""Checks of seats and air gaps whose moving part is off-axis or tilted."""
+"""Seats and air gaps whose moving part is off-axis or tilted."""
 
 from math import acos, cos, pi, sin, sqrt
 
@@ -38,7 +38,7 @@ def off_axis_seats() -> list[Check]:
     lift, offset = 60e-6, 8e-6
 
     def strip(phi: float) -> float:
-        """Part of the cone from the centre of the ball to the edge that is outside the ball."""
+        """Cone between ball and edge of the seat, outside the ball."""
         far = np.array([_RADIUS * cos(phi) - offset, _RADIUS * sin(phi), -x0 - lift])
         whole = 0.5 * float(
             np.linalg.norm(np.cross(far, _RADIUS * np.array([-sin(phi), cos(phi), 0.0])))
@@ -131,7 +131,7 @@ def off_axis_air_gaps() -> list[Check]:
     moment = float(tilted_ring_face(0.0, radius, gap, face_tilt)[2])
 
     def torque(r: float) -> float:
-        """Moment of the pull on a circle, over half of the squared mmf."""
+        """Moment of the pull on a circle, over half the squared mmf."""
         return quad(
             lambda p: -2.0 * _MU0 * r**2 * cos(p) / (gap + face_tilt * r * cos(p)) ** 2, 0.0, pi
         )[0]

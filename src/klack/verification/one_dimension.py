@@ -44,12 +44,7 @@ def one_contact(
     series: float = 0.0,
     press: float = 0.0,
 ) -> ReducedSystem:
-    """Lower end of ``a`` above the upper end of ``b``; ``press`` [N] pushes ``a`` down.
-
-    Parameters
-    ----------
-    gap, series, press [m], [m/N], [N]
-    """
+    """Lower end of ``a`` above the upper end of ``b``; ``press`` [N] on ``a``, gap [m]."""
     pair = ContactPair(
         body_a=a.name,
         port_a="bottom",
@@ -123,7 +118,7 @@ def st_venant_rods(stiffness: float, modes: int, *, step: float) -> ImpactHistor
 def sphere_on_rod(inelasticity: float) -> ImpactHistory:
     """Rigid sphere with a Hertz law (m = K = v = 1) on a rod of impedance ``1/inelasticity``.
 
-    The rod is so long that its far end is not felt during contact.
+    Its far end is not felt during contact.
     """
     rod = rod_body(
         "rod",
@@ -148,8 +143,8 @@ def sphere_on_rod(inelasticity: float) -> ImpactHistory:
 class BouncingDrop:
     """Closed form: rest, free fall, contacts of a given time, parabolas, rest.
 
-    During a contact the lift is the cubic that joins both speeds below the level 0, so that
-    approach and rebound speed are exact at first touch and release.
+    During a contact the lift is the cubic that joins both speeds, exact at first touch and
+    release.
 
     Parameters
     ----------
@@ -157,10 +152,10 @@ class BouncingDrop:
         At first touch.
     acceleration [m/s^2]
     restitution
-        Per impact; the needle rests after the flight that follows the last.
+        Per impact; after the last flight the needle rests.
     contact [s]
     before, after [s]
-        Rest at the top, and on the seat.
+        Of rest at the top, and on the seat.
     """
 
     speed: float
@@ -177,7 +172,7 @@ class BouncingDrop:
 
     @property
     def speeds(self) -> tuple[float, ...]:
-        """Approach speed of each impact, and of the touch after which it rests [m/s]."""
+        """Approach speed of each impact, and of the last touch [m/s]."""
         return tuple((self.speed * np.cumprod([1.0, *self.restitution])).tolist())
 
     @property
@@ -213,8 +208,8 @@ class BouncingDrop:
 def hertz_force(time: ArrayLike, *, duration: float, peak: float) -> np.ndarray:
     r"""Force [N] of an elastic Hertz impact at times [s] after first touch, in closed form.
 
-    It is zero before it and after ``duration`` [s].  Energy gives the time at a depth
-    :math:`\delta` below first touch (Johnson 1985, section 11.4):
+    Zero before it and after ``duration`` [s]. Energy gives the time at a depth :math:`\delta`
+    below first touch (Johnson 1985, section 11.4):
 
     .. math:: t = \frac{2 \delta_m}{5 v} B_u(2/5, 1/2), \qquad u = (\delta/\delta_m)^{5/2},
 
@@ -231,7 +226,7 @@ def hertz_force(time: ArrayLike, *, duration: float, peak: float) -> np.ndarray:
 def half_sines(
     *, step: float, count: int, times: tuple[float, ...], length: float, peak: float = 100.0
 ) -> TimeSeries:
-    """Half sines of a peak [N] that begin at some times [s], as means over ``count`` steps."""
+    """Half sines of a peak [N] that begin at some times [s], means over steps."""
     edges = step * np.arange(count + 1)
     impulse = np.zeros(count + 1)
     for start in times:

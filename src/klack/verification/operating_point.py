@@ -1,4 +1,4 @@
-"""Operating points against solutions by hand, networks of SciPy written apart, and runs in time."""
+"""Operating points against solutions by hand, by SciPy, and runs in time."""
 
 from collections.abc import Mapping
 from math import cos, pi, sin, sqrt, tanh
@@ -33,7 +33,7 @@ MAGNET = "flux of one gap: F = mu0 A (N i)^2/(2 x^2)"
 
 
 def checks() -> list[Check]:
-    """Springs and stops, magnets, restrictions, valves of others' form, and runs that stay."""
+    """Return the checks."""
     return [
         *_springs(),
         *_magnet(),
@@ -201,7 +201,7 @@ def _magnet() -> list[Check]:
 
 
 def _held_magnet() -> list[Check]:
-    """One current, two points: the armature on its seat, and held open by the magnet."""
+    """One current, two points: armature on its seat, and held open."""
     rate, preload, current = 1e4, 25.0, 1.6
     parts, joints = _valve(rate, preload)
     closed = _found(parts, joints, currents={"coil": current})
@@ -241,7 +241,7 @@ def _held_magnet() -> list[Check]:
 
 
 def _warm_coil() -> Check:
-    """A coil on a voltage, warm: its current, then the voltage that a run of it would see."""
+    """A warm coil on a voltage: current, and the voltage that a run would see."""
     parts, joints = _valve(1e6, 2.0)
     parts["coil"] = parts["coil"].model_copy(
         update={"resistance": 4.0, "winding_temperature": 393.15}
@@ -257,7 +257,7 @@ def _warm_coil() -> Check:
 
 
 def _through(up: float, down: float, size: float) -> float:
-    """Mass flow of an orifice without cavitation, written apart from that of klack."""
+    """Mass flow of an orifice without cavitation."""
     if up < down:
         return -_through(down, up, size)
     root = sqrt(2.0 * float(HEPTANE.density(up)) * (up - down))
@@ -310,7 +310,7 @@ def _divider() -> list[Check]:
 
 
 def _bridge() -> list[Check]:
-    """A bridge of five orifices: two pressures that no division by hand gives."""
+    """A bridge of five orifices: two pressures."""
     sizes = {"a": 0.3e-3, "b": 0.5e-3, "c": 0.4e-3, "d": 0.45e-3, "e": 0.35e-3}
     parts: dict[str, Component] = {
         name: component("orifice", diameter=size, cavitation=None) for name, size in sizes.items()
@@ -366,7 +366,7 @@ def _bridge() -> list[Check]:
 
 
 def _relief_valve() -> list[Check]:
-    """A pump on a spring-loaded cone: lift, pressure and stiffness from two equations."""
+    """A pump on a spring-loaded cone: lift, pressure, stiffness from two equations."""
     size, angle, rate, preload, flow = 10e-3, pi / 4, 2e4, 157.0, 5e-3 / 60.0
     point = _found(
         {
@@ -441,7 +441,7 @@ def _relief_valve() -> list[Check]:
 
 
 def _columns() -> list[Check]:
-    """A flow that is forced through a line and a gap, both laminar."""
+    """Flow forced through a laminar line and gap."""
     flow, length, size = 2e-6, 0.5, 1.5e-3
     point = _found(
         {
@@ -530,7 +530,7 @@ def _shared_mass() -> Check:
 
 
 def _runs() -> list[Check]:
-    """A whole valve, closed and held open, run from its operating point for half a millisecond."""
+    """A whole valve, closed and held open, run for half a millisecond."""
     current, found = 2.0, []
     network = driven(whole_valve(), {"coil": current}).at_start()
     rows = network.rows()

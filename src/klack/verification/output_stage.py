@@ -1,4 +1,4 @@
-"""Checks of coils behind an output stage: boost capacitor, converter, diodes, clamp, energy."""
+"""Coils behind an output stage: boost capacitor, converter, diodes, clamp, energy."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -53,9 +53,9 @@ class StageRun:
     time (n + 1,) [s]
     current, capacitor (n + 1,) [A], [V]
     state, entered (n + 1,)
-        State of the driver, and when it was entered [s].
+        Of the driver, and when it was entered [s].
     energies [J]
-        Supplies, losses and changes of stores over the run, by their entries; and ``work``.
+        Supplies, losses, changes of stores, and ``work``.
     """
 
     time: np.ndarray
@@ -74,7 +74,7 @@ class StageRun:
         return abs(total) / max(abs(value) for value in self.energies.values())
 
     def leaves(self, states: Sequence[int]) -> list[float]:
-        """Times at which those states were left, as located within the steps [s]."""
+        """Times at which states were left, located within the steps [s]."""
         inside = np.isin(self.state, states)
         ends = np.flatnonzero(inside[:-1] & ~inside[1:]) + 1
         return [float(self.entered[k]) for k in ends]
@@ -129,7 +129,7 @@ def run_stage(
 
 
 def random_driver(seed: int) -> BoostDriver:
-    """Driver of a direct or common-rail injector, its numbers drawn from usual ranges."""
+    """Driver of a direct or common-rail injector, drawn from usual ranges."""
     draw = np.random.default_rng(seed).uniform
     first = draw(0.0, 50e-6)
     middle, pause = first + draw(0.2e-3, 0.6e-3), draw(5e-6, 0.3e-3)
@@ -342,7 +342,7 @@ def _losses() -> list[Check]:
 
 
 def _decay(current: float, still: float, resistance: float) -> tuple[float, float, float]:
-    """Time, charge and integral of the square of a current that falls to zero against a voltage."""
+    """Time, charge and squared integral of a current that falls to zero against a voltage."""
     rate, level = resistance / _INDUCTANCE, still / resistance
     end = log(1.0 + current / level) / rate
     a, x = current + level, exp(-rate * end)
@@ -394,7 +394,7 @@ def _second_shot() -> list[Check]:
 def _boost_recharged(
     voltage: float, current: float, power: float, capacitance: float
 ) -> tuple[float, float]:
-    """Time to a current, and what the capacitor then has, while it is recharged; by SciPy."""
+    """Time to a current, and the capacitor [V] then, while recharged; by SciPy."""
     # at its nominal voltage the converter gives what the coil takes, until that is all it can
     begin, first = 0.0, 0.0
     if voltage == 65.0:

@@ -1,7 +1,7 @@
-"""One self-contained page of all checks: tables, curves, and a few lines of plain JavaScript.
+"""One self-contained page of all checks: tables, curves, and plain JavaScript.
 
-The page loads nothing from anywhere; its content security policy forbids it.  Without JavaScript,
-and on paper, all tables are open and complete; what needs JavaScript is not shown then.
+Its content security policy forbids loading anything. Without JavaScript, and on paper, all tables
+are open and complete.
 """
 
 import re
@@ -34,7 +34,7 @@ __all__ = ["render_page", "write_page"]
 
 
 _WIDTH = 4.6
-"""Of a plot [in]: three stand beside each other on a wide screen."""
+"""Of a plot [in]: three side by side on a wide screen."""
 
 
 def write_page(path: Path, checks: Sequence[Check], conditions: Mapping[str, str]) -> None:
@@ -79,7 +79,7 @@ def _sections(checks: Sequence[Check]) -> tuple[dict[str, Any], ...]:
 
 
 def _section(group: str, checks: Sequence[tuple[int, Check]]) -> dict[str, Any]:
-    """One group: numbered checks, and each curve once with the checks that it belongs to."""
+    """One group: numbered checks, and each curve once."""
     curves: dict[int, ComparedCurve] = {}
     users: dict[int, list[tuple[int, str]]] = {}
     for number, check in checks:
@@ -105,17 +105,16 @@ def _section(group: str, checks: Sequence[tuple[int, Check]]) -> dict[str, Any]:
 
 
 _FEW = 25
-"""So many points of a known curve are drawn as points: a table is quoted, not a function."""
+"""So many known points are drawn as points: a quoted table."""
 _COLUMNS = 300
 """Columns of pixels that a curve may use."""
 _LABEL = re.compile(r"^(.*?) ?\[([^\[\]]+)\]$")
 
 
 def curve_chart(curve: ComparedCurve, *, name: str, title: str) -> Chart:
-    """Known curve in black, klack over it in orange, and their difference where both are known.
+    """Known curve in black, klack over it in orange, and their difference.
 
-    The difference is drawn where the abscissae are the same; relative where the values have a
-    logarithmic axis.
+    The difference needs equal abscissae; it is relative on a logarithmic axis.
     """
     x = replace(_axis(curve.x_label), log=curve.x_log)
     y = replace(_axis(curve.y_label), log=curve.y_log)

@@ -1,4 +1,4 @@
-"""Checks of bodies that yield: at one point, in the contact, and in time."""
+"""Bodies that yield: at one point, in the contact, and in time."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -60,7 +60,7 @@ class FirstYield:
     Parameters
     ----------
     modulus [Pa]
-        E* of the contact.
+        E*.
     radius [m]
     yield_stress [Pa]
     poisson [-]
@@ -92,12 +92,12 @@ class FirstYield:
         return self.contact**2 / self.radius
 
     def speed(self, mass: float) -> float:
-        """Speed [m/s] of a rigid mass [kg] whose impact just reaches it."""
+        """Speed [m/s] of a rigid mass that just reaches it."""
         return sqrt(0.8 * self.force * self.approach / mass)
 
 
 class SoftPair(NamedTuple):
-    """Two soft bodies: their static loops, contact points and elastic compliance (nc, nc) [m/N]."""
+    """Two soft bodies: static loops, contact points, elastic compliance (nc, nc) [m/N]."""
 
     loops: YieldingLoops
     space: ContactSpace
@@ -105,22 +105,20 @@ class SoftPair(NamedTuple):
 
 
 def sphere_on_sphere(*, size: float, extent: float, energy: float) -> YieldingLoops:
-    """Loops of two equal hemispheres, each held at its equator.
+    """Loops of two equal hemispheres, held at the equator, up to an energy [J].
 
     Parameters
     ----------
     size, extent [m]
         Of the elements at the contact, and how far these reach.
-    energy [J]
-        Up to which.
     """
     return _loops(*_spheres(size, extent), energy).loops
 
 
 def pressed_again(*, size: float, extent: float, energy: float) -> tuple[float, float]:
-    """Plastic work [J] of two spheres pressed once, and of two more cycles to the same approach.
+    """Plastic work [J] of two spheres pressed once, and in two more cycles.
 
-    The finite elements yield as they like on the way back; see :func:`sphere_on_sphere`.
+    Elements may yield on the way back; see :func:`sphere_on_sphere`.
     """
     with _pressed(*_spheres(size, extent), energy, _REACH) as (static, C, upper, lower):
         radius = 6.0 * float(static.half_width[-1])
@@ -236,7 +234,7 @@ def _loops(above: _Part, below: _Part, energy: float) -> SoftPair:
 
 @contextmanager
 def _pressed(above: _Part, below: _Part, energy: float, reach: float) -> Iterator[_Pair]:
-    """Two soft bodies that touch, on as many contact points as elastic bodies need."""
+    """Two soft bodies that touch, on the contact points that elastic bodies need."""
     faces = [part.mesh.surface(part.face) for part in (above, below)]
     lift = touching_shift(above.mesh, faces[0], below.mesh, faces[1])
     above = above._replace(mesh=above.mesh.moved(np.array([0.0, lift])))
@@ -299,10 +297,10 @@ _OTHER = "independent program: axisymmetric 4-node elements with mean dilatation
 _HALF_SPACE = _OTHER + "; sphere of 1.25 mm on a half-space"
 
 _POINT_WORK = ((10.0, 4.872288), (30.0, 54.10526))
-"""Force over that of first yield, plastic work over force and approach then (half-space)."""
+"""Force over first yield; plastic work over force and approach then (half-space)."""
 
 _POINT_APPROACH = ((3.0, 2.111663), (10.0, 5.021038), (30.0, 11.39091))
-"""Force over that of first yield, approach over its own (half-space)."""
+"""Force over first yield; approach over its own (half-space)."""
 
 _POINT_IMPACTS = (  # first impact: speed, force and set over those of first yield; restitution
     (2.0, 2.2806, 0.1064, 0.97528),
@@ -311,10 +309,10 @@ _POINT_IMPACTS = (  # first impact: speed, force and set over those of first yie
     (20.0, 31.576, 4.8784, 0.76279),
 )
 _POINT_LATER = ((2, 0.93889), (3, 0.97492), (5, 0.99557), (10, 0.99994))
-"""Number of the impact at 10 times the speed of first yield, restitution."""
+"""Number of the impact at 10 times the speed of first yield; restitution."""
 
 _POINT_RUN_IN = 18.246
-"""Force of those impacts over that of first yield, when the faces are run in."""
+"""Force of those impacts over first yield, when run in."""
 
 _SEAT_EXCESS = (  # force [N], approach beyond the elastic one [um], plastic work [uJ]
     (91.93779, 0.048548, 5.048903),
@@ -330,7 +328,7 @@ def checks() -> list[Check]:
 
 
 def _sheared() -> Iterator[Check]:
-    """Shear of one point: there are closed forms for whatever steps."""
+    """Shear of one point: closed forms for any steps."""
     tau = (_YIELD / sqrt(3.0) + _SLOPE / 3.0 * 0.01) / (1.0 + _SLOPE / (3.0 * _SHEAR))
     there = np.linspace(0.0, 0.01, 40)
     yield from [
@@ -453,7 +451,7 @@ _FIRST_PRESSURE, _RISE = 20.0, 5e6  # [Pa] on an area of 1 m^2, [Pa/m]
 
 
 def _one_point() -> list[Check]:
-    """A rigid mass on one contact point whose pressure limit rises, at the interface level."""
+    """Rigid mass on one point whose pressure limit rises, interface level."""
     limit = PressureLimit(
         set=np.array([0.0, 1e-6]), pressure=_FIRST_PRESSURE + np.array([0.0, 1e-6 * _RISE])
     )
@@ -506,7 +504,7 @@ def _one_point() -> list[Check]:
 
 
 def _sphere() -> Iterator[Check]:
-    """Two equal spheres, up to 20 times the speed of first yield."""
+    """Two equal spheres, to 20 times the speed of first yield."""
     size = 2.5e-6
     loops = sphere_on_sphere(
         size=size, extent=16 * size, energy=0.5 * _BALL * (20.0 * _FIRST.speed(_BALL)) ** 2
@@ -594,7 +592,7 @@ def _sphere() -> Iterator[Check]:
 
 
 def _ball_impacts(law: YieldingLaw, one: float) -> list[Check]:
-    """Impacts of spheres on new faces, and ten on the same ones; ``one``: speed of first yield."""
+    """Impacts of spheres on new faces, and ten on the same; ``one``: first yield."""
     found = []
     for speed, force, left, restitution in _POINT_IMPACTS:
         history = _impact(law, _BALL, speed * one)
@@ -653,7 +651,7 @@ def _ball_impacts(law: YieldingLaw, one: float) -> list[Check]:
 
 
 def _jackson_green(w: float) -> float:
-    """Force over that of first yield at an approach over its own: one sphere on its mirror."""
+    """Force over first yield at an approach over its own: one sphere on its mirror."""
     strain = _YIELD / STEEL.plane_strain_modulus
     contact = _FIRST.contact * sqrt(w * (w / 1.9) ** (0.14 * exp(23.0 * strain)))
     hardness = 2.84 * (1.0 - exp(-0.82 * (contact / RADIUS) ** -0.7))
@@ -723,7 +721,7 @@ def _seat() -> list[Check]:
 
 
 def _points_of_seat(pair: SoftPair) -> list[Check]:
-    """The same rigid needle on the points of that seat, with a pressure limit fitted to them."""
+    """The same needle on the points of that seat, with a fitted pressure limit."""
     model = modal_model(
         masses=(_NEEDLE, np.inf),
         omega=np.zeros(1),
@@ -753,6 +751,6 @@ def _points_of_seat(pair: SoftPair) -> list[Check]:
 
 
 def _excess(loops: YieldingLoops) -> np.ndarray:
-    """Approach of each state beyond that of elastic bodies at its force [m]."""
+    """Approach of each state beyond elastic bodies at its force [m]."""
     elastic = PchipInterpolator(loops.elastic.force, loops.elastic.approach)
     return np.array([state.approach - float(elastic(state.force)) for state in loops.states])

@@ -1,4 +1,4 @@
-"""Gas: closed solutions of ISO 6358 and of gas dynamics, and networks integrated apart."""
+"""Gas: closed solutions of ISO 6358 and gas dynamics, and networks by SciPy."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -171,7 +171,7 @@ def _gas_spring() -> Iterator[Check]:
 
 
 def _closing() -> list[Check]:
-    """A needle that a spring closes while it drives gas through its own seat."""
+    """A spring closes a needle that drives gas through its seat."""
     diameter, mass, stiffness, preload, open_by = 2e-3, 3e-3, 2e3, 8.0, 0.3e-3
     face = pi / 4.0 * 25e-6
     result = run_network(
@@ -263,7 +263,7 @@ _LAW = "ISO 6358-1:2013: C rho_0 p_1 sqrt(T_0/T_1) [1 - ((r - b)/(1 - b))^2]^m"
 
 
 def checks() -> list[Check]:
-    """Flow laws, vessels with closed solutions, then networks."""
+    """Return the checks."""
     return [*_nozzles(), *_laws(), *_vessels(), *_mixing(), *_piston(), *_gas_spring(), *_closing()]
 
 
@@ -435,7 +435,7 @@ def vessel(
     b: float = 0.3,
     gas: Gas = AIR,
 ) -> GasNetwork:
-    """A vessel that is filled from a source, or emptied into it, through one restriction."""
+    """Vessel filled from a source, or emptied into it, through one restriction."""
     rows = GasRows()
     rows.chambers[2] = GasChamberRow(
         component="vessel", volume=volume, pressure=pressure, temperature=T0, heat=heat, wall=T0
@@ -548,7 +548,7 @@ def _vessels() -> list[Check]:
 
 
 def _mixing() -> list[Check]:
-    """Two vessels, one hole: what is left in the end follows from mass and energy alone."""
+    """Two vessels, one hole: the end follows from mass and energy alone."""
     rows = GasRows()
     for i, (p, V) in enumerate(((8e5, 1e-3), (2e5, 2e-3))):
         rows.chambers[i + 2] = GasChamberRow(

@@ -1,8 +1,8 @@
 """Published magnets: finite-element results of a lifting magnet, and the loop of an alloy.
 
 Source: Modelica Standard Library (BSD-3), commit b756f9d, Magnetic.FluxTubes, example
-SolenoidActuator.ComparisonQuasiStatic: stationary finite elements at 12 V and 10 ohm (1.2 A); not a
-measurement.  Only tests and checks read it.
+SolenoidActuator.ComparisonQuasiStatic: stationary finite elements at 12 V and 10 ohm (1.2 A), no
+measurement.
 
 Major loop of Vacoflux 48: Modelica.Magnetic.FluxTubes.Material.HysteresisTableData.Vacoflux48
 (BSD-3-Clause), taken there from a data sheet of Vacuumschmelze; field strength [A/m] and flux

@@ -30,20 +30,9 @@ _SPRING = STEEL_WITHOUT_POISSON.young * np.pi * RADIUS**2 / LENGTH  # EA / L
 
 
 def rod(*, elements: int, clamped: bool) -> tuple[ElasticBody, Port, Port]:
-    """One-dimensional rod as a body of revolution without Poisson's ratio, and its two end ports.
+    """Rod of revolution without Poisson's ratio, and its lower and upper end ports.
 
-    Parameters
-    ----------
-    elements
-        Along the length, eight nodes each.
-    clamped
-        Hold the upper end.
-
-    Returns
-    -------
-    body : ElasticBody
-    lower, upper : Port
-        Axial, uniform over the end faces.
+    The upper end may be clamped; ports are axial and uniform; ``elements`` have eight nodes.
     """
     mesh = lattice_mesh(
         "quad8", [np.array([0.0, RADIUS]), np.linspace(0.0, LENGTH, elements + 1)], solid="rod"
@@ -137,7 +126,7 @@ def _static_checks(plain: ReducedBody, corrected: ReducedBody, held: ReducedBody
 
 
 def exact_receptance(frequencies: np.ndarray) -> np.ndarray:
-    """Free-free rod with ``E (1 + i eta)``: drive-point and end-to-end, shape (n, 2) [m/N]."""
+    """Free-free rod, ``E (1 + i eta)``: drive-point and end-to-end (n, 2) [m/N]."""
     E = STEEL_WITHOUT_POISSON.young * (1 + 1j * _LOSS)
     k = 2 * np.pi * frequencies / np.sqrt(E / STEEL_WITHOUT_POISSON.density)
     scale = -1 / (E * np.pi * RADIUS**2 * k)
@@ -200,7 +189,7 @@ def _correction_check(reduced: ReducedBody) -> Check:
 
 
 def undamped_receptance(frequency: float) -> np.ndarray:
-    """Free-free rod at a frequency [Hz], or below zero at ``i`` times it, as the columns above."""
+    """The same undamped at a frequency [Hz], or ``i`` times it below zero."""
     E, rho = STEEL_WITHOUT_POISSON.young, STEEL_WITHOUT_POISSON.density
     k = 2 * np.pi * abs(frequency) * np.sqrt(complex(np.sign(frequency)) * rho / E)
     ends = -1 / (E * np.pi * RADIUS**2 * k * np.array([np.tan(k * LENGTH), np.sin(k * LENGTH)]))
@@ -208,7 +197,7 @@ def undamped_receptance(frequency: float) -> np.ndarray:
 
 
 def missing_with_shifts(frequencies: Sequence[float], *, kept: int) -> float:
-    """Static compliance (L/EA) that cosines and the responses at shifts [Hz] miss at a free end."""
+    """Static compliance (L/EA) that cosines and responses at shifts miss at an end."""
     first = np.sqrt(STEEL_WITHOUT_POISSON.young / STEEL_WITHOUT_POISSON.density) / (2 * LENGTH)
     squares = np.arange(kept + 1.0, 20_001.0) ** 2  # of the omitted modes, over that of the first
     shifts = [np.sign(f) * (f / first) ** 2 for f in frequencies]
@@ -221,7 +210,7 @@ def missing_with_shifts(frequencies: Sequence[float], *, kept: int) -> float:
 def _shift_checks(
     body: ElasticBody, lower: Port, upper: Port, pool: Modes, flexibility: Flexibility
 ) -> list[Check]:
-    """One kept mode and two shifted attachment modes, beyond the modes that they replace."""
+    """One kept mode and two shifted attachment modes."""
     frequencies = (190e3, -40e3)
     shifts = [shift_at(f) for f in frequencies]
     reduced = reduce_body(

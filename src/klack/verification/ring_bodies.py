@@ -64,9 +64,9 @@ class NeedleOnRing:
     size, bulk [m]
         Elements at the ring and far away.
     reach [m]
-        Largest gap of a contact point of the centred bodies.
+        Of the centred bodies.
     slave
-        Side of the hats, needle or seat.
+        Of the hats, needle or seat.
     """
 
     size: float = 30e-6
@@ -76,12 +76,12 @@ class NeedleOnRing:
 
     @cached_property
     def bodies(self) -> tuple[ElasticBody, ElasticBody]:
-        """Needle and seat, centred and in first touch, with their axial motion alone."""
+        """Needle and seat, centred in first touch, moving axially alone."""
         return needle_over_seat(size=self.size, bulk=self.bulk)[:2]
 
     @property
     def sides(self) -> tuple[Mesh, Surface, Mesh, Surface]:
-        """Mesh and surface of both, as contact spaces take them."""
+        """Mesh and surface of both."""
         upper, lower = (body.mesh for body in self.bodies)
         return upper, upper.surface("tip"), lower, lower.surface("cone")
 
@@ -91,7 +91,7 @@ class NeedleOnRing:
         return contact_space(*self.sides, reach=self.reach, slave=self.slave)
 
     def gaps(self, count: int) -> RingGaps:
-        """Gaps at so many angles at a placement of the needle."""
+        """Gaps at so many angles."""
         return RingGaps.of(
             self.section,
             *self.sides,
@@ -100,10 +100,7 @@ class NeedleOnRing:
         )
 
     def placed(self, count: int, placement: np.ndarray) -> tuple[RingSpace, np.ndarray]:
-        """Contact points after a placement, shape (6,), and a shift along z to first touch.
-
-        Returns the placement with that shift as well.
-        """
+        """Contact points and placement (6,), after a placement and a shift to first touch."""
         gaps, moved = self.gaps(count), np.array(placement, dtype=float)
         for _ in range(6):
             gap = gaps(moved)
@@ -121,7 +118,7 @@ class NeedleOnRing:
         )
 
     def revolved(self, axial: int, others: int) -> list[RevolvedBody]:
-        """Both bodies with so many modes of order 0 and of the orders above."""
+        """Both bodies with so many modes of order 0 and of each above."""
         return [
             RevolvedBody(
                 name=body.name,
@@ -142,7 +139,7 @@ class NeedleOnRing:
     def model(
         self, space: RingSpace, *, axial: int, others: int, friction: Friction | None = None
     ) -> InterfaceModel:
-        """Interface model with so many modes of order 0 and of the orders above, of each body."""
+        """Interface model; modes as of :meth:`revolved`."""
         return revolved_model(self.revolved(axial, others), [self.contact(space, friction)])
 
 
@@ -151,7 +148,7 @@ def impulse_on_needle(
 ) -> np.ndarray:
     """Impulse and its moment about the centre of mass, shape (6,), from forces at the hats.
 
-    Without Fourier orders: the forces of the half section on a needle that is rigid.
+    Without Fourier orders: forces of the half section on a rigid needle.
     """
     needle = pair.bodies[0]
     points = needle.mesh.points
@@ -169,7 +166,7 @@ def impulse_on_needle(
 
 
 def momentum_of_needle(pair: NeedleOnRing, velocity: np.ndarray) -> np.ndarray:
-    """Momentum and angular momentum, shape (6,), of a needle of this rigid velocity."""
+    """Momentum and angular momentum (6,) of a rigid velocity."""
     needle = pair.bodies[0]
     return np.concatenate([needle.mass * velocity[:3], needle.inertia @ velocity[3:]])
 
@@ -179,10 +176,9 @@ def solid_over_ring_compliance(
 ) -> tuple[float, float]:
     r"""Compliance under a pressure wave, of a swept solid and of the half section in that order.
 
-    Work of the pressure :math:`\cos n \theta` on its own answer over the square of its force
-    all round.  The hats of the solid are linear round the ring: one that reaches two steps *d* wide
-    reads a wave by :math:`(\sin x / x)^2`, :math:`x = n d / 2`, when it is loaded and when it is
-    read, and the half section is given the same.
+    Work of the pressure :math:`\cos n \theta` on its own answer over the square of its force all
+    round.  The hats of the solid are linear round the ring, two steps *d* wide, and read a wave by
+    :math:`(\sin x / x)^2`, :math:`x = n d / 2`, loaded and read; so does the half section here.
 
     Parameters
     ----------
@@ -231,13 +227,13 @@ class RingStroke:
     Parameters
     ----------
     placement (6,) [m], [rad]
-        Of the needle; it is moved along z to ``gap``.
+        Of the needle, which is moved along z to ``gap``.
     count
         Angles of every ring.
     axial, others
-        Modes of each body of order 0, and of the orders above.
+        As of :meth:`NeedleOnRing.revolved`.
     gap [m]
-        Along z, to the first touch.
+        To first touch.
     """
 
     pair: NeedleOnRing
@@ -268,7 +264,7 @@ class RingStroke:
 
     @property
     def bodies(self) -> list[ReducedBody]:
-        """Both bodies with a port on their contact surface and the modes of all orders."""
+        """Both bodies with contact port and modes of all orders."""
         return [
             in_all_orders(self.along_axis(number), points)
             for number, points in enumerate(self._reduced[1])
@@ -313,7 +309,7 @@ class RingStroke:
         speed [m/s]
             Downwards.
         duration, step [s]
-        velocity (6,), optional [m/s], [rad/s]
+        velocity (6,) [m/s], [rad/s]
             Beside it.
         """
         needle, seat = self.bodies

@@ -16,10 +16,10 @@ _THREAD_LIMITS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
 def run_conditions() -> dict[str, str]:
-    """All that can change the last digits of a check: versions, platform, solvers and cores.
+    """All that can change the last digits of a check.
 
-    ``solvers`` are the direct ones that can be loaded, of which the first is used; ``threads``
-    names the usable cores and the limits set in the environment.
+    ``solvers``: direct ones that can be loaded, the first is used; ``threads``: usable cores and
+    limits of the environment.
     """
     numpy, scipy, numba = (version(name) for name in _LIBRARIES)
     return dict(

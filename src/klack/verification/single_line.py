@@ -1,4 +1,4 @@
-"""Lines between prescribed pressures or flows, as delays and in cells: the smallest set-ups."""
+"""Lines between prescribed pressures or flows, as delays and in cells."""
 
 from dataclasses import dataclass
 
@@ -48,9 +48,8 @@ __all__ = [
 class End:
     """Condition at one end: a level, or the ``flow`` into the line.
 
-    The level is a ``pressure`` [Pa, about ambient] with a flow [m^3/s] for lines as delays, and
-    ``total``, ``g + u^2/2`` [J/kg], with a flow [kg/s] for lines in cells.  Means over the steps,
-    or one number for all of them.
+    For delays a ``pressure`` [Pa, about ambient] or flow [m^3/s]; for cells ``total``, ``g +
+    u^2/2`` [J/kg], or flow [kg/s]. Means over the steps, or one number.
     """
 
     pressure: ArrayLike | None = None
@@ -72,15 +71,15 @@ class LineRun:
     Parameters
     ----------
     time (n,) [s]
-        Start of each step.
+        Starts of steps.
     pressure, flow (n, 2) [Pa], [m^3/s]
-        At both ends, means over each step; flow into the line.
+        At both ends, means; flow into the line.
     cavity (n,) [m^3]
-        Vapour in the line after each step.
+        After each step.
     losses (3,) [J]
         See ``LINE_LOSSES``.
     energy_residual, volume_residual [-]
-        What does not balance, over what passed the ends; none where nothing did.
+        Over what passed the ends.
     """
 
     time: np.ndarray
@@ -101,7 +100,7 @@ def plain_line(
     unsteady: tuple[ArrayLike, ArrayLike] = ((), ()),
     vapour_pressure: float = -1e12,
 ) -> LineRow:
-    """Line with the numbers of a 60 x 2.5 mm bore in heptane; its vapour is out of reach."""
+    """Bore of 60 x 2.5 mm in heptane; vapour is out of reach."""
     gain, rate = (np.array(values, dtype=float) for values in unsteady)
     return LineRow(
         component="line",
@@ -131,12 +130,12 @@ def run_line(
 
     Parameters
     ----------
-    lengths : array of int, shape (n,)
-        Fine steps of each step: 1, or one greater number.
+    lengths (n,)
+        Of each step in fine ones: 1, or one greater number.
     pressure (2,) [Pa]
-        At both ends at the start.
+        At the start.
     flow [m^3/s]
-        From a to b at the start.
+        At the start, from a to b.
     """
     m = np.asarray(lengths, dtype=np.int64)
     lines, state = compile_lines([row], step=step, coarse=int(m.max()), ambient_pressure=0.0)
@@ -214,7 +213,7 @@ def laminar_decay(*, delay: float, radius: float, kinematic_viscosity: float) ->
 def exponential_decay(
     weights: ExponentialWeights, *, delay: float, radius: float, kinematic_viscosity: float
 ) -> complex:
-    """Give the root of :func:`laminar_decay` for friction by ``weights`` spread along the line."""
+    """The same for friction by ``weights`` spread along the line."""
     unit = kinematic_viscosity / radius**2
     factors, rates = np.array(weights.factors), unit * np.array(weights.rates)
     s = complex(-1.0, np.pi / (2.0 * delay))
@@ -232,9 +231,9 @@ def ringing(time: np.ndarray, values: np.ndarray, frequency: float, *, apart: fl
     time, values (n,)
         Evenly spaced.
     frequency [Hz]
-        About that of the tone; others are suppressed by the window.
+        About that of the tone.
     apart [s]
-        Distance of the windows; the later one ends with the record.
+        Of the windows; the later one ends with the record.
     """
     step = time[1] - time[0]
     size, shift = round(16 / frequency / step), round(apart / step)
@@ -252,15 +251,15 @@ class CellRun:
     Parameters
     ----------
     time (n,) [s]
-        Middle of each step.
+        Middles of steps.
     total, flow (n, 2) [J/kg], [kg/s]
-        At both ends, means over each step; flow into the line.
+        At both ends, means; flow into the line.
     losses (n, 3) [J]
-        Of each step: friction, waves, outflow.
+        Friction, waves, outflow.
     pressure, velocity (cells,) [Pa], [m/s]
         At the end.
     energy_residual, mass_residual [-]
-        What does not balance, over what passed the ends and over what is held.
+        Over what passed the ends and what is held.
     """
 
     time: np.ndarray
@@ -276,7 +275,7 @@ class CellRun:
 def cell_state(
     parameters: np.ndarray, pressure: ArrayLike, velocity: ArrayLike = 0.0
 ) -> np.ndarray:
-    """State of a line with these pressures [Pa] and velocities [m/s] in its cells."""
+    """State of cells with pressures [Pa] and velocities [m/s]."""
     n, area, stretch, ambient, place = (float(parameters[k]) for k in (0, 2, 3, 4, 9))
     count = int(n)
     p = np.broadcast_to(np.asarray(pressure, float), (count,))
@@ -319,7 +318,7 @@ def run_cells(
 
 
 def cell_rates(parameters: np.ndarray, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Wave speed [m/s] and rate of the mass per length [kg/(m s)] of each cell, ends closed."""
+    """Wave speed [m/s] and mass rate [kg/(m s)] of each cell, ends closed."""
     n = int(parameters[0])
     cells = state[SCALARS : SCALARS + 4 * n].copy()
     speed, rate = np.zeros(n), np.zeros(n)

@@ -43,7 +43,7 @@ def checks() -> list[Check]:
 
 
 def _half_sine() -> TimeSeries:
-    """Half sine of 250 N and 15 us in 4 ms, on a preload of 30 N, as means over 50 ns."""
+    """Half sine, 250 N, 15 us, in 4 ms on a preload of 30 N, means over 50 ns."""
     pulse = half_sines(
         step=50e-9, count=round(4e-3 / 50e-9), times=(TOUCH,), length=LENGTH, peak=PEAK
     )

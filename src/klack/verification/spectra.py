@@ -23,7 +23,7 @@ HERTZ = ((0.0, 0.543612), (0.5, 0.449625), (1.0, 0.240011), (2.5, 0.010565))
 
 
 def checks() -> list[Check]:
-    """Half sine, Hertz pulse, Parseval, band edges, band energies."""
+    """Return the checks."""
     return [*_half_sine(), *_hertz(), *_parseval(), *_bands()]
 
 
@@ -96,7 +96,7 @@ def _hertz() -> list[Check]:
 
 
 def _hertz_spectrum(x: np.ndarray) -> np.ndarray:
-    """Of the pulse in closed form, peak and length one, by the trapezoidal rule."""
+    """Of the pulse, peak and length one, by the trapezoidal rule."""
     time = np.linspace(0.0, 1.0, 20_001)
     return np.asarray(
         np.abs(

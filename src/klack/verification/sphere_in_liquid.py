@@ -1,4 +1,4 @@
-"""Spheres that hit a wall in a liquid: film of a sphere on a flat face, Hertz contact, drag."""
+"""Spheres that hit a wall in a liquid: film, Hertz contact, drag."""
 
 from dataclasses import dataclass
 from math import exp, log, pi, sqrt
@@ -81,7 +81,7 @@ def measured_ratio(stokes: float) -> float:
 
 
 def film_alone(stokes: float, cut_off: float) -> float:
-    """``1 - 2 ln(h/h_r)/St``: a film takes the same momentum on both ways (Reynolds)."""
+    """``1 - 2 ln(h/h_r)/St``: a film takes equal momentum both ways (Reynolds)."""
     return max(0.0, 1.0 - 2.0 / stokes * log((READ_AT + cut_off) / cut_off))
 
 
@@ -99,7 +99,7 @@ def elastohydrodynamic_height(sphere: Sphere, stokes: float) -> float:
 
 @step_function
 def _drag_step(par: Any, state: Any, inp: Any, out: Any) -> int:
-    """Steady drag at the mean velocity of the step: its loss is never negative."""
+    """Steady drag at the mean velocity: its loss is never negative."""
     moved = inp[3] - inp[2]
     out[0] = out[1] = 0.0
     if inp[1] > 0.0:
@@ -145,9 +145,7 @@ def restitution(
     stokes [-]
     cut_off [m]
     pull
-        The film may pull up to the tension of the ambient pressure; else it cavitates at once.
-    drag
-        With steady drag.
+        The film may pull up to the ambient pressure; else it cavitates at once.
     """
     return _bounce(
         sphere,
@@ -162,8 +160,7 @@ def restitution(
 def on_compliance(sphere: Sphere, stokes: float, *, cut_off: float, pull: bool) -> float:
     """As :func:`restitution`, of stiff asperities with the film before the bulk of the bodies.
 
-    The bulk is the compliance ``1/(2 E* a)`` of a flat circle, as wide as the film where it
-    begins to flatten the faces, ``a^2 = R x_r``.
+    The bulk is the compliance ``1/(2 E* a)`` of a flat circle, ``a^2 = R x_r``.
     """
     a = sqrt(RADIUS * elastohydrodynamic_height(sphere, stokes))
     series = 1.0 / (2.0 * sphere.modulus * a)

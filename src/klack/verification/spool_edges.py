@@ -32,7 +32,7 @@ __all__ = ["edges", "notched_edges"]
 
 
 def edges() -> list[Check]:
-    """Spool edge, pressure loss, friction of a pipe, walls, junction."""
+    """Return the checks."""
     return [*_spool(), *_loss(), *_pipe(), *_walls(), *_swing(), *_junction()]
 
 
@@ -61,7 +61,7 @@ def _spool() -> list[Check]:
     slot = 12 * MU_OIL / (pi * d * c**3)
 
     def series(x: float) -> float:
-        """Root of the quadratic for an edge and a slot in series [l/min]."""
+        """Edge and slot in series, by a quadratic [l/min]."""
         a, b = slot * max(-x, 0.0), RHO_OIL / (2 * (0.7 * area(max(x, 0.0))) ** 2)
         return float(np.roots([b, a, -30e5]).max()) * 6e4
 
@@ -356,7 +356,7 @@ SOURCE = "elementary geometry: exit and throat, the smaller one, by quadrature o
 
 
 def notched_edges() -> list[Check]:
-    """Areas, limits, leakage, friction, jet, and a chamber that empties through notches."""
+    """Return the checks of notches."""
     return [*_areas(), *_limits(), *_laminar(), *_jet(), *_emptying()]
 
 
@@ -368,7 +368,7 @@ def _notch(shape: str, **changed: float) -> Notch:
 
 
 def _area(notch: Notch, x: float) -> float:
-    """Narrowest section of one notch without clearance, as klack has it [m^2]."""
+    """Narrowest section of one notch without clearance, of klack [m^2]."""
     return float(notch_opening(np.array(notch.numbers), 0, x, C, C)[1])
 
 
@@ -401,7 +401,7 @@ def _exit(shape: str, s: float, length: float) -> float:
 
 
 def _section(s: float, phi: float) -> float:
-    """Plane section of the triangular notch through the edge of the sleeve, tilted by ``phi``."""
+    """Plane section of the triangular notch through the edge, tilted by ``phi``."""
     slope = DEPTH / LENGTH
     reach = s * slope / (cos(phi) + slope * sin(phi))  # from the edge to the bottom
 
@@ -413,7 +413,7 @@ def _section(s: float, phi: float) -> float:
 
 
 def _strips(x: float) -> float:
-    """Shortest distances from the edge of the sleeve to the bottom of a V, over its width."""
+    """Shortest distances from the edge to the bottom of a V, over its width."""
 
     def distance(q: float) -> float:
         depth, length = DEPTH * q, LENGTH * q
@@ -589,7 +589,7 @@ def _friction() -> list[Check]:
 
 
 def _flank(shape: str, x: float) -> float:
-    """Leakage at 1 Pa through the covered flank of a V, counted from the clearance [m^3/s]."""
+    """Leakage at 1 Pa through the covered flank of a V [m^3/s]."""
     if shape != "triangular":
         return 0.0
     r = 0.5 * WIDTH

@@ -1,7 +1,7 @@
-"""Pump, relief valve, accumulator and throttle together, against the same equations written apart.
+"""Pump, relief valve, accumulator and throttle together.
 
-The other side integrates one pressure per volume with SciPy to 1e-9, from the density of the fluid
-and the formulas alone.
+The other side integrates one pressure per volume with SciPy to 1e-9, from density and formulas
+alone.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -29,7 +29,7 @@ BALANCE = "conservation of energy"
 
 
 def supply_networks() -> list[Check]:
-    """Filling, a jump of the flow, a pulsation, and a compressor of fluid."""
+    """Return the checks."""
     return [*_filling(), *_pulsation(), *_one_way(), *_lagging_relief()]
 
 
@@ -201,7 +201,7 @@ def _pulsation() -> list[Check]:
 
 
 def _one_way() -> list[Check]:
-    """A pulsating flow between two volumes with a check valve: a piston compressor of fluid."""
+    """Pulsating flow between volumes with a check valve: a piston compressor of fluid."""
     size = pi / 4 * 3e-3**2
     frequency, hole = 200.0, pi / 4 * 0.8e-3**2
 
@@ -384,9 +384,8 @@ CONDENSED = (1.0 - FRACTION) * float(LIQUID.liquid.density(REFERENCE))
 def gas_release() -> list[Check]:
     """One chamber whose piston draws and presses, two with openings, and the limits.
 
-    Gas leaves and enters the oil with time constants.  The other side integrates the masses of
-    fluid and of free gas of every chamber with SciPy, from the densities of liquid and gas; the
-    pressure follows from both by bisection.
+    Gas leaves and enters the oil with time constants. The other side integrates the masses of
+    fluid and free gas with SciPy; the pressure follows by bisection.
     """
     return [*_one_chamber(), *_two_chambers(), *_limits()]
 
@@ -441,7 +440,7 @@ def _pressure(volume: float, share: float) -> float:
 def _apart_gas(
     rates: Callable[[float, np.ndarray], list[float]], start: Sequence[float], time: np.ndarray
 ) -> np.ndarray:
-    """States at the times of records, from one corner of the course of the piston to the next."""
+    """States at the records, from corner to corner of the course of the piston."""
     found, state = [np.array(start)[:, None]], np.array(start)
     for a, b in pairwise(TIME):
         run = solve_ivp(

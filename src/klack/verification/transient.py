@@ -64,7 +64,7 @@ def rod_body(
     Parameters
     ----------
     material
-        Poisson's ratio plays no part.
+        Without Poisson's ratio.
     area [m^2]
     length [m]
     bottom [m]
@@ -85,7 +85,7 @@ def rod_body(
 
 
 def rod_contact(a: ElasticBody, b: ElasticBody | None, *, area: float, gap: float) -> ContactSpace:
-    """Lower end of rod a above the upper end of rod b, or above a rigid wall (``None``)."""
+    """Lower end of rod a above the upper end of rod b, or a rigid wall (``None``)."""
     count = 1 if b is None else b.dof_count
     return ContactSpace(
         G_a=csr_array(([1.0], ([0], [0])), shape=(1, a.dof_count)),
@@ -118,8 +118,8 @@ def drop_rod(
 ) -> FullOrderResult:
     """Rod of ``length`` [m] on a rigid wall, or on a free rod of length ``other`` [m].
 
-    Both have elements of the same size h; the time step is ``courant`` h / c; the run ends 1.6
-    times the wave's return time after the start.
+    Elements of one size h; time step ``courant`` h / c; the run takes 1.6 return times of the
+    wave.
     """
     size = length / elements
     a = rod_body("upper", material, area=area, length=length, elements=elements)
@@ -152,13 +152,13 @@ def plateau(result: FullOrderResult, duration: float) -> float:
 
 
 def since_touch(history: ImpactHistory) -> np.ndarray:
-    """Times of the middle of each step since first touch [s]."""
+    """Middles of steps since first touch [s]."""
     first = int(np.argmax(history.force > 0))
     return np.asarray(history.time - history.time[first] + 0.5 * history.step)
 
 
 def force_curve(history: ImpactHistory, known: np.ndarray) -> ComparedCurve:
-    """Force since first touch, beside the known force at those times [N]."""
+    """Force since first touch, beside the known one [N]."""
     since = since_touch(history)
     return ComparedCurve(
         x_label="time since first touch [us]",
@@ -169,7 +169,7 @@ def force_curve(history: ImpactHistory, known: np.ndarray) -> ComparedCurve:
 
 
 def square_pulse(history: ImpactHistory, height: float, duration: float) -> ComparedCurve:
-    """The same for a force [N] that stays for a time [s]."""
+    """The same for a constant force [N] of some duration [s]."""
     since = since_touch(history)
     return force_curve(history, np.where((since > 0.0) & (since < duration), height, 0.0))
 
@@ -179,7 +179,7 @@ def blocked_bar(
 ) -> tuple[ElasticBody, ContactSpace]:
     """Bar of quad8 elements, axisymmetric, that cannot move sideways, over a rigid plane.
 
-    Its bulk wave runs at c_p = sqrt(E (1-nu) / (rho (1+nu) (1-2nu))) and hits as on a rod.
+    Its bulk wave runs at c_p = sqrt(E (1-nu) / (rho (1+nu) (1-2nu))).
     """
     bar = _strip(length, radius, elements)
     body = elastic_body("bar", bar, {"solid": material})
@@ -221,7 +221,7 @@ def sphere_over_cylinder(
 ) -> tuple[ElasticBody, ElasticBody, ContactSpace]:
     """Free sphere that touches the upper face of a free cylinder, both axisymmetric.
 
-    Elements of ``size`` [m] within 0.1 mm of the contact, growing to ``bulk`` [m] far away.
+    Elements of ``size`` [m] within 0.1 mm of the contact, then up to ``bulk`` [m].
     """
     ball = Profile(
         (0.0, 0.0),
@@ -264,9 +264,8 @@ def needle_over_seat(
 ) -> tuple[ElasticBody, ElasticBody, ContactSpace]:
     """Needle D4 with a spherical tip that touches a seat cone of 90 degrees in a ring.
 
-    Elements of ``size`` [m] within 60 um of the ring, growing to ``bulk`` [m] far away.  With
-    ``layers`` the same meridian meshes are swept to solids, the seat turned by 0.13 rad so that the
-    two do not match; without, both are axisymmetric.
+    Elements of ``size`` [m] within 60 um of the ring, then up to ``bulk`` [m]. Axisymmetric, or
+    with ``layers`` swept to solids, the seat turned by 0.13 rad so that they do not match.
     """
     tip, ring = 2e-3, 2e-3 / sqrt(2.0)
     needle = Profile(
@@ -335,7 +334,7 @@ def drop_sphere(
 
 
 def _strip(length: float, radius: float, elements: int) -> Mesh:
-    """One column of quad8 elements from z = 0 to ``length``, r = 0 to ``radius``."""
+    """One column of quad8 elements, 0 to ``length``, 0 to ``radius``."""
     points = np.stack(
         np.meshgrid(
             np.array([0.0, 0.5 * radius, radius]), np.linspace(0.0, length, 2 * elements + 1)
@@ -358,7 +357,7 @@ def _strip(length: float, radius: float, elements: int) -> Mesh:
 
 
 def zener_parameter(material: Material, sphere_radius: float, radius: float, speed: float) -> float:
-    """Zener's lambda = m / (Z T0) of a sphere on the end of a rod of the same material [-]."""
+    """Zener's lambda = m / (Z T0), sphere on a rod of the same material [-]."""
     mass = material.density * 4.0 / 3.0 * pi * sphere_radius**3
     stiffness = 4.0 / 3.0 * 0.5 * material.plane_strain_modulus * np.sqrt(sphere_radius)
     time = (mass**2 / (stiffness**2 * speed)) ** 0.2
@@ -440,7 +439,7 @@ def blocked_bar_model(
     ----------
     length [m]
     modes
-        Plane ones of the bar, the lowest; picked by the compliance they give a uniform pressure.
+        Lowest plane ones, by the compliance they give a uniform pressure.
     radius [m]
     """
     bar, _ = blocked_bar(length, radius, elements, material)
@@ -477,14 +476,14 @@ def blocked_bar_model(
 def block_on_pad(
     arm: float, *, width: float = 0.2e-3
 ) -> tuple[ElasticBody, ElasticBody, ContactSpace]:
-    """Steel block of 10 x 10 x 20 mm whose lower face meets a small soft pad off its axis.
+    """Steel block of 10 x 10 x 20 mm whose lower face meets a small soft pad off-axis.
 
     Parameters
     ----------
     arm [m]
-        From the axis of the block to the middle of the pad, along x.
+        From the axis to the middle of the pad, along x.
     width [m]
-        Of the square pad, half as high; its stiffness is about E width * 2.
+        Of the square pad, half as high; stiffness about E width * 2.
     """
     half = 5e-3
     upper = lattice_mesh(
@@ -515,7 +514,7 @@ def free_blocks() -> tuple[ElasticBody, ElasticBody, ContactSpace]:
 def block_between_plates(
     play: float,
 ) -> tuple[tuple[ElasticBody, ...], tuple[InterfaceContact, ...]]:
-    """Block with two crowned ends, a plate below and one above it, at a distance ``play`` [m]."""
+    """Block with two crowned ends between plates, ``play`` [m] from the upper one."""
     height = 6e-3
     block = _crowned(4e-3, height=height, both=True)
     below = _plate(6e-3, 3e-3)
@@ -538,7 +537,7 @@ def _line(start: float, end: float, cells: int) -> np.ndarray:
 
 
 def _towards_middle(half: float) -> np.ndarray:
-    """Cell borders from -half to half, an eighth of the size in the middle."""
+    """Cell borders from -half to half, smaller in the middle (an eighth)."""
     side = half * np.array([0.0, 0.0625, 0.125, 0.25, 0.5, 1.0])
     return np.concatenate([-side[:0:-1], side])
 
@@ -686,7 +685,7 @@ def _blocked_bar() -> list[Check]:
 
 
 def _sphere_on_block() -> list[Check]:
-    """Sphere of 4 mm on a block so large that no echo returns in time."""
+    """Sphere of 4 mm on a block too large for echoes."""
     run = drop_sphere(radius=50e-3, height=50e-3, bulk=3e-3, speed=_SPEED)
     history = run.history
     peak, contact_time = 30.4775197, 15.8774048e-6

@@ -37,13 +37,7 @@ _TRAVEL = LENGTH / STEEL_WITHOUT_POISSON.bar_wave_speed  # of a wave along the r
 
 
 def rod_structure(*, modes: int = 12, damping: float = 0.0) -> Structure:
-    """Rod held at its upper end, with the ports ``"tip"`` (lower face) and ``"skin"``.
-
-    Parameters
-    ----------
-    damping [-]
-        Ratio of every mode.
-    """
+    """Rod held at its upper end, with the ports ``"tip"`` (lower face) and ``"skin"``."""
     body, lower, _ = rod(elements=80, clamped=True)
     ports = [Port("tip", lower.pattern), surface_port(body.mesh, "outer", "z", name="skin")]
     with Flexibility(body) as flexibility:
@@ -65,15 +59,7 @@ def rod_structure(*, modes: int = 12, damping: float = 0.0) -> Structure:
 def oscillator(*, mass: float, stiffness: float, base: float, damping: float = 0.0) -> Structure:
     """One mass on a spring on a base that is held: the smallest structure.
 
-    Its surface is a plate of 1 cm^2 on the mass, facing +z.
-
-    Parameters
-    ----------
-    mass [kg]
-    stiffness [N/m]
-    base [kg]
-        Mass of the held part.
-    damping [-]
+    Its surface is a plate of 1 cm^2 on the mass, facing +z; ``base`` [kg] is held.
     """
     shape, area = 1.0 / sqrt(mass), 1e-4
     columns = np.array([shape, 0.0, 1.0])
