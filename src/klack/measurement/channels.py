@@ -1,4 +1,4 @@
-"""What channels of a recording measure, and what a case says of them, their sensor and trigger."""
+"""What channels of a recording measure, and what a case says of sensor and trigger."""
 
 from collections.abc import Mapping
 from typing import Any, Literal, Self
@@ -37,17 +37,17 @@ ROLES: Mapping[Role, Kind] = {
     "acceleration": ACCELERATION,
     "force": FORCE,
 }
-"""Kind of quantity of each role; inside klack its values are in the SI unit of that kind."""
+"""Kind of quantity of each role; values are in its SI unit."""
 
 LIFT_ALONE: tuple[Role, ...] = ("lift",)
-"""Channels that a comparison needs of a recording, in addition to its trigger."""
+"""Channels that a comparison needs beside the trigger."""
 
 
 class ChannelChoice(Section):
     """One channel of a recording, or one per stroke.
 
-    A plain text is its name.  With ``*`` and ``?`` the name is a pattern; if several channels
-    match, each of them is a stroke of its own, in the order of the file.
+    A plain text is its name. With ``*`` and ``?`` it is a pattern; each match is a stroke of its
+    own, in the order of the file.
     """
 
     name: Text = Field(min_length=1, description="Name of the channel, or a pattern with * and ?.")
@@ -92,8 +92,8 @@ _USUAL_SHARE = 0.2
 class Trigger(Section):
     """Time zero of a stroke: where a channel crosses a level.
 
-    The same rule is applied to computed channels, so that computed and measured strokes share their
-    time zero.
+    Computed channels obey the same rule, so that computed and measured strokes share their time
+    zero.
     """
 
     channel: Role = Field(default="current", description="Channel that triggers.")
@@ -143,5 +143,5 @@ class Trigger(Section):
 
     @property
     def share_of_way(self) -> float:
-        """Share of the range from the rest value to the highest value, without a level."""
+        """Share of the range from rest to the highest value, without a level."""
         return _USUAL_SHARE if self.share is None else self.share

@@ -1,9 +1,9 @@
 """Starts of strokes in a recording read in windows.
 
-A stroke begins where the trigger channel crosses its level in the direction asked for, found
-between two samples along a straight line.  The channel has to go back behind the level by five
-standard deviations of its noise before it can trigger again, and no second stroke begins within
-the dead time.  What is found does not depend on how the recording is divided into windows.
+A stroke begins where the trigger channel crosses its level in the wanted direction, on a straight
+line between samples.  The channel must return behind the level by five standard deviations of its
+noise before it triggers again, and no second stroke begins within the dead time.  Results do not
+depend on the windows.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -44,10 +44,10 @@ class Piece:
     Parameters
     ----------
     start, step [s]
-        Time of the first sample since the trigger, and spacing.
-    values : mapping of role to array, shape (n,) [SI]
+        Of the first sample since the trigger, and spacing.
+    values (n,) [SI]
     instant [s]
-        Of the trigger, in the time of the recording.
+        Of the trigger in the recording.
     """
 
     start: float
@@ -57,7 +57,7 @@ class Piece:
 
     @property
     def end(self) -> float:
-        """Time of the last sample since the trigger [s]."""
+        """Last sample since the trigger [s]."""
         count = len(next(iter(self.values.values())))
         return self.start + self.step * (count - 1)
 
@@ -65,13 +65,8 @@ class Piece:
 def trigger_level(windows: Iterable[Window], trigger: Trigger) -> float:
     """Value at which a trigger fires [SI], read off the whole recording where it is a share.
 
-    The resting value is the median of what lies in the lowest quarter of the range; the highest
-    value leaves single samples (spikes) out.
-
-    Raises
-    ------
-    InputError
-        If the channel never changes.
+    Rest is the median of the lowest quarter of the range; the highest value leaves out single
+    samples (spikes). Rejects a channel that never changes.
     """
     if trigger.value is not None:
         return trigger.value
@@ -96,18 +91,14 @@ def trigger_level(windows: Iterable[Window], trigger: Trigger) -> float:
 
 
 def cut_strokes(windows: Iterable[Window], trigger: Trigger, level: float) -> Iterator[Piece]:
-    """Strokes of a recording, in order of time.
+    """Strokes in order of time, from ``before`` to ``after``; less at the ends of the recording.
 
     Parameters
     ----------
-    windows : iterable of mapping of role to TimeSeries
-        Each overlaps the one before by ``trigger.before + trigger.after`` and two samples or more.
+    windows
+        By role; each overlaps the one before by ``trigger.before + trigger.after`` and at least
+        two samples.
     level [SI]
-
-    Yields
-    ------
-    Piece
-        From ``before`` to ``after``; less where the recording begins later or ends earlier.
     """
     state = _State(dead_time=trigger.after if trigger.dead_time is None else trigger.dead_time)
     window: Window | None = None
@@ -135,7 +126,7 @@ def whole_piece(window: Window) -> Piece:
 
 @dataclass
 class _State:
-    """State of the trigger channel up to the sample scanned last."""
+    """State of the trigger channel up to the last sample."""
 
     dead_time: float
     armed: bool = False
@@ -170,7 +161,7 @@ class _State:
 
 
 def _crossing(series: TimeSeries, distance: Vector, index: int) -> float:
-    """Instant between the sample behind the level and the one beyond it."""
+    """Instant between a sample behind the level and the next one."""
     if index == 0:
         return series.start
     below, above = float(distance[index - 1]), float(distance[index])
@@ -179,7 +170,7 @@ def _crossing(series: TimeSeries, distance: Vector, index: int) -> float:
 
 
 def _noise(values: Vector) -> float:
-    """White noise of a channel, from its second differences (variance 6 times as large)."""
+    """White noise, from second differences (variance 6 times as large)."""
     second = np.diff(values, 2)
     return 1.4826 * float(np.median(np.abs(second))) / np.sqrt(6.0) if second.size else 0.0
 
@@ -205,10 +196,8 @@ def common_axis(pieces: Sequence[Piece], first: float, last: float) -> Vector:
 
     Parameters
     ----------
-    pieces
-        At least one.
     first, last [s]
-        What is wanted; less where at least half of the pieces have less.
+        Wanted; less where at least half of the pieces have less.
     """
     step = min(piece.step for piece in pieces)
     begin = max(first, float(np.median([piece.start for piece in pieces])))
@@ -232,9 +221,9 @@ def covers(piece: Piece, axis: Vector) -> bool:
 def onto_axis(piece: Piece, axis: Vector) -> Mapping[str, Vector]:
     """Channels of a piece at the times of an axis, by cubic splines held within their samples.
 
-    Samples that fall on the axis stay as they are.  Half-way between samples white noise keeps
-    about 0.7 of its variance; a straight line would keep half, and blur a touch as well.  The
-    spline alone would leave a step by 11 % of its height on either side.
+    Samples on the axis stay. Half-way between, white noise keeps about 0.7 of its variance; a
+    straight line would keep half, and blur a touch. The spline alone would overshoot a step by 11
+    %.
     """
     count = len(next(iter(piece.values.values())))
     time = piece.start + piece.step * np.arange(count)
@@ -249,7 +238,7 @@ def onto_axis(piece: Piece, axis: Vector) -> Mapping[str, Vector]:
 
 
 def between_samples(piece: Piece, axis: Vector) -> bool:
-    """True if the samples of a piece do not fall onto the axis."""
+    """True if samples of a piece are off the axis."""
     shift = (piece.start - axis[0]) / piece.step
     same = abs(piece.step / (axis[1] - axis[0]) - 1.0) * axis.size < _ON_AXIS
     return not (same and abs(shift - round(shift)) < _ON_AXIS)
@@ -258,8 +247,8 @@ def between_samples(piece: Piece, axis: Vector) -> bool:
 def _bounds(x: Vector) -> tuple[Vector, Vector]:
     """Lowest and highest value between each sample and the next.
 
-    Those of the two, and beyond them the crest of the flatter parabola through either three samples
-    where the record turns there: ``|x[k-1] - 2 x[k] + x[k+1]| / 8`` at most.
+    Of both, and where the record turns the crest of the flatter parabola through three samples,
+    beyond by ``|x[k-1] - 2 x[k] + x[k+1]| / 8`` at most.
     """
     low, high = np.minimum(x[:-1], x[1:]), np.maximum(x[:-1], x[1:])
     if x.size > 3:

@@ -1,22 +1,22 @@
-r"""Velocity from lift, with what the differentiator does to it stated.
+r"""Velocity from lift, with the effect of the differentiator stated.
 
-A cubic is fitted to every window of ``2 m + 1`` samples and differentiated in its middle
-(Savitzky & Golay 1964).  The weights are antisymmetric, so nothing is delayed; cubics come out
-exactly; a sine of frequency f comes out ``G(f)`` times too small,
+A cubic is fitted to every window of ``2 m + 1`` samples and differentiated in its middle (Savitzky
+& Golay 1964). Weights are antisymmetric: nothing is delayed, cubics are exact, a sine of frequency
+f is reduced by ``G(f)``,
 
 .. math:: G(f) = \frac{2}{2 \pi f h} \sum_{k=1}^{m} c_k \sin(2 \pi f k h), \qquad
           \sigma_v = \frac{\sigma_x}{h} \sqrt{2 \sum_{k=1}^{m} c_k^2} .
 
-Without a bandwidth the window is the one with the least expected squared error of the velocity:
-what it takes from the signal plus what it leaves of the noise,
+Without a bandwidth the window has the least expected squared error of the velocity, lost signal
+plus noise left,
 
 .. math:: \sum_f (2 \pi f)^2 \left[(1 - G)^2 S + G^2 N\right],
 
-``N`` the plateau at the high end of the periodogram of the lift, ``S`` what lies above it up to the
-first third octave without any; both from the second difference, which a record that ends elsewhere
-than it began does not smear.
+``N`` the plateau at the high end of the periodogram of the lift, ``S`` what lies above it up to
+the first third octave without any; both from the second difference, which different ends of a
+record do not smear.
 
-A smoothing spline of the same record was tried: see the theory page for the numbers.
+A smoothing spline of the same record: see the theory page.
 """
 
 from dataclasses import dataclass
@@ -48,18 +48,18 @@ class VelocityEstimate:
     time (n,) [s]
     velocity (..., n) [m/s]
     bandwidth [Hz]
-        Frequency at which 3 dB are lost, of the window that was used.
+        Of 3 dB loss of the window.
     noise [m/s]
-        Standard deviation of the velocity where the lift has white noise of ``lift_noise``.
+        Standard deviation, from ``lift_noise``.
     lift_noise [m]
-        Standard deviation of the noise of the lift, from the plateau of its spectrum.
+        Standard deviation of the lift, from the plateau of its spectrum.
     delay [s]
         0: the window is symmetric.
     window
         Samples of one fit.
     step [s]
     chosen
-        True if the bandwidth was chosen by the noise.
+        True if the noise chose the bandwidth.
     """
 
     time: NDArray[np.float64]
@@ -73,7 +73,7 @@ class VelocityEstimate:
     chosen: bool
 
     def amplitude_error(self, frequency: ArrayLike) -> NDArray[np.float64]:
-        """Error of the amplitude at a frequency [-], below zero: what is lost."""
+        """Error of the amplitude at a frequency [-], below zero."""
         return differentiator_gain(np.asarray(frequency), self.window, self.step) - 1.0
 
 
@@ -88,17 +88,7 @@ def velocity_of(
         Uniform.
     lift (n,) or (strokes, n) [m]
     bandwidth [Hz]
-        Frequency at which 3 dB may be lost; the nearest window that loses no more is used.  Chosen
-        by the noise without.
-
-    Returns
-    -------
-    VelocityEstimate
-
-    Raises
-    ------
-    InputError
-        If the time is not uniform, or the record has too few samples for the bandwidth.
+        At which 3 dB may be lost, by the nearest window that loses no more; default: by the noise.
     """
     step = uniform_step(time, "velocity_of: time")
     records = np.atleast_2d(np.asarray(lift, dtype=np.float64))
@@ -130,7 +120,7 @@ def velocity_of(
 def differentiator_gain(
     frequency: NDArray[np.float64], window: int, step: float
 ) -> NDArray[np.float64]:
-    """Amplitude of the velocity of a sine over the true one [-]; 1 at 0 Hz."""
+    """Velocity amplitude of a sine over the true one [-]; 1 at 0 Hz."""
     c = _weights(window)
     omega = 2.0 * pi * np.atleast_1d(np.asarray(frequency, dtype=np.float64)) * step
     k = np.arange(1, c.size + 1)
@@ -141,20 +131,16 @@ def differentiator_gain(
 
 
 def noise_floor(records: NDArray[np.float64], step: float) -> tuple[NDArray[np.float64], float]:
-    """Periodogram of lift, mean over the records, and the standard deviation of its white noise.
+    """Mean periodogram of lift (n // 2,) [m^2], and the standard deviation of its white noise [m].
+
+    The periodogram is that of second differences at the frequencies ``1 .. n // 2`` of the record,
+    scaled so that white noise of standard deviation s gives s^2 at every line.  The noise is the
+    median above 60 % of the half sampling rate.
 
     Parameters
     ----------
     records (strokes, n) [m]
     step [s]
-
-    Returns
-    -------
-    power (n // 2,) [m^2]
-        Mean squared value of one sample per line, at the frequencies ``1 .. n // 2`` of the record
-        of second differences; white noise of standard deviation s gives s^2 at every line.
-    noise : float [m]
-        From the median above 60 % of the half sampling rate.
     """
     second = np.diff(records, 2, axis=-1)
     n = second.shape[-1]
@@ -177,13 +163,13 @@ def noise_floor(records: NDArray[np.float64], step: float) -> tuple[NDArray[np.f
 
 
 def _weights(window: int) -> NDArray[np.float64]:
-    """Weights ``c_1 .. c_m`` of the samples after the middle, for a step of one."""
+    """Weights ``c_1 .. c_m`` for a step of one."""
     c = scipy.signal.savgol_coeffs(window, _DEGREE, deriv=1, use="dot")
     return np.asarray(c[window // 2 + 1 :])
 
 
 def _lost_3_dB(window: int, step: float) -> float:
-    """Frequency at which the amplitude is 3 dB too small [Hz]; half the rate if it never is."""
+    """Frequency of 3 dB loss [Hz]; else half the rate."""
     f = np.linspace(0.0, 0.5, 4001)[1:] / step
     f = f[: max(2, int(np.ceil(8001 * 2.0 / window)))]
     gain = differentiator_gain(f, window, step)
@@ -221,7 +207,7 @@ def _half_window(bandwidth: float, samples: int, step: float) -> int:
 
 
 def _signal_power(power: NDArray[np.float64], noise: float, records: int) -> NDArray[np.float64]:
-    """Power above the noise in bands of a third octave; none from the first band without any."""
+    """Power above the noise in third octaves; none from the first empty one."""
     signal = np.zeros_like(power)
     edges = np.unique(np.round(_BAND ** np.arange(0.0, np.log(power.size + 1) / np.log(_BAND) + 1)))
     for low, high in pairwise(np.minimum(edges, power.size + 1).astype(int).tolist()):

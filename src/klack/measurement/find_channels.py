@@ -1,8 +1,8 @@
 """Which channel of a recording is the lift, which the current.
 
-Channels named in the section ``measurement`` are taken as named.  The others are looked for by
-their names in English and German, together with their units, then by their units alone.  Names
-that differ in their numbers only (``lift_01``, ``lift_02``, ...) are the strokes of a series.
+Channels not named in the section ``measurement`` are found by their names in English and German
+with their units, then by units alone. Names that differ only in numbers (``lift_01``, ``lift_02``,
+...) are the strokes of a series.
 """
 
 import re
@@ -32,14 +32,12 @@ _SHORT = re.compile(r"[a-z](_\w+)?")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FoundChannel:
-    """A channel whose meaning is known: SI value = ``factor * value + offset``.
+    """Known channel: SI value = ``factor * value + offset``.
 
     Parameters
     ----------
-    name
-        In the recording.
     unit
-        Of its values in the file.
+        In the file.
     factor [SI unit per unit of the file]
         With the scale of the section.
     offset [SI unit]
@@ -61,28 +59,20 @@ def find_channels(
     needed: Collection[Role] = (),
     roles: Collection[Role] = tuple(ROLES),
 ) -> list[dict[Role, FoundChannel]]:
-    """Roles of the channels of a recording.
+    """Roles of the channels, one mapping for each stroke-record.
+
+    Usually a single one; one per stroke if a role matches several channels. A role that matches
+    one channel is shared by all. Rejects missing and ambiguous channels, units that do not fit,
+    and series of different length.
 
     Parameters
     ----------
-    channels : mapping of role to ChannelChoice, optional
-        From the section ``measurement``; patterns may match several channels.
+    channels
+        By role, from the section ``measurement``; patterns may match several.
     needed
         What the recording must have.
     roles
-        What is looked for; others are left alone, even if they are named.
-
-    Returns
-    -------
-    list of dict
-        One for each stroke-record: usually a single one; one per stroke if a role matches several
-        channels.  A role that matches one channel is shared by all.
-
-    Raises
-    ------
-    InputError
-        If a named or needed channel is missing, several could be meant, units do not fit or
-        series differ in length.
+        What is looked for; others are ignored, even if named.
     """
     named: dict[Role, Sequence[ChannelInfo]] = {
         role: _matching(recording, role, choice)
@@ -107,7 +97,7 @@ def find_channels(
 
 
 def matches(pattern: str, text: str) -> bool:
-    """Compare with ``*`` and ``?`` as the only special signs.
+    """Compare with ``*`` and ``?`` as only special signs.
 
     Examples
     --------
@@ -119,7 +109,7 @@ def matches(pattern: str, text: str) -> bool:
 
 
 def _matching(recording: Recording, role: Role, choice: ChannelChoice) -> list[ChannelInfo]:
-    """Channels of a name or pattern, numbered ones too; what stands behind a ``/`` is enough."""
+    """Channels of a name or pattern, numbered ones too; the part after ``/`` is enough."""
     found = [info for info in recording.channels if matches(choice.name, info.name)]
     found = found or [
         info
@@ -178,7 +168,7 @@ def _as_guessed(recording: Recording, role: Role, info: ChannelInfo, note: str) 
 
 
 def _require_known_scale(recording: Recording, role: Role, info: ChannelInfo) -> None:
-    """Refuse numbers beside which the file states a scale that is not known."""
+    """Reject numbers beside which the file states an unknown scale."""
     if not info.unapplied:
         return
     unit = info.unit if role in roles_of_unit(info.unit) else ROLES[role].common[0]
@@ -195,7 +185,7 @@ def _require_known_scale(recording: Recording, role: Role, info: ChannelInfo) ->
 def _guess(
     recording: Recording, role: Role, free: Sequence[ChannelInfo], must: bool
 ) -> Sequence[ChannelInfo]:
-    """Channels found by name and unit; none if there is none, or several and none is a must."""
+    """Channels by name and unit; none if several and none is a must."""
     by_name = [info for info in free if _named_like(role, info)]
     by_unit = [info for info in free if roles_of_unit(info.unit) == (role,)]
     others = [info for info in by_unit if not any(_named_like(r, info) for r in ROLES if r != role)]
@@ -211,7 +201,7 @@ def _guess(
 
 
 def _named_like(role: Role, info: ChannelInfo) -> bool:
-    """True if the name means this role and the unit, if any, does not speak against it."""
+    """True if the name means this role and the unit does not contradict."""
     name = re.sub(r"[\s.\-]+", "_", _last_part(info.name).strip().lower())
     if no_unit(info.unit):
         if _SHORT.fullmatch(name):
@@ -225,7 +215,7 @@ def _named_like(role: Role, info: ChannelInfo) -> bool:
 def _pair(
     recording: Recording, series: Mapping[Role, Sequence[FoundChannel]]
 ) -> list[dict[Role, FoundChannel]]:
-    """One dict per stroke from series of channels; single channels are shared."""
+    """One dict per stroke from series; single channels are shared."""
     count = max(len(found) for found in series.values())
     for role, found in series.items():
         if len(found) not in (1, count):
@@ -243,7 +233,7 @@ def _pair(
 
 
 def _as_yaml(name: str) -> str:
-    """Name of a channel as a case file takes it: numbers and odd signs in quotes."""
+    """Name as in a case file: numbers and odd signs in quotes."""
     if re.fullmatch(r"[^\W\d][\w ./-]*", name):
         return name
     quoted = name.replace("'", "''")
@@ -261,7 +251,7 @@ def _ambiguous(recording: Recording, role: Role, infos: Sequence[ChannelInfo]) -
 
 
 def _candidate(recording: Recording, role: Role) -> ChannelInfo:
-    """Channel that an error proposes: called so, or the volts of a sensor, or the first unknown."""
+    """Channel that an error proposes: by name, volts of a sensor, or the first unknown."""
     word = re.compile(rf"(\w*_)?({_WORDS[role]})(_?\d+)?(_\w*)?", re.IGNORECASE)
     infos = recording.channels
     named = [info for info in infos if word.fullmatch(_last_part(info.name))]

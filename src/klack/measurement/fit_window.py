@@ -1,8 +1,8 @@
 """Which samples of a stroke are fitted, and how much each counts.
 
-Later bounces magnify every difference between strokes until they say nothing about the valve; free
-flight and first impacts are repeatable.  The windows follow from the impacts of the *measured*
-strokes and stay as they are while the parameters move.
+Later bounces magnify differences between strokes until they say nothing about the valve; free
+flight and first impacts are repeatable. The windows follow from the *measured* impacts and stay
+while the parameters move.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,7 +16,7 @@ __all__ = ["FitWindow", "fit_windows", "sample_weights", "touch_shifts", "window
 Vector = NDArray[np.float64]
 
 _GUARD = 3.0
-"""Standard deviations of the impact time by which a window ends before it."""
+"""Standard deviations of the impact time between a window and it."""
 _LEAST_GUARD = 5e-6  # [s]
 _LEAD = 0.1e-3  # [s] of rest before the needle leaves the opening stop
 _APPROACH = 40e-6  # [s]
@@ -24,7 +24,7 @@ _LEFT = 0.03
 """Share of the lift by which the needle has left its stop."""
 _TAPER = 20e-6  # [s]
 _FLOOR = 1e-3
-"""Error of any model, as a share of the range of a channel: limits the weight of noiseless data."""
+"""Error of any model over the range: limits the weight of noiseless data."""
 _SMOOTHED = 15e-6  # [s]
 
 
@@ -51,17 +51,17 @@ def fit_windows(
     impacts: Mapping[str, Sequence[float]],
     count: int = 1,
 ) -> tuple[FitWindow, ...]:
-    """Windows up to the impact after the last one that is fitted, on each stop.
+    """Windows up to the impact after the last fitted one, on each stop.
 
     Parameters
     ----------
     time (k,) [s]
     strokes (n, k) [m]
         Lift.
-    impacts : mapping of "opening" and "seat" to impact times [s]
-        Of the mean stroke.
+    impacts [s]
+        Of the mean stroke, on "opening" and "seat".
     count
-        Impacts on each stop that are fitted.
+        Fitted impacts on each stop.
     """
     mean = strokes.mean(axis=0)
     start, end = float(time[0]), float(time[-1])
@@ -99,7 +99,7 @@ def fit_windows(
 
 
 def touch_shifts(time: Vector, strokes: NDArray[np.float64], instant: float) -> Vector:
-    r"""By how much each stroke meets a stop later than the mean stroke, shape (n,) [s].
+    r"""By how much each stroke touches later than the mean stroke, shape (n,) [s].
 
     .. math:: \delta t_s = -\frac{\int v\, (y_s - \bar y)\, dt}{\int v^2 dt}
 
@@ -110,7 +110,7 @@ def touch_shifts(time: Vector, strokes: NDArray[np.float64], instant: float) -> 
     time (k,) [s]
     strokes (n, k) [m]
     instant [s]
-        Touch of the mean stroke.
+        Of the mean stroke.
     """
     near = (time > instant - _APPROACH) & (time <= instant)
     if near.sum() < 2:
@@ -121,9 +121,9 @@ def touch_shifts(time: Vector, strokes: NDArray[np.float64], instant: float) -> 
 
 
 def window_taper(time: Vector, windows: Sequence[FitWindow]) -> Vector:
-    """Weight 0 to 1 of each sample, shape (n,): 1 inside, falling to 0 towards the end.
+    """Weight of each sample, shape (n,): 1 inside, falling to 0 towards the end.
 
-    The end is soft, so that an impact that the model puts there fades in instead of jumping.
+    So an impact of the model at the end fades in.
     """
     result = np.zeros_like(time)
     for window in windows:
@@ -139,7 +139,7 @@ def sample_weights(strokes: NDArray[np.float64], step: float) -> Vector:
 
     .. math:: 1 / w = \sigma_{noise}^2 + \sigma_{strokes}^2(t) + (10^{-3} \Delta)^2
 
-    Where strokes differ most, near impacts and in late flights, samples count least.  The variance
+    Near impacts and in late flights, where strokes differ most, samples count least. The variance
     between strokes is averaged over 15 us; ``Delta`` is the range of the mean stroke.
 
     Parameters
@@ -166,7 +166,7 @@ def sample_weights(strokes: NDArray[np.float64], step: float) -> Vector:
 
 
 def _release(time: Vector, lift: Vector, opening: float, seat: float) -> float:
-    """Start of the closing window: some rest before the needle leaves the opening stop."""
+    """Start of the closing window: some rest before the needle leaves the stop."""
     between = (time > opening) & (time < seat)
     if not between.any():
         return seat

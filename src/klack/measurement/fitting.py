@@ -2,10 +2,9 @@ r"""Parameters of a model by weighted least squares, inside bounds.
 
 .. math:: S(z) = \sum_i w_i (y_i - f_i(z))^2, \qquad 0 \le z_j \le 1
 
-The parameters are scaled by their bounds, ``theta = lower + z (upper - lower)``, so that all of
-them are of one size.  The search is scipy's trust region reflective method (Branch, Coleman & Li
-1999); the derivatives are central differences, whose steps are chosen so that each moves the model
-about as far as the data scatter: large against the rounding of a computed motion with its impacts,
+Parameters are scaled by their bounds, ``theta = lower + z (upper - lower)``. The search is scipy's
+trust region reflective method (Branch, Coleman & Li 1999); the steps of central differences move
+the model about as far as the data scatter: large against the rounding of a motion with impacts,
 small against its curvature.
 """
 
@@ -23,14 +22,14 @@ __all__ = ["Fit", "Profile", "fit_within_bounds", "follow_profiles", "sensitivit
 
 Vector = NDArray[np.float64]
 Model = Callable[[Sequence[Vector]], list[Vector]]
-"""From several scaled parameter vectors (p,) to the model vectors (m,), in the same order."""
+"""Scaled parameter vectors (p,) to model vectors (m,), in the same order."""
 
 _FIRST_STEP = 0.01
 _SMALLEST_STEP, _LARGEST_STEP = 1e-3, 0.03
 _INSIDE = 1e-6
 _POLISHING, _SHARES = 2, (1.0, 0.5)
 _MOVED = 0.5
-"""Target of the root mean square change of the model by a step, in standard deviations."""
+"""Wanted RMS change of the model by a step, in standard deviations."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -40,13 +39,11 @@ class Fit:
     Parameters
     ----------
     z (p,) [-]
-        Scaled parameters.
-    model (m,)
-        Of the data there.
+        Scaled.
     jacobian (m, p)
-        Derivatives of the model by ``z``.
+        By ``z``, of all parameters.
     cost [-]
-        Weighted sum of squares ``S``.
+        ``S``.
     """
 
     z: Vector
@@ -72,25 +69,17 @@ def fit_within_bounds(
 
     Parameters
     ----------
-    model
-        See :data:`Model`.
     data (m,)
     weights (m,)
-        Inverse variances of the data; 0 leaves a sample out.
+        Inverse variances; 0 leaves a sample out.
     start (p,) [-]
-        Scaled parameters, 0 to 1.
+        Scaled.
     free (p,)
-        Parameters that may move; the others stay at their start, and so do those that the data do
-        not see.
+        May move; others keep their start, and so do those that the data do not see.
     most
-        Most iterations.
+        Iterations.
     tolerance
-        Relative change of the sum of squares at which it ends.
-
-    Returns
-    -------
-    Fit
-        Its Jacobian covers all parameters, also those that did not move.
+        Relative change of the sum of squares at the end.
     """
     free = np.ones(start.size, dtype=bool) if free is None else free
     root = np.sqrt(weights)
@@ -153,10 +142,10 @@ def _polished(
     steps: Vector,
     free: NDArray[np.bool_],
 ) -> tuple[Vector, Vector, NDArray[np.float64], float]:
-    """Whole steps of Gauss and Newton with the final derivatives, as long as they help.
+    """Whole Gauss-Newton steps with the final derivatives, as long as they help.
 
-    The search ends where the computed motion is no longer smooth; steps of the size of the
-    differences still see the slope there.
+    The search ends where the motion is no longer smooth; steps of the size of the differences
+    still see the slope.
     """
     every = np.ones(z.size, dtype=bool)
     jacobian = sensitivities(model, z, steps, every)
@@ -181,7 +170,7 @@ def _polished(
 def sensitivities(
     model: Model, z: Vector, steps: Vector, free: NDArray[np.bool_]
 ) -> NDArray[np.float64]:
-    """Central differences of the model, one-sided at a bound, shape (m, p); 0 where not free."""
+    """Central differences (m, p), one-sided at a bound; 0 where not free."""
     columns = np.flatnonzero(free)
     pairs = []
     for j in columns:
@@ -200,9 +189,9 @@ _PLACES = (0.4, 0.8, 1.1, 1.5)
 """Distances from the best value, in half widths of the linear interval."""
 _MOST_STEPS = 6
 _SETTLED = 0.02
-"""Change of Lambda below which the other parameters are fitted; 4 is about two standard errors."""
+"""Change of Lambda at which other parameters are fitted; 4: two standard errors."""
 _ENOUGH = 1.5
-"""A side ends where Lambda is this many times that of the interval."""
+"""Lambda over that of the interval at which a side ends."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -214,7 +203,7 @@ class Profile:
     index
         Of the parameter.
     z (k,) [-]
-        Rising, with the best value among them.
+        Rising, the best value included.
     excess (k,) [-]
         ``Lambda``.
     others (k, p) [-]
@@ -222,7 +211,7 @@ class Profile:
     threshold [-]
         ``Lambda`` at the ends of the 95 % interval.
     lower, upper [-]
-        Ends of that interval; the bound where it is not left inside the bounds.
+        Ends of the interval, or the bounds.
     """
 
     index: int
@@ -242,32 +231,28 @@ def follow_profiles(
     covariance: ShotCovariance,
     indices: Sequence[int],
 ) -> list[Profile]:
-    r"""Follow the profiles of some parameters, both sides of all of them side by side.
+    r"""Follow the profiles of some parameters, both sides at once.
 
-    One parameter is moved from its best value step by step and all others are fitted again at each.
-    The sum of squares on this path, ``S_p``, shows bent and one-sided uncertainty that standard
-    errors cannot (Raue et al. 2009).  It is brought to the scale on which the scatter between
-    strokes counts,
+    One parameter moves step by step from its best value and the others are fitted again. The sum
+    of squares on this path, ``S_p``, shows bent and one-sided uncertainty (Raue et al. 2009). It
+    is scaled to the scatter between strokes,
 
     .. math:: \Lambda(z_j) = (S_p(z_j) - S_{min}) \, \frac{(H^{-1})_{jj}}{C_{jj}}, \qquad
               H = J^T W J ,
 
     so that near the best value ``Lambda = (z_j - \hat z_j)^2 / C_jj`` with the covariance *C* of
-    whole strokes (the vertical adjustment of Chandler & Bate 2007).  The 95 % interval is where
-    ``Lambda`` stays below the square of Student's quantile; for a linear model it is the one of the
-    standard error.
+    whole strokes (vertical adjustment, Chandler & Bate 2007). In the 95 % interval ``Lambda`` is
+    below the square of Student's quantile; for a linear model it is that of the standard error.
 
-    The others are fitted by Gauss-Newton steps with the Jacobian of the best fit, kept up to date
-    by Broyden's (1965) rank-one formula: two or three evaluations a point.
+    The others are fitted by Gauss-Newton steps with the Jacobian of the best fit, updated by
+    Broyden's (1965) rank-one formula: two or three evaluations a point.
 
     Parameters
     ----------
-    model, data, weights
-        As for :func:`klack.measurement.fitting.fit_within_bounds`.
     covariance
         Of the scaled parameters.
     indices
-        Parameters that the data see.
+        That the data see.
     """
     problem = _Problem(data, weights, fit, covariance)
     paths = [(index, side) for index in indices for side in (-1.0, 1.0)]
@@ -299,7 +284,7 @@ _Path = Generator[Vector, Vector, list[_Point]]
 
 
 def _side_by_side(model: Model, paths: Sequence[_Path]) -> list[list[_Point]]:
-    """Advance all paths together: their trials are computed in one batch."""
+    """Advance all paths together, trials in one batch."""
     results: list[list[_Point]] = [[] for _ in paths]
     asked: dict[int, Vector] = {}
     for i, path in enumerate(paths):
@@ -381,7 +366,7 @@ class _Problem:
 def _bounded_step(
     jacobian: NDArray[np.float64], r: Vector, z: Vector, free: NDArray[np.bool_]
 ) -> Vector:
-    """Gauss-Newton step of the free parameters that stays inside the bounds."""
+    """Gauss-Newton step of free parameters inside the bounds."""
     active = free.copy()
     for _ in range(z.size):
         step = np.zeros_like(z)
@@ -396,7 +381,7 @@ def _bounded_step(
 
 
 def _crossing(z: Vector, root: Vector, level: float, otherwise: float) -> float:
-    """Where the root of Lambda, nearly a straight line, first exceeds a level."""
+    """Where the root of Lambda, nearly straight, first exceeds a level."""
     above = np.flatnonzero(root >= level)
     if not above.size or above[0] == 0:
         return otherwise

@@ -1,7 +1,7 @@
-r"""Free flight between two impacts, fitted to lift as the sensor showed it.
+r"""Free flight between two impacts, fitted to lift as the sensor shows it.
 
-Between impacts the needle is accelerated by forces that are nearly constant, by a spring that is
-pressed farther at the top, and by friction, which turns with the velocity:
+Nearly constant forces, a spring, and friction, which turns with the velocity, accelerate the
+needle:
 
 .. math:: p(t) = c_0 + c_1 s + c_2 \left(s^2 - \tfrac{1}{12} \kappa s^4 + \beta\, s |s|\right),
           \quad s = t - t_0,
@@ -10,11 +10,11 @@ pressed farther at the top, and by friction, which turns with the velocity:
 mass (two terms of the cosine), ``beta`` friction over the mean force.  The coefficients of
 ``s^4`` and ``s |s|`` are fitted as such.  A flight that does not turn is a polynomial.
 
-A low pass ``1 / D`` of the sensor passes polynomials on as polynomials, so what it shows of each
-term is known exactly (of ``s |s|``: late by the delay), however slow it is, once its own transient
-has died away.  The fit is Huber's (Huber 1981, ch. 7): least squares inside 2.5 standard
-deviations, absolute values outside.  Standard errors take in that neighbouring samples may carry
-the same noise, through the long-run variance of the residuals (Newey & West 1987, eq. 5).
+A low pass ``1 / D`` maps polynomials to polynomials: what the sensor shows of each term is known
+exactly (of ``s |s|``: late by the delay) after its transient. The fit is Huber's (Huber 1981, ch.
+7): least squares inside 2.5 standard deviations, absolute values outside. Standard errors use the
+long-run variance of the residuals (Newey & West 1987, eq. 5), since neighbouring samples may share
+noise.
 """
 
 from dataclasses import dataclass, replace
@@ -33,15 +33,13 @@ _TRUST = 30.0  # samples that the noise of the other flights counts for
 
 @dataclass(frozen=True, kw_only=True)
 class Crossing:
-    """Where a flight meets the level of a stop.
+    """Where a flight meets the level of a stop; positive in the direction of lift.
 
     Parameters
     ----------
     time, time_se [s]
     velocity, velocity_se [m/s]
-        In the direction of lift.
     acceleration [m/s^2]
-        In the direction of lift.
     """
 
     time: float
@@ -58,19 +56,18 @@ class Flight:
     Parameters
     ----------
     reference [s]
-        Turning point of a flight that turns, else the middle.
+        Turning point, or the middle.
     turns
         Whether the terms are ``1, s, s^2, s^4, s |s|``; else ``1, s, s^2, ...``
     coefficients (m,)
-        Of the motion, not of what the sensor shows [SI].
+        Of the motion, not of the sensor output [SI].
     covariance (m, m)
-        Of the coefficients.
     residuals (n,) [m]
-        Of the samples, about what the sensor shows of the motion.
+        About what the sensor shows of the motion.
     scale [m]
-        Standard deviation of a sample that the covariance stands for.
+        Standard deviation of a sample in the covariance.
     first, last [s]
-        Samples that were fitted.
+        Of the fitted samples.
     """
 
     reference: float
@@ -93,7 +90,7 @@ class Flight:
         return 2.0 * float(self.coefficients[2])
 
     def derivative(self, time: float, order: int) -> tuple[float, NDArray[np.float64]]:
-        """Derivative of the motion at a time, and its gradient by the coefficients."""
+        """Derivative of the motion, and its gradient by the coefficients."""
         s = time - self.reference
         gradient = [
             _falling(k, order) * s ** (k - order) if k >= order else 0.0 for k in self.powers
@@ -104,13 +101,13 @@ class Flight:
         return float(row @ self.coefficients), row
 
     def crossing(self, level: float, level_se: float, near: float) -> Crossing | None:
-        """Where the flight meets a level, next to a time; None if it never does.
+        """Where the flight meets a level next to a time; None if never.
 
         Parameters
         ----------
         level, level_se [m]
         near [s]
-            Beginning or end of the flight.
+            An end of the flight.
         """
         time = self._meets(level, near)
         if time is None:
@@ -132,7 +129,7 @@ class Flight:
         )
 
     def top(self) -> tuple[float, float]:
-        """Lift [m] at the turning point of a flight that turns, and its standard error."""
+        """Lift [m] at the turning point, and its standard error."""
         x, by_x = self.derivative(self.reference, 0)
         v, _ = self.derivative(self.reference, 1)
         a = self.acceleration
@@ -140,10 +137,7 @@ class Flight:
         return x + shift, float(np.sqrt(by_x @ self.covariance @ by_x))
 
     def told(self, index: int, mean: float, variance: float) -> "Flight":
-        """The same flight, given one coefficient as ``mean`` with a variance.
-
-        One step of linear estimation with one observation (Kalman 1960).
-        """
+        """The same flight, one coefficient observed as ``mean`` with a variance (Kalman 1960)."""
         seen = self.covariance[:, index]
         gain = seen / (seen[index] + variance)
         covariance = self.covariance - np.outer(gain, seen)
@@ -154,7 +148,7 @@ class Flight:
         )
 
     def _meets(self, level: float, near: float) -> float | None:
-        """Time at which the flight is at a level, by Newton steps from its end."""
+        """Time of a level, by Newton steps from the end."""
         time, length = near, self.last - self.first
         for _ in range(30):
             x, _ = self.derivative(time, 0)
@@ -188,17 +182,16 @@ def fit_flight(
     time, lift (n,) [s], [m]
         More samples than terms.
     degree
-        Of the polynomial of a flight that does not turn.
+        Of the polynomial without turn.
     sensor [s^i]
-        :func:`klack.measurement.lift_sensor.sensor_polynomial`.
+        See :func:`klack.measurement.lift_sensor.sensor_polynomial`.
     turning_point [s]
-        Of a flight that turns.
     correlation [-]
         See :func:`correlation_factor`.
     floor [m]
         Least standard deviation of a sample.
     noise [m]
-        Standard deviation about other flights; helps where there are few samples.
+        Standard deviation about other flights, for few samples.
     """
     turns = turning_point is not None
     reference = 0.5 * float(time[0] + time[-1]) if turning_point is None else turning_point
@@ -237,12 +230,12 @@ def fit_flight(
 
 
 def correlation_factor(residuals: tuple[NDArray[np.float64], ...]) -> float:
-    """Variance of long means of the residuals over that of white noise [-], at least 1.
+    """Variance of long means of residuals over white noise [-], at least 1.
 
     Parameters
     ----------
     residuals
-        Of several flights, on one sampling step.
+        Of several flights, one sampling step.
     """
     sizes = [r.size for r in residuals]
     if not sizes or max(sizes) < 16:

@@ -1,7 +1,7 @@
-r"""All flights on one stop, estimated together.
+"""All flights on one stop, estimated together.
 
 Each flight is fitted alone first (:mod:`klack.measurement.flight`); its coefficients and their
-covariance hold all that its samples say.  Together the flights of one stop say more, for
+covariance hold all that its samples say. Together the flights of one stop say more:
 
 * their force is nearly the same: accelerations scatter about a mean, by as much as they are found
   to (random effects, DerSimonian & Laird 1986, eq. 7), at least 1 %;
@@ -10,8 +10,8 @@ covariance hold all that its samples say.  Together the flights of one stop say 
 * they meet one level, and each contact lasts about as long as the others: release minus touch is
   ``T_c`` up to 10 % and 0.2 us.
 
-These are further observations in one least-squares problem, solved by Gauss-Newton steps; the
-inverse of its normal matrix is the covariance of everything (Gelman et al. 2013, ch. 5).
+These are further observations in one least-squares problem, solved by Gauss-Newton steps; its
+inverse normal matrix is the covariance (Gelman et al. 2013, ch. 5).
 """
 
 from collections.abc import Callable
@@ -45,11 +45,11 @@ class FlightTrain:
     ----------
     level, level_se [m]
     flights
-        As given, with the joint coefficients and their covariance; the first is the approach.
+        The approach first, with joint coefficients.
     touches, releases
-        Ends of the flights: touch of impact k, and release after it.
+        Touch of impact k, and release after it.
     restitution_se
-        Per impact; nan where touch or release is missing.
+        Per impact; nan without touch or release.
     shape
         None without a bounce.
     """
@@ -84,12 +84,11 @@ def join_flights(
     Parameters
     ----------
     flights
-        The approach to the first impact, then the bounce after each impact; None where a flight
-        could not be fitted.
+        Approach, then the bounce after each impact; None where there is no fit.
     level, level_se [m]
         Of the stop.
     away
-        1 if the needle bounces towards larger lift, -1 towards smaller.
+        1 for bounces towards larger lift, else -1.
     known
         From other strokes of the same valve.
     """
@@ -183,7 +182,7 @@ class _Problem:
         return None if f is None else replace(f, coefficients=self.unknown[self.part[k]])
 
     def _end(self, k: int, *, last: bool) -> _End | None:
-        """Where flight k meets the level at its end or at its beginning."""
+        """Where flight k meets the level at either end."""
         f = self._flight(k)
         if f is None or (not last and not f.turns):
             return None
@@ -268,7 +267,7 @@ class _Problem:
     def _observe_approach(
         self, observe: Callable[[dict[int, float], float, float], None], k: int
     ) -> None:
-        """Acceleration of the approach at its end against that of the bounces."""
+        """Acceleration at the end of the approach against the bounces."""
         f, own = self._flight(k), self.flights[k]
         if f is None or own is None:
             return
@@ -284,7 +283,7 @@ class _Problem:
         observe({**by, 2: -2.0}, a - told, spread)
 
     def _learn_scatter(self) -> None:
-        """Scatter of the accelerations beyond their own errors, by their moments."""
+        """Scatter of the accelerations beyond their errors, by moments."""
         if len(self.bounces) < 2 or self.force == 0.0:
             return
         values, variances = [], []
@@ -318,7 +317,7 @@ class _Problem:
 
 
 def _whitener(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """``W`` with ``W.T W`` the inverse of a covariance of badly scaled coefficients."""
+    """``W`` with ``W.T W`` the inverse of a badly scaled covariance."""
     scale = np.sqrt(np.diag(covariance))
     values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
     values = np.maximum(values, 1e-12 * values[-1])
@@ -326,7 +325,7 @@ def _whitener(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _scatter(values: NDArray[np.float64], variances: NDArray[np.float64]) -> float:
-    """Variance of the values beyond their own (DerSimonian & Laird 1986), 0 or more."""
+    """Variance of values beyond their own (DerSimonian & Laird 1986)."""
     w = 1.0 / variances
     mean = w @ values / w.sum()
     excess = float(w @ (values - mean) ** 2) - (values.size - 1)

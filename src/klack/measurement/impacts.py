@@ -1,16 +1,16 @@
-r"""Impacts of one stroke from its lift alone.
+"""Impacts of one stroke from its lift alone.
 
-1. Levels of rest on the stops (given, or found: :mod:`klack.measurement.stop_levels`).
-2. Turns of the smoothed lift at these levels (:mod:`klack.measurement.stop_levels`).
-3. The raw lift of each flight between two impacts, without the time in which the sensor still
-   shows the impact before, is fitted by a polynomial of the least degree (2, 3 or 4) that the next
-   coefficient does not improve significantly; of a flight that comes from elsewhere, the longest
-   stretch before the touch is used that agrees with all shorter ones (Lepski 1991).
-4. A short flight tells its acceleration badly, and with it its speeds.  The flights of one stop are
-   driven by nearly the same force, so each is told the mean acceleration of the others with a
-   variance that holds what the accelerations scatter beyond their own errors (random effects,
-   DerSimonian & Laird 1986, eq. 7); where they do differ, nothing is changed.
-5. First touch and release are where the fits meet the level of the stop; speeds are theirs there.
+1. Levels of rest on the stops, given or found, and turns of the smoothed lift at these levels
+   (:mod:`klack.measurement.stop_levels`).
+2. The raw lift of each flight, without the time in which the sensor still shows the impact before,
+   is fitted by a polynomial of the least degree (2, 3 or 4) that the next coefficient does not
+   improve significantly; of a flight that comes from elsewhere, by the longest stretch before the
+   touch that agrees with all shorter ones (Lepski 1991).
+3. A short flight defines its acceleration, and with it its speeds, badly.  Flights of one stop are
+   driven by nearly the same force, so each is given the mean acceleration of the others, with a
+   variance that holds their scatter beyond their own errors (random effects, DerSimonian & Laird
+   1986, eq. 7); where they do differ, nothing changes.
+4. First touch, release and speeds are where the fits meet the level of the stop.
 
 A line instead of the parabola would be wrong by half the acceleration times its length: 0.1 m/s
 for 50 us at 4000 m/s^2.
@@ -63,7 +63,7 @@ class _Record:
 
 @dataclass(frozen=True, kw_only=True)
 class _Ends:
-    """A fitted flight: its release from the stop before, its touch of the stop after."""
+    """A fitted flight, its release from one stop, its touch of the next."""
 
     flight: Flight
     release: Crossing | None
@@ -72,7 +72,7 @@ class _Ends:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FittedStroke:
-    """Impacts found, and each flight fitted alone; see :func:`fit_flights`."""
+    """Impacts found, each flight fitted alone; see :func:`fit_flights`."""
 
     record: _Record
     touches: tuple[Touch, ...]
@@ -91,33 +91,23 @@ def measure_stroke(
 ) -> StrokeMeasures:
     """Read impacts, speeds, restitution, rebound heights and periods off one lift.
 
-    Works on measured lift and on computed lift alike, so that both are read in the same way, and
-    on single drops on a seat.
+    Measured and computed lift are read in the same way, single drops too. Nothing touches: no
+    impacts.
 
     Parameters
     ----------
     time (n,) [s]
         Uniform.
     lift (n,) [m]
-        Rising while the valve opens; as the sensor shows it if there is a sensor.
+        Rising while the valve opens; as the sensor, if any, shows it.
     seat, opening [m]
-        True lift at which the needle touches the seat and the opening stop; found from where it
-        rests without.  ``nan`` for a stop that does not exist.
+        True lift at which the needle touches the stops; default: where it rests; ``nan`` for a
+        stop that does not exist.
     sensor
         Its sensitivity and offset are taken out, its low pass is undone in the fits.
-    shapes : mapping of stop to FlightShape, optional
-        What other strokes of the same valve say of the flights (:func:`klack.measurement.
-        set_measures.measure_set` gives each stroke what the others say).
-
-    Returns
-    -------
-    StrokeMeasures
-        Without impacts if nothing touches.
-
-    Raises
-    ------
-    InputError
-        If the time is not uniform, values are missing, or the lift never changes.
+    shapes
+        By stop, from other strokes of the same valve
+        (:func:`klack.measurement.set_measures.measure_set`).
     """
     return read_flights(
         fit_flights(time, lift, seat=seat, opening=opening, sensor=sensor), shapes or {}
@@ -147,7 +137,7 @@ def fit_flights(
 
 
 def read_flights(fitted: FittedStroke, shapes: Mapping[Stop, FlightShape]) -> StrokeMeasures:
-    """Second half of :func:`measure_stroke`: estimate the flights on each stop together."""
+    """Second half of :func:`measure_stroke`: flights on each stop together."""
     record, touches = fitted.record, fitted.touches
     trains = _joined(record, touches, list(fitted.fits), shapes)
     noise = _noise(list(fitted.fits))
@@ -232,10 +222,10 @@ def _fit_all(record: _Record, touches: tuple[Touch, ...]) -> list[_Ends | None]:
 
 
 def _bounce(record: _Record, before: Touch, after: Touch) -> _Ends | None:
-    """Flight from a stop back to the same stop.
+    """Flight from a stop back to it.
 
-    Its samples reach to the release and touch that the fit to the former ones shows, a part of the
-    guard at a time: a fit to few samples knows neither well, and might take in the contact itself.
+    Its samples reach to the release and touch of the former fit, a part of the guard at a time: a
+    fit to few samples knows neither well, and might take in the contact itself.
     """
     t = record.time
     release, touch = float(t[before.index]), float(t[after.index])
@@ -260,7 +250,7 @@ def _bounce(record: _Record, before: Touch, after: Touch) -> _Ends | None:
 
 
 def _same(time: NDArray[np.float64], flight: Flight) -> bool:
-    """Whether a flight was fitted to these very samples."""
+    """Whether a flight was fitted to these samples."""
     return bool(time[0] == flight.first and time[-1] == flight.last)
 
 
@@ -337,7 +327,7 @@ def _approach(record: _Record, before: Touch | None, after: Touch) -> _Ends | No
 
 
 def _under_way(record: _Record, touch: Touch) -> float:
-    """Time from which the needle comes to a stop with 15 % of its fastest speed."""
+    """Time from which the needle approaches with 15 % of its fastest speed."""
     towards = -record.smooth.velocity[: touch.index] * (1.0 if touch.stop == "seat" else -1.0)
     last = towards[max(0, touch.index - 4 * record.smooth.half) :]
     slow = np.flatnonzero(towards < _UNDER_WAY * float(np.max(last, initial=0.0)))
@@ -347,7 +337,7 @@ def _under_way(record: _Record, touch: Touch) -> float:
 
 
 def _longest_stretch(record: _Record, stop: Stop, start: float, end: float) -> _Ends | None:
-    """Of the stretches that end at a time: the most precise that agrees with all shorter ones."""
+    """Most precise stretch to a time that agrees with all shorter ones."""
     step = float(record.time[1] - record.time[0])
     noise = _own_noise(record, max(start, end - max(_OWN_NOISE, 24.0 * step)), end)
     best: tuple[float, _Ends] | None = None
@@ -374,13 +364,13 @@ def _longest_stretch(record: _Record, stop: Stop, start: float, end: float) -> _
 
 
 def _agree(value: float, error: float, shorter: float, its_error: float) -> bool:
-    """Whether two nested estimates differ by no more than the noise of the shorter one explains."""
+    """Whether nested estimates differ by no more than noise of the shorter one."""
     own = np.sqrt(max(its_error**2 - error**2, 0.0))
     return bool(abs(value - shorter) <= _AGREES * float(own) + 0.1 * error)
 
 
 def _own_noise(record: _Record, first: float, last: float) -> float:
-    """Standard deviation of the samples before a touch, about a cubic, as long means feel it."""
+    """Standard deviation before a touch, about a cubic, of long means."""
     window = _window(record, first, last)
     if window is None:
         return record.smooth.noise
@@ -398,10 +388,9 @@ def _known_noise(flight: Flight, noise: float) -> Flight:
 
 
 def _ghost(record: _Record, touches: tuple[Touch, ...], fits: list[_Ends | None]) -> int | None:
-    """Last touch between which and the one before the needle was not seen to fly; None if none.
+    """Last touch before which the needle was not seen to fly; None if none.
 
-    Vibration of the needle and noise turn the lift round as well; but no parabola rises from the
-    stop there and comes back to it.
+    Vibration and noise turn the lift as well, but without a parabola that rises and comes back.
     """
     for k in range(len(touches) - 1, 0, -1):
         fit = fits[k]
@@ -435,7 +424,7 @@ def _joined(
     fits: list[_Ends | None],
     shapes: Mapping[Stop, FlightShape],
 ) -> list[tuple[range, FlightTrain]]:
-    """Runs of impacts on one stop, each with its flights estimated together."""
+    """Runs of impacts on one stop, their flights estimated together."""
     out = []
     first = 0
     for k in range(1, len(touches) + 1):

@@ -1,12 +1,12 @@
-r"""Output of a lift sensor for a motion, and its inverse for smooth motions.
+r"""Output of a lift sensor for a motion, and its inverse for smooth ones.
 
 An inductive sensor follows the tip through a low pass,
 
 .. math:: D(\tau_0 s)\, y = x, \qquad D(s) = 1 + s \quad\text{or a Butterworth polynomial},
           \quad \tau_0 = 1 / (2 \pi f_b),
 
-so that 3 dB are lost at the bandwidth ``f_b`` (polynomials: Butterworth 1930).  What it shows is
-``sensitivity * y + offset``, rounded to its resolution.
+3 dB down at the bandwidth ``f_b`` (Butterworth 1930). It shows ``sensitivity * y + offset``,
+rounded to its resolution.
 """
 
 from collections.abc import Mapping
@@ -34,26 +34,17 @@ __all__ = [
 def sense(
     time: NDArray[np.float64], lift: NDArray[np.float64], sensor: LiftSensor
 ) -> NDArray[np.float64]:
-    """Lift as the sensor shows it [m].
+    """Lift as the sensor shows it [m], of the shape of ``lift``.
 
-    The low pass is solved exactly for a motion that runs straight between the samples, at any
-    step (:mod:`klack.signals.low_pass`); before the first sample the valve is taken to rest there.
+    The low pass is exact for motions straight between samples, at any step
+    (:mod:`klack.signals.low_pass`); before the first sample the valve is at rest.
 
     Parameters
     ----------
     time (n,) [s]
         Uniform.
     lift (n,) or (strokes, n) [m]
-        True lift at the place of the sensor.
-
-    Returns
-    -------
-    array, as ``lift`` [m]
-
-    Raises
-    ------
-    InputError
-        If the time is not uniform.
+        True, at the sensor.
     """
     step = uniform_step(time, "sense: time")
     shown = np.asarray(lift, dtype=np.float64)
@@ -66,15 +57,14 @@ def sense(
 
 
 def sensor_delay(sensor: LiftSensor) -> float:
-    """Time by which the sensor shows a steady motion late [s]: ``1 / (2 pi f_b)`` for order 1."""
+    """Delay of a steady motion [s]: ``1 / (2 pi f_b)`` for order 1."""
     return float(sensor_polynomial(sensor)[1]) if sensor.bandwidth is not None else 0.0
 
 
 def sensor_poles(sensor: LiftSensor) -> NDArray[np.complex128]:
     """Poles of the low pass [1/s], shape (order,); none without a bandwidth.
 
-    After a sharp event what the sensor shows differs from the smooth motion by
-    ``sum_i C_i exp(p_i t)``.
+    After a sharp event the sensor deviates by ``sum_i C_i exp(p_i t)``.
     """
     if sensor.bandwidth is None:
         return np.empty(0, dtype=np.complex128)
@@ -85,7 +75,7 @@ def sensor_poles(sensor: LiftSensor) -> NDArray[np.complex128]:
 def sensor_polynomial(sensor: LiftSensor) -> NDArray[np.float64]:
     """Coefficients ``d_i`` [s^i] of ``x = d_0 y + d_1 y' + d_2 y'' + ...``, shape (order + 1,).
 
-    With them a polynomial that the sensor shows gives the polynomial of the motion exactly.
+    Exact for polynomials.
     """
     if sensor.bandwidth is None:
         return np.ones(1)
@@ -115,15 +105,15 @@ def recorded_stroke(
     time (n,) [s]
         Uniform; before it the valve is at rest.
     channels (n,)
-        By role, SI; the lift as it truly is.
+        By role, SI; true lift.
     grid (k,) [s]
         From the trigger.
     sensor
-        Its resolution is left out: rounding averages out over strokes, and has no slope.
+        Without resolution: rounding averages out over strokes, and has no slope.
     trigger
         None: the time of the computation is that of the record.
     zeroed
-        True if the lift before the trigger is set to zero.
+        Set the lift before the trigger to zero.
 
     Raises
     ------
@@ -146,15 +136,15 @@ def recorded_stroke(
 def trigger_instant(time: Vector, values: Vector, trigger: Trigger, step: float) -> float:
     """First instant at which a recorder finds the crossing of a trigger level [s].
 
-    A recorder joins two samples by a straight line; where the channel bends, that crosses the level
-    a little aside, 0.1 us for a current that is sampled every 2.5 us.  The same is done here, and
-    averaged over where the samples may lie.
+    A recorder joins samples by straight lines, which cross the level of a bent channel a little
+    aside: 0.1 us for a current sampled every 2.5 us. So is it here, averaged over where the
+    samples may lie.
 
     Parameters
     ----------
     time, values (n,) [s], [SI]
     step [s]
-        Between two samples of the recorder.
+        Of the recorder.
     """
     sign = 1.0 if trigger.slope == "rising" else -1.0
     level = trigger.value

@@ -41,9 +41,9 @@ _FEWEST = 6
 
 
 def find_outliers(time: NDArray[np.float64], lift: Matrix) -> dict[int, str]:
-    """Reasons by the row of the stroke.
+    """Reasons to discard, by stroke.
 
-    Only what is beyond doubt is discarded: scatter from shot to shot is the matter to be measured.
+    Only what is beyond doubt: scatter from shot to shot is to be measured.
 
     ========== ===============================================================================
     no motion  lift moves by less than 20 % of the median way
@@ -146,31 +146,21 @@ def load_stroke_set(
 ) -> StrokeSet:
     """Read recordings, cut them into strokes, align these, and discard what cannot be used.
 
-    Long recordings are read in windows; only the strokes themselves are kept.
+    Long recordings are read in windows; only strokes are kept, as the sensor showed them; with
+    ``zero: start`` less the median lift before the trigger.
 
     Parameters
     ----------
     paths
-        Files of one valve: one long recording, one file per stroke, or a mixture.
+        Of one valve: one long recording, one file per stroke, or a mixture.
     measurement
-        Channels, trigger, zero; without it channels are found by their names, and every recording
-        is one stroke in its own time.
+        Channels, trigger, zero; without it channels are found by name, and every recording is one
+        stroke in its own time.
     progress
-        Called with the share of the files that is done, 0 to 1.
+        Gets the share of the files that is done.
     roles
-        Channels that are read beside that of the trigger; of them the recording must have the lift.
-        A bench that records less than another can so share its description.
-
-    Returns
-    -------
-    StrokeSet
-        Values as the sensor showed them; with ``zero: start`` the median lift before the trigger
-        is taken off.
-
-    Raises
-    ------
-    InputError
-        If a file cannot be read, channels are missing, or no stroke is left.
+        Channels to read beside that of the trigger, of which the lift must exist.  Benches that
+        record less than others can so share a description.
     """
     trigger = None if measurement is None else measurement.trigger
     cuts: list[_Cut] = []

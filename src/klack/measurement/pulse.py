@@ -1,7 +1,7 @@
-"""A pulse with a front, a plateau and an end, as a struck bar carries it: read off one record.
+"""A pulse of front, plateau and end, as in a struck bar, read off one record.
 
-The plateau is the mean over the middle half of the time above half of itself, found by iteration.
-Front and end are where the record crosses shares of the plateau, on straight lines between samples.
+The plateau is the mean over the middle half of the time above half of itself, by iteration.  Front
+and end cross shares of the plateau, on straight lines between samples.
 """
 
 from dataclasses import dataclass
@@ -38,23 +38,23 @@ class Pulse:
     Parameters
     ----------
     sign
-        -1 where the plateau lies below zero; all levels are those of the pulse turned upwards.
+        -1 where the plateau is below zero; all levels are those of the pulse turned upwards.
     rest
-        Level before the front, as recorded.
+        Before the front, as recorded.
     plateau
-        Above the level at rest.
+        Above rest.
     front [s]
-        Where the front crosses half of the plateau.
+        At half of the plateau.
     length [s]
-        From there to where the end does.
+        From there to the end.
     rise, fall [s]
         From 10 to 90 % of the plateau, and back.
     peak [-]
-        Highest value over the plateau.
+        Over the plateau.
     ripple [-]
-        Root mean square of the plateau about its mean, over that.
+        RMS of the plateau about its mean, over that.
     ripple_period [s]
-        From the first to the second crest behind the front; nan without a second one.
+        Between two crests behind the front; nan without a second.
     """
 
     sign: float
@@ -70,22 +70,12 @@ class Pulse:
 
     @property
     def end(self) -> float:
-        """Where the end crosses half of the plateau [s]."""
+        """End at half of the plateau [s]."""
         return self.front + self.length
 
 
 def measure_pulse(time: Floats, values: Floats, where: str) -> Pulse:
-    """Read the first pulse off a record.
-
-    Parameters
-    ----------
-    time, values (n,)
-
-    Raises
-    ------
-    InputError
-        For a record without a front, without an end, or without a plateau.
-    """
+    """Read the first pulse off a record; rejects one without front, end or plateau."""
     if len(values) < _FEWEST:
         _refuse(where, f"no pulse: {len(values)} samples")
     size = np.abs(values - np.median(values[: max(3, len(values) // 50)]))
@@ -125,7 +115,7 @@ def measure_pulse(time: Floats, values: Floats, where: str) -> Pulse:
 def _plateau(
     time: Floats, values: Floats, sign: float, rest: float, where: str
 ) -> tuple[float, float, float, float]:
-    """Level at rest, plateau above it, and where its half is crossed twice."""
+    """Rest, plateau above it, and where its half is crossed twice."""
     plateau = 0.5 * float(np.max(sign * (values - rest)))
     front = end = 0.0
     for _ in range(_ROUNDS):
@@ -166,7 +156,7 @@ def _require_plateau(time: Floats, x: Floats, front: float, end: float, where: s
 
 
 def _crossing(x: Floats, level: float, first: int, last: int, where: str) -> NDArray[np.int64]:
-    """Samples before which x rises through a level, at least one."""
+    """Samples before which x rises through a level."""
     above = x[first:last] >= level
     found = first + np.flatnonzero(~above[:-1] & above[1:])
     if len(found):
@@ -178,14 +168,14 @@ def _crossing(x: Floats, level: float, first: int, last: int, where: str) -> NDA
 
 
 def _instant(time: Floats, x: Floats, level: float, k: int) -> float:
-    """Where x is at a level on the straight line from sample k to the next [s]."""
+    """Where x is at a level after sample k, straight [s]."""
     return float(time[k] + (level - x[k]) / (x[k + 1] - x[k]) * (time[k + 1] - time[k]))
 
 
 def _period(time: Floats, x: Floats, rise: float) -> float:
-    """Time between the first two crests; nan where there are none.
+    """Time between the first two crests; nan without.
 
-    Noise is taken off with a bell of a sixth of the rise, to which nothing faster belongs.
+    A bell of a sixth of the rise takes off noise: nothing faster belongs to the pulse.
     """
     step = float(np.median(np.diff(time)))
     smooth = scipy.ndimage.gaussian_filter1d(x, max(_BELL * rise / step, 0.5))
@@ -197,7 +187,7 @@ def _period(time: Floats, x: Floats, rise: float) -> float:
 
 
 def _vertex(x: Floats, k: int) -> float:
-    """Top of the parabola through a crest and its neighbours, in samples."""
+    """Top of the parabola through a crest, in samples."""
     left, top, right = x[k - 1], x[k], x[k + 1]
     bend = left - 2.0 * top + right
     return k + 0.5 * float((left - right) / bend) if bend < 0.0 else float(k)
@@ -226,17 +216,17 @@ class PulseFit:
     .. math:: \min_{\tau, a} \sum_k \left[ a\, y(t_k + \tau) - x(t_k) \right]^2, \qquad
         a(\tau) = \frac{\sum x y}{\sum y^2}
 
-    from a little before the front of the measured pulse to a little behind its end.  In a linear
-    bar the factor is that of the speed.
+    from a little before the front to a little behind the end. In a linear bar the factor is that
+    of the speed.
 
     Parameters
     ----------
     shift [s]
-        Computed time minus measured time of the same instant.
+        Computed minus measured time.
     factor [-]
         Measured over computed.
     rms [-]
-        Root mean square of what is left, over the measured plateau.
+        RMS of the rest over the measured plateau.
     """
 
     shift: float
@@ -254,17 +244,7 @@ def fit_pulse(
     *,
     factor: float | None = None,
 ) -> PulseFit:
-    """Lay a computed pulse over a measured one.
-
-    Parameters
-    ----------
-    time, measured (n,)
-    pulse
-        Of it.
-    computed_time, computed (m,)
-    factor
-        Kept as it is; fitted by default.
-    """
+    """Align a computed pulse with a measured one, with a given or a fitted factor."""
     first = pulse.front - _BEFORE * pulse.length
     last = pulse.end + _BEHIND * pulse.length
     seen = (time >= first) & (time <= last)

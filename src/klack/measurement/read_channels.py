@@ -1,7 +1,7 @@
 """Channels of a recording in SI on one uniform time, whole or in windows.
 
-The fastest channel gives the time; the others are brought onto it along straight lines, which add
-no overshoot at a touch.  A channel whose samples lie on that time already stays as it was measured.
+The fastest channel gives the time; others are brought onto it along straight lines, which add no
+overshoot at a touch, unless their samples lie on it.
 """
 
 import warnings
@@ -30,13 +30,13 @@ _FEWEST, _MOST_SPIKES = 20, 10  # samples; more spikes are a signal
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommonTime:
-    """The uniform time of several channels, where all of them have values.
+    """Uniform time over which all channels have values.
 
     Parameters
     ----------
     start, step [s]
     notes
-        How channels were brought onto it, and what was assumed of them.
+        How channels were brought onto it, and assumptions.
     """
 
     start: float
@@ -48,10 +48,7 @@ class CommonTime:
 def common_time(recording: Recording, found: Mapping[Role, FoundChannel]) -> CommonTime:
     """Time of the fastest channel, cut to what all channels cover.
 
-    Raises
-    ------
-    InputError
-        If channels do not overlap in time, or a stored time is unusable.
+    Rejects channels that do not overlap.
     """
     bases = {name: base for name, (base, _) in _bases(recording, found).items()}
     fastest = min(bases.values(), key=lambda base: base.step)
@@ -90,24 +87,16 @@ def read_channels(
     first: int = 0,
     last: int | None = None,
 ) -> dict[Role, TimeSeries]:
-    """Read a window of all channels [SI].
+    """Read a window of all channels [SI], of one start, step and length.
+
+    Rejects empty windows and more than five missing values in a row.
 
     Parameters
     ----------
-    found : mapping of role to FoundChannel
-        One entry of :func:`klack.measurement.find_channels.find_channels`.
+    found
+        Of :func:`klack.measurement.find_channels.find_channels`.
     first, last
-        Samples of the common time, ``last`` not included; the whole of it by default.
-
-    Returns
-    -------
-    dict of role to TimeSeries
-        All of the same start, step and length.
-
-    Raises
-    ------
-    InputError
-        If the window is empty or more than five values in a row are missing.
+        Samples of the common time, ``last`` excluded; by default all.
     """
     clock = common_time(recording, found)
     last = clock.count if last is None else min(last, clock.count)
@@ -143,21 +132,14 @@ def windows(
     length: float,
     overlap: float = 0.0,
 ) -> Iterator[dict[Role, TimeSeries]]:
-    """Go through a long recording in windows, so that memory stays small.
+    """Windows of a long recording, as :func:`read_channels` gives them, so that memory stays small.
 
     Parameters
     ----------
-    found : mapping of role to FoundChannel
     length [s]
-        Of each window; the last may be shorter.
+        Of each; the last may be shorter.
     overlap [s]
-        Time that a window shares with the one before; a stroke not longer than this lies whole
-        in at least one window.
-
-    Yields
-    ------
-    dict of role to TimeSeries
-        As :func:`read_channels` gives them.
+        With the window before; a stroke not longer lies whole in one window.
     """
     clock = common_time(recording, found)
     size = max(round(length / clock.step), 2)
@@ -181,7 +163,7 @@ def windows(
 def _bases(
     recording: Recording, found: Mapping[Role, FoundChannel]
 ) -> dict[str, tuple[TimeBase, float]]:
-    """Time of each channel from the earliest start of them, and its start after that [s]."""
+    """Time of each channel from their earliest start, and its start after that [s]."""
     origins = {one.name: recording.channel(one.name).origin for one in found.values()}
     known = [origin for origin in origins.values() if origin is not None]
     result = {}
@@ -192,7 +174,7 @@ def _bases(
 
 
 def _started(recording: Recording, found: Mapping[Role, FoundChannel]) -> Iterator[str]:
-    """Which channels start later by the clock of the file, and which of them do not say."""
+    """Channels that start later by the clock of the file, and those that do not say."""
     where, bases = recording.path.name, _bases(recording, found)
     for name, (_, later) in bases.items():
         if later > 0.0:
@@ -244,7 +226,7 @@ def _values_at(
 def _tell_spikes(
     recording: Recording, name: str, start: float, step: float, values: Vector
 ) -> None:
-    """Warn of single samples that leave their neighbours by more than all others ever move."""
+    """Warn of single samples farther from their neighbours than all others ever move."""
     known = np.flatnonzero(np.isfinite(values))
     if known.size < _FEWEST:
         return
@@ -263,7 +245,7 @@ def _tell_spikes(
 
 
 def _filled(recording: Recording, name: str, at: Vector, values: Vector, time: Vector) -> Vector:
-    """Bridge a few missing values along straight lines; refuse many."""
+    """Bridge a few missing values along straight lines; reject many."""
     missing = ~np.isfinite(values)
     edges = np.diff(np.concatenate(([0], missing.astype(np.int8), [0])))
     begins, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)

@@ -1,8 +1,7 @@
 """A measured file: named channels, each read in windows of its samples.
 
-Every format has one class in :mod:`klack.measurement.files`.  What a file of a stranger holds is
-data: nothing of it is executed, no object of another program is rebuilt from it, and its sizes are
-checked before memory is asked for.
+Every format has a class in :mod:`klack.measurement.files`. Files are untrusted: nothing is
+executed, no foreign object is rebuilt, sizes are checked before memory is taken.
 """
 
 from abc import abstractmethod
@@ -23,7 +22,7 @@ __all__ = ["ChannelInfo", "Recording", "left_out", "some_names"]
 Vector = NDArray[np.float64]
 
 OVER_RANGE = 9.9e37
-"""IEEE 488.2 writes 9.9e37 for infinity and 9.91e37 for what is no number."""
+"""IEEE 488.2: 9.9e37 is infinity, 9.91e37 not a number."""
 _LARGEST_WINDOW = 200_000_000  # samples, 1.6 GB
 
 
@@ -34,23 +33,22 @@ class ChannelInfo:
     Parameters
     ----------
     name
-        As in the file, without its unit; different for every channel.
+        Without its unit; unique.
     unit
-        As the file says; empty if it does not.
+        Of the file, or empty.
     count
-        Number of samples.
+        Of samples.
     start [s]
-        Time of the first sample.
     step [s]
-        Mean time from sample to sample.
+        Mean.
     clock
         Name of the stored time; empty if the file gives start and step alone.
     label
-        Name and unit as the file writes them, ``"lift [um]"``.
+        Name and unit as written, ``"lift [um]"``.
     origin [ns]
-        When its time is zero, as the file says it by date and time of day; since 1970.
+        Zero of its time since 1970, where the file has date and time of day.
     unapplied
-        What the file says of a scale that klack does not know, ``"gain = 0.5"``.
+        A scale that klack does not know, ``"gain = 0.5"``.
     """
 
     name: str
@@ -65,12 +63,12 @@ class ChannelInfo:
 
 
 class Recording(Closing):
-    """Channels of one open file; use it in a ``with`` statement.
+    """Channels of an open file; use it in a ``with`` statement.
 
     Parameters
     ----------
     channels
-        In the order of the file, without its time.
+        In the order of the file, without time.
     notes
         What was assumed on opening.
     """
@@ -90,7 +88,7 @@ class Recording(Closing):
             )
 
     def channel(self, name: str) -> ChannelInfo:
-        """Find a channel by its name; raise :class:`InputError` with the names there are."""
+        """Channel of a name."""
         if name in self._by_name:
             return self._by_name[name]
         raise InputError(
@@ -103,7 +101,7 @@ class Recording(Closing):
     def read(self, name: str, first: int = 0, last: int | None = None) -> tuple[Vector, Vector]:
         """Time [s] and values [unit of the file] of samples ``first`` to before ``last``.
 
-        Samples outside the recording are left out; missing values are nan.
+        Limited to the recording; missing values are nan.
         """
         channel = self.channel(name)
         begin, end = self._window(channel, first, last)
@@ -120,7 +118,7 @@ class Recording(Closing):
         return self._time(channel, *self._window(channel, first, last))
 
     def time_base(self, name: str) -> TimeBase:
-        """Compare the time of a channel with a uniform one; its stored time is read once."""
+        """Channel time against a uniform one; a stored time is read once."""
         channel = self.channel(name)
         if not channel.clock:
             return TimeBase(
@@ -142,7 +140,7 @@ class Recording(Closing):
         return self._time_bases[key]
 
     def place(self, name: str, sample: int) -> str:
-        """What users know a sample by, for messages; formats of text override this."""
+        """Sample in words, for messages."""
         return f"sample {sample + 1}"
 
     def _window(self, channel: ChannelInfo, first: int, last: int | None) -> tuple[int, int]:
@@ -158,7 +156,7 @@ class Recording(Closing):
         return begin, end
 
     def _known(self, channel: ChannelInfo, first: int, last: int) -> Vector:
-        """Values, those out of range of any instrument as missing."""
+        """Values, nan where out of range of any instrument."""
         values = self._values(channel, first, last)
         over = ~(np.abs(values) < OVER_RANGE)
         return np.where(over, np.nan, values) if np.any(over) else values
@@ -168,13 +166,13 @@ class Recording(Closing):
         """Values of samples that exist, in the unit of the file."""
 
     def _time(self, channel: ChannelInfo, first: int, last: int) -> Vector:
-        """Time of samples that exist [s]: of even steps, or what a clock has stored."""
+        """Time of existing samples [s], even or stored."""
         if channel.clock:
             return self._clock_time(channel, first, last)
         return channel.start + channel.step * np.arange(first, last, dtype=np.float64)
 
     def _clock_time(self, channel: ChannelInfo, first: int, last: int) -> Vector:
-        """Stored time of samples that exist [s], of formats whose channels have a clock."""
+        """Stored time of existing samples [s]."""
         raise NotImplementedError
 
     def close(self) -> None:  # many formats hold nothing open
@@ -182,7 +180,7 @@ class Recording(Closing):
 
 
 def some_names(channels: Sequence[ChannelInfo], most: int = 12) -> str:
-    """Names of channels for an error text; the first of them if there are many."""
+    """Channel names for an error text, the first of many."""
     return _some([channel.name for channel in channels], most)
 
 
@@ -192,7 +190,7 @@ def _some(names: Sequence[str], most: int = 12) -> str:
 
 
 def left_out(file: str, reasons: Mapping[str, Sequence[str]]) -> Iterator[str]:
-    """Notes of what does not become a channel: names by reason."""
+    """Notes of what does not become a channel, by reason."""
     for reason, names in reasons.items():
         quoted = _some([f"'{name}'" for name in names])
         yield f"{file}: {quoted} left out: {reason}."

@@ -1,20 +1,20 @@
-r"""Numbers of a set of strokes: distributions, and the centric reference.
+r"""Measures of a set of strokes: distributions, and the centric reference.
 
-Every stroke is read alone first; then again, told what the other strokes say of the shape of its
-flights (:class:`klack.measurement.stroke_measures.FlightShape`), which they share.
+Every stroke is read alone first, then with the shape of the flights
+(:class:`klack.measurement.stroke_measures.FlightShape`) from the others.
 
-**The highest rebound.**  Off-axis a needle loses more to vibration, so the shot that rebounds
-highest is the nearest to a centric one.  But the largest of n measured values is large by scatter
-as well.  With measured scatter ``s`` and measurement error ``u`` (root mean square standard error)
-the scatter of the shots themselves is ``sigma = sqrt(max(s^2 - u^2, 0))``; for normal shots the
-expected largest true value of n is ``mean + sigma E_n``, the expected largest measured one ``mean +
-s E_n``, and the true value of the shot that measured highest ``mean + sigma^2 / s E_n``, with
+**The highest rebound.** Off-axis a needle loses more to vibration, so the highest rebound is the
+nearest to a centric one; but the largest of n measured values is also large by scatter. With
+measured scatter ``s`` and measurement error ``u`` (RMS standard error) the shots scatter by
+``sigma = sqrt(max(s^2 - u^2, 0))``; for normal shots the expected largest true value of n is
+``mean + sigma E_n``, the largest measured one ``mean + s E_n``, and the true value of the shot
+that measured highest ``mean + sigma^2 / s E_n``, with
 
 .. math:: E_n = \int_{-\infty}^{\infty} x \, n \, \varphi(x) \, \Phi(x)^{n - 1} \, \mathrm dx
 
-(David & Nagaraja 2003, eq. 3.1.1).  Without the normal law the same is done on the measured shots,
-shrunk towards their mean by ``sigma / s``: the expected maximum of n draws from them,
-``sum_i x_(i) ((i/n)^n - ((i-1)/n)^n)``.
+(David & Nagaraja 2003, eq. 3.1.1). Without the normal law: the expected maximum of n draws from
+the measured shots, shrunk towards their mean by ``sigma / s``, ``sum_i x_(i) ((i/n)^n -
+((i-1)/n)^n)``.
 """
 
 from collections.abc import Mapping, Sequence
@@ -70,14 +70,14 @@ _SE = {
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Column:
-    """One quantity of the first impact on one stop, over the strokes.
+    """One quantity of first impacts on one stop, over the strokes.
 
     Parameters
     ----------
     quantity, unit
         Among :data:`QUANTITIES`.
     values, errors (strokes,)
-        nan where a stroke does not have it; standard errors.
+        nan where missing; standard errors.
     """
 
     stop: Stop
@@ -103,12 +103,12 @@ class Column:
 
     @property
     def scatter(self) -> float:
-        """Standard deviation from stroke to stroke, as measured."""
+        """Measured standard deviation from stroke to stroke."""
         return float(np.std(self.known, ddof=1)) if self.known.size > 1 else float("nan")
 
     @property
     def error(self) -> float:
-        """Root mean square standard error of one value."""
+        """RMS standard error of one value."""
         used = self.errors[np.isfinite(self.values) & np.isfinite(self.errors)]
         return float(np.sqrt(np.mean(used**2))) if used.size else float("nan")
 
@@ -119,25 +119,25 @@ class Column:
 
 @dataclass(frozen=True, kw_only=True)
 class HighestRebound:
-    """The shot with the highest rebound, and what a maximum over n shots adds to it.
+    """The shot of highest rebound, and the bias of a maximum over n shots.
 
     Parameters
     ----------
     index
         Of the stroke.
     value, error
-        As measured, with its standard error.
+        Measured, with standard error.
     count
-        Shots it is the highest of.
+        n.
     scatter, own_scatter
-        Standard deviation of the measured values, and of the shots without measurement error.
+        s and sigma.
     normal_excess
-        Expected measured maximum minus expected true maximum, for normal scatter:
-        ``(s - sigma) E_n``; how much too high the highest reading is by measurement error.
+        ``(s - sigma) E_n``: how much too high the highest reading is by measurement error, for
+        normal scatter.
     expected
-        Expected true maximum of n shots, from the shots shrunk by their measurement error.
+        Expected true maximum, from the shrunk shots.
     above_median
-        ``expected`` minus the median: what choosing the highest of n adds.
+        ``expected`` minus the median.
     """
 
     index: int
@@ -159,13 +159,7 @@ class SetMeasures:
     strokes: tuple[StrokeMeasures, ...]
 
     def column(self, stop: Stop, quantity: str) -> Column:
-        """One quantity of the first impact on a stop.
-
-        Raises
-        ------
-        InputError
-            For a quantity that is not among :data:`QUANTITIES`.
-        """
+        """One of :data:`QUANTITIES` of the first impact on a stop."""
         if quantity not in QUANTITIES:
             raise InputError(
                 "quantity",
@@ -180,7 +174,7 @@ class SetMeasures:
         return np.array([stroke.bounces(stop) for stroke in self.strokes])
 
     def centric(self, stop: Stop, quantile: float | None = None) -> float:
-        """Restitution of the reference shot: of the highest rebound, or a quantile of all."""
+        """Restitution of the highest rebound, or a quantile of all."""
         column = self.column(stop, "restitution")
         if quantile is not None:
             return column.quantile(quantile)
@@ -190,13 +184,7 @@ class SetMeasures:
 def first_impact_column(
     stop: Stop, quantity: str, firsts: Sequence[MeasuredImpact | None]
 ) -> Column:
-    """One quantity of the first impacts of several strokes; nan where there is none.
-
-    Parameters
-    ----------
-    quantity
-        Among :data:`QUANTITIES`.
-    """
+    """The same of several strokes; nan without impact."""
     return Column(
         stop=stop,
         quantity=quantity,
@@ -213,20 +201,10 @@ def measure_set(
     opening: float | None = None,
     sensor: LiftSensor | None = None,
 ) -> SetMeasures:
-    """Read every stroke of a set.
+    """Read every stroke of a set, which has the channel ``lift``.
 
-    Parameters
-    ----------
-    strokes
-        With the channel ``lift``.
-    seat, opening [m]
-    sensor
-        See :func:`klack.measurement.impacts.measure_stroke`.
-
-    Raises
-    ------
-    InputError
-        If the strokes have no lift.
+    ``seat`` [m], ``opening`` [m] and ``sensor`` as of
+    :func:`klack.measurement.impacts.measure_stroke`.
     """
     if "lift" not in strokes.roles:
         raise InputError(
@@ -247,7 +225,7 @@ def measure_set(
 
 
 def expected_maximum(count: int) -> float:
-    """Expected largest of n draws from the standard normal law, ``E_n``.
+    """Expected largest of n standard normal draws, ``E_n``.
 
     Examples
     --------
@@ -265,18 +243,7 @@ def expected_maximum(count: int) -> float:
 
 
 def highest_rebound(column: Column) -> HighestRebound:
-    """Highest rebound of a set, and the bias of a maximum over n shots.
-
-    Parameters
-    ----------
-    column
-        Usually the rebound heights, or the restitution.
-
-    Raises
-    ------
-    InputError
-        If no stroke has the quantity.
-    """
+    """Highest rebound (height or restitution) of a set, and its bias."""
     known = column.known
     if not known.size:
         raise InputError(
@@ -311,7 +278,7 @@ def _value(impact: MeasuredImpact | None, name: str) -> float:
 
 
 def _others(strokes: Sequence[StrokeMeasures], skip: int) -> dict[Stop, FlightShape]:
-    """Shape of the flights on each stop, over all strokes but one."""
+    """Shape of the flights on each stop, from all strokes but one."""
     out: dict[Stop, FlightShape] = {}
     stops: tuple[Stop, ...] = ("opening", "seat")
     for stop in stops:
@@ -327,7 +294,7 @@ def _others(strokes: Sequence[StrokeMeasures], skip: int) -> dict[Stop, FlightSh
 
 
 def _mean(shapes: Sequence[FlightShape], name: str) -> dict[str, float]:
-    """Median over the strokes; error: what single strokes scatter about it, robustly."""
+    """Median over the strokes; error: robust scatter of single strokes."""
     values = np.array([getattr(shape, name) for shape in shapes])
     own = np.array([getattr(shape, f"{name}_se") for shape in shapes])
     middle = float(np.median(values))

@@ -1,21 +1,19 @@
 r"""Uncertainty of fitted parameters when whole strokes scatter, not single samples.
 
-Noise of the samples averages out over the thousands of them in a stroke; what makes one stroke open
-later than the next does not: all residuals of one stroke move together.  The usual covariance
-``s^2 (J^T J)^-1`` takes samples for independent and is far too small.  Strokes, however, are
-independent of each other, so each one is asked alone where it would have put the parameters,
+Noise averages out over the thousands of samples of a stroke, differences between strokes do not:
+the residuals of one stroke move together. The usual covariance ``s^2 (J^T J)^-1`` of independent
+samples is far too small. Strokes are independent; each alone would give the parameters
 
 .. math:: \theta_s = \theta + (J^T W J)^{-1} J^T W r_s, \qquad
           C = \frac{1}{n (n - 1)} \sum_s (\theta_s - \bar\theta)(\theta_s - \bar\theta)^T ,
 
-one Gauss-Newton step per stroke with residuals ``r_s = y_s - f(theta)``.  This is the "sandwich" of
-White (1980) with whole strokes as clusters (Liang & Zeger 1986): right for any weights *W*, and for
-any correlation within a stroke.  Intervals take Student's t with ``n - 1`` degrees of freedom.
-Since all strokes share *J*, their sum of squares and that of their mean have the same normal
-equations: fitting the mean stroke is fitting all strokes.
+one Gauss-Newton step with residuals ``r_s = y_s - f(theta)``. This "sandwich" of White (1980) with
+strokes as clusters (Liang & Zeger 1986) is right for any weights *W* and any correlation within a
+stroke. Intervals take Student's t with ``n - 1`` degrees of freedom. Since strokes share *J*,
+fitting the mean stroke is fitting all strokes.
 
-Limits: strokes scatter little enough for one linear step; with few strokes (n near the number of
-parameters) the correlations, not the single errors, become unreliable.
+Limits: scatter is small enough for one linear step; with few strokes (n near the number of
+parameters) correlations, not single errors, become unreliable.
 """
 
 from collections.abc import Sequence
@@ -41,7 +39,7 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 _NOTHING = 1e-9
-"""Sensitivity relative to the largest one below which the data do not depend on a parameter."""
+"""Relative sensitivity below which the data do not depend on a parameter."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -53,9 +51,9 @@ class ShotCovariance:
     covariance (p, p)
         inf on the diagonal of parameters that the data do not see.
     degrees
-        Degrees of freedom of Student's t.
+        Of freedom of Student's t.
     estimates (n, p)
-        Parameters of every stroke alone; empty when they are not known.
+        Of every stroke alone, or empty.
     """
 
     covariance: Matrix
@@ -69,17 +67,17 @@ class ShotCovariance:
 
     @property
     def quantile(self) -> float:
-        """Standard errors from the value to each end of the 95 % interval."""
+        """Standard errors to each end of the 95 % interval."""
         return float(scipy.stats.t.ppf(0.975, self.degrees))
 
     @property
     def correlation(self) -> Matrix:
-        """Correlation of the estimates, shape (p, p); 0 for parameters without effect."""
+        """Correlation (p, p); 0 for parameters without effect."""
         return correlation_of(self.covariance)
 
 
 def correlation_of(covariance: Matrix) -> Matrix:
-    """Correlation matrix of a covariance; 0 where a variance is 0 or infinite."""
+    """Correlation matrix; 0 where a variance is 0 or infinite."""
     deviation = np.sqrt(np.diag(covariance))
     known = np.isfinite(deviation) & (deviation > 0.0)
     scale = np.where(known, 1.0 / np.where(known, deviation, 1.0), 0.0)
@@ -95,19 +93,14 @@ def seen_by_data(jacobian: Matrix, weights: Vector) -> NDArray[np.bool_]:
 
 
 def shot_estimates(jacobian: Matrix, weights: Vector, residuals: Matrix) -> Matrix:
-    """Parameter step of each single stroke.
+    """Parameter step of each stroke, shape (n, p); nan for parameters that the data do not see.
 
     Parameters
     ----------
     jacobian (m, p)
     weights (m,)
     residuals (n, m)
-        Measured less computed, stroke by stroke.
-
-    Returns
-    -------
-    (n, p)
-        nan for parameters that the data do not see.
+        Measured less computed.
     """
     root = np.sqrt(weights)
     seen = seen_by_data(jacobian, weights)
@@ -122,7 +115,7 @@ def shot_estimates(jacobian: Matrix, weights: Vector, residuals: Matrix) -> Matr
 def shot_covariance(jacobian: Matrix, weights: Vector, residuals: Matrix) -> ShotCovariance:
     """Covariance of the parameters from the scatter of two or more strokes.
 
-    Parameters are as for :func:`shot_estimates`.
+    Arguments as of :func:`shot_estimates`.
     """
     steps = shot_estimates(jacobian, weights, residuals)
     seen = ~np.isnan(steps[0])
@@ -136,9 +129,8 @@ def shot_covariance(jacobian: Matrix, weights: Vector, residuals: Matrix) -> Sho
 def noise_covariance(jacobian: Matrix, weights: Vector, residual: Vector) -> ShotCovariance:
     """Covariance from the residuals of a single stroke: its own noise, no scatter of strokes.
 
-    ``C = s^2 tau (J^T W J)^-1`` with the number ``tau`` of samples that move together, taken from
-    the autocorrelation of the weighted residuals up to its first zero.  Too small as soon as
-    strokes differ, which one stroke cannot tell.
+    ``C = s^2 tau (J^T W J)^-1``, with ``tau`` samples that move together by the autocorrelation of
+    the weighted residuals up to its first zero. Too small as soon as strokes differ.
     """
     seen = seen_by_data(jacobian, weights)
     used = weights > 0.0
@@ -177,20 +169,20 @@ _MOST_PART = 0.3
 class Identifiability:
     """Identifiability from the sensitivities alone, without scatter.
 
-    With the Jacobian scaled by the bounds, ``J`` by ``z``, and weights *W*, the singular values of
-    ``W^1/2 J`` say by how many standard deviations of the data the model moves when a combination
-    of parameters (the right singular vector) crosses its bounds; small ones are combinations that
-    the data do not see (Bellman & Aström 1970; Belsley, Kuh & Welsch 1980, ch. 3).
+    With the Jacobian ``J`` by ``z`` and weights *W*, the singular values of ``W^1/2 J`` say by how
+    many standard deviations of the data the model moves when a combination of parameters (right
+    singular vector) crosses its bounds; the data do not see small ones (Bellman & Aström 1970;
+    Belsley, Kuh & Welsch 1980, ch. 3).
 
     Parameters
     ----------
     singular_values (p,) [-]
-        Falling; of the weighted Jacobian by the scaled parameters.
+        Falling.
     directions (p, p) [-]
-        Rows: the combinations that belong to them.
+        Combinations in rows.
     correlation (p, p) [-]
-        Of the estimates for independent samples of the weights' variance: a property of what was
-        measured, not of how the strokes scatter.
+        Of the estimates for independent samples: a property of what was measured, not of the
+        scatter of strokes.
     """
 
     singular_values: NDArray[np.float64]
@@ -199,7 +191,7 @@ class Identifiability:
 
 
 def identifiability(jacobian: NDArray[np.float64], weights: NDArray[np.float64]) -> Identifiability:
-    """Judge a Jacobian, shape (m, p) by the scaled parameters, with weights (m,)."""
+    """Judge a Jacobian (m, p) by the scaled parameters, with weights (m,)."""
     A = np.sqrt(weights)[:, None] * jacobian
     _, values, directions = np.linalg.svd(A, full_matrices=False)
     seen = seen_by_data(jacobian, weights)
@@ -217,15 +209,7 @@ def identifiability_warnings(
     found: Identifiability,
     covariance: ShotCovariance,
 ) -> tuple[str, ...]:
-    """Warnings on what the data do not determine.
-
-    Parameters
-    ----------
-    z (p,) [-]
-        Scaled parameters where the fit ended.
-    covariance
-        Of the scaled parameters.
-    """
+    """Warnings on what the data do not determine, by scaled parameters z and their covariance."""
     C, error = covariance.covariance, covariance.standard_error
     notes = [
         f"The data do not depend on '{name}': it stays at its start value. "
@@ -267,7 +251,7 @@ def identifiability_warnings(
 def _wide_combinations(
     names: Sequence[str], C: NDArray[np.float64], alone: NDArray[np.bool_]
 ) -> list[str]:
-    """Combinations of parameters that may cross their bounds within one standard error."""
+    """Combinations that may cross their bounds within one standard error."""
     known = np.isfinite(np.diag(C)) & ~alone
     if known.sum() < 2:
         return []

@@ -24,19 +24,19 @@ _LEAST_SHARE = 0.01  # of the span
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SmoothLift:
-    """Lift and velocity from which events are found; numbers are fitted to the raw lift.
+    """Lift and velocity for finding events; measures are fitted to the raw lift.
 
     Parameters
     ----------
     lift, velocity (n,) [m], [m/s]
     noise [m]
-        White noise of one raw sample.
+        Of one raw sample, white.
     lift_noise, velocity_noise [m], [m/s]
-        Standard deviation that is left in the smoothed ones.
+        Standard deviations left.
     half
         Half window [samples].
     least_height [m]
-        Motion below this is not told from noise or from vibration.
+        Motion below it may be noise or vibration.
     """
 
     lift: NDArray[np.float64]
@@ -50,13 +50,7 @@ class SmoothLift:
 
 @dataclass(frozen=True, kw_only=True)
 class StopLevels:
-    """Levels of rest; nan where the needle never rests.
-
-    Parameters
-    ----------
-    seat, opening [m]
-    seat_se, opening_se [m]
-    """
+    """Levels of rest [m]; nan where the needle never rests."""
 
     seat: float
     opening: float
@@ -65,7 +59,7 @@ class StopLevels:
 
 
 def smooth_lift(time: NDArray[np.float64], lift: NDArray[np.float64]) -> SmoothLift:
-    """Lift as cubic windows smooth it: as wide as the noise demands, at least 20 us."""
+    """Lift smoothed by cubic windows as wide as the noise demands, at least 20 us."""
     step = float(time[-1] - time[0]) / (time.size - 1)
     chosen: VelocityEstimate = velocity_of(time, lift)
     narrow = max(2, round(0.5 * _LEAST_SMOOTHING / step))
@@ -89,11 +83,11 @@ def smooth_lift(time: NDArray[np.float64], lift: NDArray[np.float64]) -> SmoothL
 def find_levels(
     time: NDArray[np.float64], lift: NDArray[np.float64], smooth: SmoothLift
 ) -> StopLevels:
-    """Levels of rest at the lower and upper end of the motion: medians over half a rest.
+    """Levels of rest at both ends of the motion: medians over half a rest.
 
-    The needle rests where its speed stays below 3 % of the fastest motion (and within its noise)
-    for 25 us, at most 12 % of the span away from the ends of the motion; not where its speed runs
-    evenly from one bound to the other, as in a turning point.
+    The needle rests where its speed is below 3 % of the fastest (and within its noise) for 25 us,
+    within 12 % of the span from an end; not where its speed runs evenly from bound to bound, as in
+    a turning point.
     """
     step = float(time[-1] - time[0]) / (time.size - 1)
     low, high = np.quantile(smooth.lift, (0.002, 0.998))
@@ -123,7 +117,7 @@ def _runs(mask: NDArray[np.bool_], least: int) -> list[tuple[int, int]]:
 
 
 def _first_rest(lift: NDArray[np.float64], noise: float, least: int) -> list[tuple[int, int]]:
-    """Samples from the start of a record that lie within its noise, if there are enough."""
+    """First samples within the noise, if enough."""
     level = float(np.median(lift[:least]))
     beyond = np.flatnonzero(np.abs(lift - level) > _NOISE * noise)
     count = int(beyond[0]) if beyond.size else lift.size
@@ -141,7 +135,7 @@ def _level(lift: NDArray[np.float64], run: tuple[int, int]) -> float:
 
 
 def _settled(run: tuple[int, int]) -> tuple[int, int]:
-    """Half of a rest: away from the motion, and from the last small bounces."""
+    """Half of a rest: away from motion and last small bounces."""
     middle = (run[0] + run[1]) // 2
     return (0, middle) if run[0] == 0 else (middle, run[1])
 
@@ -170,9 +164,9 @@ class Touch:
     Parameters
     ----------
     index
-        Sample of the turn, or of the arrival if it does not turn.
+        Of the turn, or of the arrival.
     rebounds
-        Whether a rebound above the noise follows.
+        Above the noise.
     """
 
     stop: Stop
@@ -181,17 +175,11 @@ class Touch:
 
 
 def find_touches(smooth: SmoothLift, levels: Mapping[Stop, float]) -> tuple[Touch, ...]:
-    """Impacts on the given stops, in order of time.
+    """Impacts on the given stops [m], in order of time.
 
-    An impact is a turn of the lift near a stop and away from it, higher than
-    ``smooth.least_height`` on both sides; or an arrival after which nothing more is seen.  A turn
-    in free flight (the top of a bounce that comes near the other stop) bends no sharper than the
-    flight beside it and is not counted.
-
-    Parameters
-    ----------
-    levels : mapping of stop to float [m]
-        Of the stops that exist.
+    An impact is a turn of the lift near a stop, higher than ``smooth.least_height`` on both sides,
+    or an arrival after which nothing more is seen. A turn in free flight (the top of a bounce near
+    the other stop) bends no sharper than the flight beside it and does not count.
     """
     touches: list[Touch] = []
     span = float(np.ptp(smooth.lift))
@@ -208,7 +196,7 @@ def find_touches(smooth: SmoothLift, levels: Mapping[Stop, float]) -> tuple[Touc
 
 
 def _touching_turns(away: NDArray[np.float64], smooth: SmoothLift, span: float) -> list[int]:
-    """Samples at which a distance from a stop is least, near the stop."""
+    """Samples of least distance from a stop, near it."""
     inner = away[smooth.half : away.size - smooth.half]  # its smoothed ends are noisy
     peaks, found = scipy.signal.find_peaks(-inner, prominence=smooth.least_height)
     peaks = peaks + smooth.half
@@ -226,7 +214,7 @@ def _touching_turns(away: NDArray[np.float64], smooth: SmoothLift, span: float) 
 
 
 def _sharp(away: NDArray[np.float64], peak: int, half: int) -> bool:
-    """Whether the motion bends more in a turn than beside it, over windows of one width."""
+    """Whether the motion bends more in a turn than beside it."""
     w = 2 * half
 
     def bend(middle: int) -> float:
@@ -242,7 +230,7 @@ def _sharp(away: NDArray[np.float64], peak: int, half: int) -> bool:
 
 
 def _arrivals(away: NDArray[np.float64], smooth: SmoothLift, span: float) -> list[int]:
-    """Samples at which the needle arrives from a distance and stays."""
+    """Samples at which the needle arrives and stays."""
     here = max(smooth.least_height, 0.01 * span)
     far = 2.0 * here
     out: list[int] = []

@@ -1,4 +1,4 @@
-"""Strokes of a measurement on one time, and the numbers that were measured of a stroke."""
+"""Strokes of a measurement on one time, and the measures of a stroke."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -23,14 +23,14 @@ Stop = Literal["opening", "seat"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightShape:
-    """Common parameters of the flights on one stop, each with its standard error.
+    """Common parameters of flights on one stop, with standard errors.
 
     Parameters
     ----------
     acceleration, acceleration_se [m/s^2]
         Towards the stop, at the turning point, mean of rise and fall.
     stiffness, stiffness_se [1/s^2]
-        Of the spring, over the mass: change of the acceleration with lift.
+        Change of the acceleration with lift.
     friction, friction_se [-]
         Over the mean force.
     """
@@ -47,23 +47,22 @@ class FlightShape:
 class MeasuredImpact:
     """One impact, as lift alone shows it.
 
-    Speeds are those of the smooth flight before and after, carried on to the level of the stop:
-    what the elastic needle does beside it is averaged out.  ``*_se`` are standard errors.
+    Speeds are those of smooth flight, continued to the level of the stop: vibration of the needle
+    is averaged out. ``*_se`` are standard errors.
 
     Parameters
     ----------
     time, time_se [s]
-        First touch: the approaching flight reaches the level of the stop.
+        First touch.
     release, release_se [s]
-        The rebounding flight leaves it; nan without a rebound.
+        nan without a rebound.
     approach_speed, approach_se [m/s]
         Above zero; nan if the flight is too short to be fitted.
     rebound_speed, rebound_se [m/s]
-        0 where nothing above the noise is seen; nan if the flight is too short to be fitted.
+        0 where nothing above the noise is seen; nan as before.
     restitution, restitution_se [-]
-        Rebound over approach speed.
     rebound_height, rebound_height_se [m]
-        Largest distance from the stop in the flight after it; nan if the flight ends elsewhere.
+        Largest distance from the stop; nan if the flight ends elsewhere.
     period, period_se [s]
         To the next first touch on the same stop; nan after the last.
     acceleration [m/s^2]
@@ -95,20 +94,20 @@ class MeasuredImpact:
 
 @dataclass(frozen=True, kw_only=True)
 class StrokeMeasures:
-    """All impacts of a stroke, and the levels between which it moved.
+    """All impacts of a stroke, and the levels of rest.
 
     Parameters
     ----------
     impacts
         In order of time.
     seat_level, opening_level [m]
-        Lift at which the needle rests on the stop; nan for a stop that was not met.
+        nan for a stop that was not met.
     level_se [m]
-        Standard error of the levels.
+        Standard error.
     noise [m]
-        Standard deviation of the lift about the fitted flights.
+        Standard deviation about the fitted flights.
     least_height [m]
-        Bounces lower than this are not told from noise, and not counted.
+        Lower bounces do not count.
     notes
         What could not be done, and why.
     shapes : mapping of stop to FlightShape
@@ -138,7 +137,7 @@ class StrokeMeasures:
         return next(iter(self.on(stop)), None)
 
     def bounces(self, stop: Stop) -> int:
-        """Number of times the needle left a stop again, higher than :attr:`least_height`."""
+        """Times that the needle left a stop, higher than :attr:`least_height`."""
         return sum(impact.rebound_speed != 0.0 for impact in self.on(stop))
 
 
@@ -149,11 +148,11 @@ class MeasuredStroke:
     Parameters
     ----------
     name
-        Where it comes from, for example ``"bench.mf4 #12"`` or ``"bench.csv lift_12"``.
+        Source, as ``"bench.mf4 #12"`` or ``"bench.csv lift_12"``.
     values (n,)
-        By role (see :data:`klack.measurement.channels.ROLES`), SI, all on the time axis of the set.
+        By role, SI, on the time axis of the set.
     start [s]
-        Time of the trigger in the recording.
+        Trigger in the recording.
     """
 
     name: str
@@ -180,9 +179,9 @@ class StrokeSet:
     time (n,) [s]
         Uniform, zero at the trigger.
     strokes
-        Those that are used.
+        Not discarded.
     notes
-        What the reader of a report must know: units assumed, channels found by their name, ...
+        For a report: units assumed, channels found by name, ...
     """
 
     source: str

@@ -1,7 +1,7 @@
-"""Is a stored time uniform?  How a recording is brought onto one uniform time.
+"""How uniform a stored time is, and how it is brought onto one uniform time.
 
-Stored times jitter because clocks do, because they are written with few digits, or because samples
-were lost.  The first two are told apart by the steps: rounding makes steps of two lengths only.
+Stored times jitter with the clock, by few digits, or by lost samples. Rounding makes steps of two
+lengths only.
 """
 
 from collections.abc import Callable
@@ -26,20 +26,20 @@ _LENGTHS = 6  # distinct lengths of steps that are kept
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TimeBase:
-    """Times of a channel, compared with ``start + step * k``.
+    """Channel times, compared with ``start + step * k``.
 
     Parameters
     ----------
     start, end [s]
-        Time of the first and the last sample.
+        Of the first and last sample.
     step [s]
-        Mean step of a uniform time, median step of an uneven one.
+        Mean of a uniform time, median of an uneven one.
     uniform
-        True if the samples can be taken as they are.
+        Samples can be taken as they are.
     note
-        What was found if it is not perfect, to follow the names of its channels.
+        What is not perfect, to follow the names of channels.
     marks (m,) [s]
-        Time of every 2^20th sample, by which windows of uneven times are found.
+        Every 2^20th sample, to find windows of uneven times.
     """
 
     start: float
@@ -57,7 +57,7 @@ class TimeBase:
         )
 
     def samples(self, begin: float, end: float) -> tuple[int, int]:
-        """Range of samples that covers the times ``begin`` to ``end``, and a few more."""
+        """Samples that cover ``begin`` to ``end``, and a few more."""
         if self.uniform:
             first = int(np.floor((begin - self.start) / self.step)) - 1
             last = int(np.ceil((end - self.start) / self.step)) + 2
@@ -72,17 +72,15 @@ def survey_time(
 ) -> TimeBase:
     """Go through a stored time once, in blocks.
 
+    Rejects a time that stands still, goes back, has no value, or leaves out more than five
+    samples.
+
     Parameters
     ----------
     read
         Times [s] of samples first to before last.
     place
-        What a sample is called there, counted from 0.
-
-    Raises
-    ------
-    InputError
-        If the time stands still, goes back, has no value, or leaves out more than five samples.
+        A sample in words.
     """
     if count < 2:
         raise InputError(
@@ -136,7 +134,7 @@ def survey_time(
 def _check_order(
     steps: Vector, time: Vector, first: int, where: str, place: Callable[[int], str]
 ) -> None:
-    """Raise where the time is constant, decreasing, missing or without end."""
+    """Reject constant, decreasing, missing or endless times."""
     wrong = np.flatnonzero(~((steps > 0) & (steps < np.inf)))
     if wrong.size == 0:
         return
@@ -152,28 +150,23 @@ def _check_order(
 
 
 def _two_lengths(lengths: list[float]) -> bool:
-    """True if all steps are of two lengths, as rounding makes them."""
+    """True if steps have two lengths, by rounding."""
     return len(lengths) <= _LENGTHS and np.count_nonzero(np.diff(lengths) > 2e-3) == 1
 
 
 _JITTER = 0.01
-"""Largest deviation of a sample from a uniform axis, in steps: text files round their times."""
+"""Largest deviation of a sample from a uniform axis, in steps."""
 
 
 def uniform_step(time: NDArray[np.float64], where: str) -> float:
     """Step of a uniform time axis [s].
 
+    Rejects a time more than 1 % of a step beside the uniform axis, or not rising.
+
     Parameters
     ----------
     time (n,) [s]
-        At least two times.
-    where
-        Named in the error.
-
-    Raises
-    ------
-    InputError
-        If a time is more than 1 % of a step beside the uniform axis, or the time does not rise.
+        Two at least.
     """
     n = time.size
     step = float(time[-1] - time[0]) / (n - 1) if time.ndim == 1 and n > 1 else 0.0

@@ -1,8 +1,7 @@
 """Units as people write them into measured files: ``[µm]``, ``mm``, ``m/s²``, ``bar(g)``.
 
-A case file has one spelling for each unit (:mod:`klack.units`); files of other programs have many.
-The usual ones stand in a table, all others go through :func:`klack.units.parse_quantity`.  Upper
-and lower case matter, because mN is not MN.
+The usual spellings are in a table, others go through :func:`klack.units.parse_quantity`. Case
+matters: mN is not MN.
 """
 
 from collections.abc import Mapping
@@ -77,7 +76,7 @@ _TABLE: Mapping[Role, Mapping[str, float]] = {
         "lbf": 4.4482216152605,
     },
 }
-"""Factors to SI by role; what one role reads as g (acceleration) no other role reads as a mass."""
+"""Factors to SI by role; g (acceleration) is no mass in other roles."""
 
 _TIMES: Mapping[str, float] = {
     **dict.fromkeys(
@@ -94,13 +93,13 @@ _GAUGE = {"barg", "barG", "bar(g)", "bar g", "bar rel", "psig"}
 
 @dataclass(frozen=True, slots=True)
 class UnitFactor:
-    """From the numbers of a file to SI: ``factor * number + offset``.
+    """Numbers of a file to SI: ``factor * number + offset``.
 
     Parameters
     ----------
     factor [SI unit per unit of the file]
     offset [SI unit]
-        Of units with a zero of their own, such as gauge pressure.
+        As of gauge pressure.
     """
 
     factor: float
@@ -122,26 +121,19 @@ def plain_unit(text: str) -> str:
 
 
 def no_unit(text: str) -> bool:
-    """True if a file says with this text that there is no unit, or nothing at all."""
+    """True for a text that means no unit, or nothing."""
     return plain_unit(text).lower() in _NONE
 
 
 def unit_factor(text: str, quantity: Role | Kind, where: str) -> UnitFactor:
-    """Read a unit of a file for a quantity that is known.
+    """Read a unit of a file for a known quantity.
 
     Parameters
     ----------
     text
-        As the file has it, with or without brackets.
+        With or without brackets.
     quantity
-        What the channel is; ``klack.units.TIME`` for a time.
-    where
-        File and channel, for the error.
-
-    Raises
-    ------
-    InputError
-        If the unit is unknown, missing, or of another kind.
+        Of the channel; ``klack.units.TIME`` for a time.
 
     Examples
     --------
@@ -183,7 +175,7 @@ def unit_factor(text: str, quantity: Role | Kind, where: str) -> UnitFactor:
 
 
 def roles_of_unit(text: str) -> tuple[Role, ...]:
-    """Roles whose usual units include this one; none if it is unusual or missing.
+    """Roles whose usual units include this one.
 
     Examples
     --------

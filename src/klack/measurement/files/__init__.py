@@ -1,1 +1,1 @@
-"""One reader per file format; all of them are a :class:`klack.measurement.recording.Recording`."""
+"""One reader per file format, each a :class:`klack.measurement.recording.Recording`."""

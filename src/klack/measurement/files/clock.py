@@ -1,4 +1,4 @@
-"""Which of the arrays of a file is its time, in which unit, and when it is zero."""
+"""Which array of a file is its time, in which unit, and when it is zero."""
 
 import re
 from calendar import timegm
@@ -26,7 +26,7 @@ __all__ = [
 
 
 SLOWEST = 1e-3  # [s]
-"""Longest step at which a time without unit passes as seconds: lift is measured faster."""
+"""Longest step at which a time without unit passes as seconds."""
 
 _NAME = re.compile(
     r"(t|time|date[ /_-]?time|zeit|timestamps?|time[ _-]?stamp|timechannel|abtastzeit|messzeit|"
@@ -48,7 +48,7 @@ _INSTANT = re.compile(
 
 
 def instant(text: str) -> int | None:
-    """Date and time of day since 1970 [ns]; None if the text is something else.
+    """Date and time of day since 1970 [ns]; None for other texts.
 
     Examples
     --------
@@ -69,7 +69,7 @@ def instant(text: str) -> int | None:
 
 
 def since(unit: str) -> tuple[str, int | None]:
-    """Unit and zero [ns] of a time in the manner of netCDF, ``seconds since 2026-03-02 08:00``."""
+    """Unit and zero [ns] of a time as netCDF has it, ``seconds since 2026-03-02 08:00``."""
     plain, _, zero = unit.partition(" since ")
     return (plain.strip(), instant(zero)) if zero else (unit, None)
 
@@ -91,17 +91,14 @@ def is_clock(name: str, unit: str) -> bool:
 def clock_factor(unit: str, step: float, where: str) -> tuple[float, str]:
     """Seconds per unit of a stored time, and a note if the unit was assumed.
 
+    Rejects a missing unit where seconds would make a recording slower than 1 kHz.
+
     Parameters
     ----------
     unit
-        As the file says; may be empty.
+        Of the file; may be empty.
     step [unit]
-        Mean step of the time.
-
-    Raises
-    ------
-    InputError
-        If there is no unit and seconds would make a recording slower than 1 kHz.
+        Mean.
     """
     if not no_unit(unit):
         return unit_factor(unit, TIME, where).factor, ""
@@ -133,7 +130,7 @@ def unique_names(names: list[str]) -> list[str]:
 
 
 def no_clock(where: str, looked_at: str = "") -> InputError:
-    """Error of a file without any time; what was looked at is said."""
+    """Error of a file without time; names what was looked at."""
     return InputError(
         where,
         got="no time" + looked_at,
@@ -160,9 +157,9 @@ _OF_THE_FILE = re.compile(r"(wf_|ni_|dimension|class$|name$|_netcdf|crest)", re.
 def unpacked(about: About) -> Callable[[Vector], Vector] | None:
     """Function from stored numbers to values; None if they are the values.
 
-    Known are those of netCDF: ``value = stored * scale_factor + add_offset``; stored numbers equal
-    to ``_FillValue`` or ``missing_value``, or outside ``valid_min`` to ``valid_max``, are missing.
-    Any other key that sounds like a scale makes the numbers doubtful: what it means is not guessed.
+    As netCDF: ``value = stored * scale_factor + add_offset``; ``_FillValue``, ``missing_value``
+    and numbers outside ``valid_min`` to ``valid_max`` are missing. Any other key that sounds like
+    a scale makes the numbers doubtful: its meaning is not guessed.
     """
     factor, offset = _number(about, _FACTOR, 1.0), _number(about, _OFFSET, 0.0)
     missing = [value for key in _MISSING if isinstance(value := about.get(key), float)]
@@ -183,7 +180,7 @@ def _number(about: About, key: str, otherwise: float) -> float:
 
 
 def unknown_scales(about: Mapping[str, object], known: Collection[str] = ()) -> str:
-    """Keys that sound like a scale, with their values; those that change nothing are left out.
+    """Keys that sound like a scale and change something, with their values.
 
     Those that are ``known`` are applied, if they are numbers.
     """

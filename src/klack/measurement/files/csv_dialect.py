@@ -1,8 +1,7 @@
 """Dialect of a text table: encoding, separator, decimal mark and header.
 
-Separator and decimal mark are those with which the most lines, looked at in the beginning, the
-middle and the end of the file, become rows of numbers of the same length.  The header is what
-stands above the first such row.
+Separator and decimal mark are those with which most lines, in the beginning, the middle and the
+end of the file, become rows of numbers of one length. The header is above the first such row.
 """
 
 import re
@@ -76,7 +75,7 @@ class Dialect:
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """Name, unit and text of the header of one column."""
+    """Name, unit and header text of a column."""
 
     name: str
     unit: str
@@ -84,7 +83,7 @@ class Column:
 
 
 def encoding_of(head: bytes) -> str:
-    """Encoding of a text by its first bytes: UTF-8, UTF-16 (also without mark), or Latin-1."""
+    """Encoding by the first bytes: UTF-8, UTF-16 (also without mark), Latin-1."""
     if head[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return "utf-16"
     if head[:3] == b"\xef\xbb\xbf":
@@ -111,10 +110,8 @@ def find_dialect(head: Sequence[str], samples: Iterable[str]) -> Dialect | None:
 
     Parameters
     ----------
-    head
-        First lines of the file.
     samples
-        Complete lines from anywhere in the file.
+        Complete lines from anywhere.
     """
     lines = [line for line in samples if line.strip() and line.lstrip()[0] not in "#%!"]
     best, most = None, (0, 0, 0)
@@ -138,7 +135,7 @@ def find_dialect(head: Sequence[str], samples: Iterable[str]) -> Dialect | None:
 
 
 def _one_or_two(head: Sequence[str], lines: Sequence[str], found: Dialect) -> Dialect:
-    """Distinguish ``0,5`` as one column with a decimal comma from two columns, by the header."""
+    """Whether ``0,5`` is one column with a decimal comma or two, by the header."""
     alone = Dialect("", ",", 1)
     rows = [line for line in lines if _width(line, found.separator, found.decimal)]
     if any(_width(line, alone.separator, alone.decimal) != 1 for line in rows):
@@ -148,7 +145,7 @@ def _one_or_two(head: Sequence[str], lines: Sequence[str], found: Dialect) -> Di
 
 
 def _width(line: str, separator: str, decimal: str) -> int:
-    """Cells of a row of numbers, without empty ones at its end; 0 if it is none."""
+    """Cells of a row of numbers, without empty ones at its end; else 0."""
     cells = _cells(line, separator)
     while cells and not cells[-1]:
         cells.pop()
@@ -162,7 +159,7 @@ def _width(line: str, separator: str, decimal: str) -> int:
 
 
 def first_row(lines: Sequence[str], dialect: Dialect) -> int:
-    """Index of the first row of numbers that is followed by more; their count if there is none."""
+    """Index of the first row of numbers followed by more; their count without."""
     at = [
         k
         for k, line in enumerate(lines)
@@ -176,7 +173,7 @@ def first_row(lines: Sequence[str], dialect: Dialect) -> int:
 
 
 def rows_above(header: Sequence[str], dialect: Dialect) -> list[int]:
-    """Lines of a header that are rows of a table of several columns: whole, or the damaged last."""
+    """Header lines that are rows of a table of several columns: whole, or the damaged last."""
     if dialect.width < 2:
         return []
     found = [
@@ -199,9 +196,9 @@ def _like_number(cell: str) -> bool:
 def read_columns(header: Sequence[str], dialect: Dialect) -> tuple[Column, ...] | None:
     """Names and units from the lines above the numbers; None without a row of names.
 
-    A row of names has a cell for every column.  Below it there may be a row of units; without it
-    units are looked for in the names: ``lift [um]``, ``lift (um)``, ``lift / um``, ``lift_um``.
-    Where blanks separate, any sentence looks like a row of names: only the last lines count.
+    A row of names has a cell for every column; a row of units may follow, else see
+    :func:`split_label`. Where blanks separate, any sentence looks like names: only the last lines
+    count.
     """
     lines = [line for line in header if line.strip(dialect.comments + "/ \t\r\n")]
     if not dialect.separator:
@@ -223,7 +220,7 @@ def read_columns(header: Sequence[str], dialect: Dialect) -> tuple[Column, ...] 
 
 
 def _named_after(above: Sequence[str], cells: Sequence[str]) -> bool:
-    """Whether only the row above names a time with its unit, and this is no row of units."""
+    """Whether the row above alone names a time with unit, and this is no row of units."""
     first, unit = split_label(above[0])
     return (
         bool(unit)
@@ -233,7 +230,7 @@ def _named_after(above: Sequence[str], cells: Sequence[str]) -> bool:
 
 
 def _header_cells(line: str, dialect: Dialect) -> list[str] | None:
-    """Cells of a header line if it has one for every column, else None."""
+    """Cells of a header line if one for every column."""
     text = line.strip("\r\n ")
     if text[:1] in tuple(dialect.comments):
         text = text.lstrip(dialect.comments + "/ \t")
@@ -322,26 +319,25 @@ _BARE = re.compile(r"[\s_:]+")
 
 
 _Said = Mapping[str, tuple[str, list[str]]]
-"""Words as they are written and their values, by the word in plain letters."""
+"""Words as written and their values, by the word in plain letters."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class TableHeader:
-    """Values for all channels together, or one for each; none where the file says nothing.
+    """One value for all channels, or one for each; none where the file says nothing.
 
-    Oscilloscopes and loggers write a word and its values, one for all channels or one for each:
-    ``Sample Interval,1e-9``, ``Vertical Units,V,A``, ``Delta_X 1e-5 1e-5``, ``t0 = -5e-3``, or
-    ``Start,Increment`` above two numbers.
+    As of oscilloscopes and loggers: ``Sample Interval,1e-9``, ``Vertical Units,V,A``, ``Delta_X
+    1e-5 1e-5``, ``t0 = -5e-3``, or ``Start,Increment`` above two numbers.
 
     Parameters
     ----------
     starts, steps [s]
     origins [ns]
-        Dates of the zero of time since 1970.
+        Zero of time since 1970.
     count
-        Rows of the table, of each segment; 0 if it is not said.
+        Rows of the table, or of each segment; 0 if not given.
     words
-        Where the step comes from, ``"Sample Interval"``.
+        Source of the step, ``"Sample Interval"``.
     """
 
     starts: tuple[float, ...] = ()
@@ -356,7 +352,7 @@ class TableHeader:
 def read_header(
     lines: Sequence[str], separator: str, decimal: str
 ) -> tuple[TableHeader, list[str]]:
-    """Header of a table, and its lines without the cells of start and increment beside names."""
+    """Header, and its lines without the cells of start and increment beside names."""
     said: dict[str, tuple[str, list[str]]] = {}
     rows = [_said_cells(line, separator) for line in lines]
     read: list[set[int]] = [set() for _ in rows]
@@ -421,7 +417,7 @@ def _dates(said: _Said) -> tuple[int | None, ...]:
 def _first(
     said: _Said, keys: Sequence[str], decimal: str, second: float
 ) -> tuple[str, tuple[float, ...]]:
-    """Word and numbers of the first key there is; times in seconds, rates (0) in hertz."""
+    """Word and numbers of the first existing key; times in seconds, rates (0) in hertz."""
     for key in keys:
         word, texts = said.get(key, ("", []))
         found = tuple(_numbers((text for text in texts if text), decimal, second))

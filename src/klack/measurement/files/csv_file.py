@@ -1,4 +1,4 @@
-"""Text tables: CSV and its relatives, any separator and either decimal mark."""
+"""Text tables: any separator and either decimal mark."""
 
 import re
 from pathlib import Path
@@ -43,23 +43,16 @@ _CELL = 40  # bytes of a faulty cell shown
 class NumberTable:
     """Columns of numbers.
 
-    The file is gone through once to count rows and to find faults.  Tables of moderate size stay in
-    memory as numbers; of larger ones only the places of the blocks are kept, and blocks are parsed
-    again when they are asked for.
+    One pass counts rows and finds faults: a cell that is no number, a row with too many. Tables of
+    moderate size stay in memory; of larger ones only the places of the blocks, which are parsed
+    again when needed.
 
     Parameters
     ----------
-    path
-        For errors.
     data
-        Text of the whole file, in an encoding that agrees with ASCII.
+        The whole file, in an encoding that agrees with ASCII.
     start
         First byte of the rows.
-
-    Raises
-    ------
-    InputError
-        If a cell is no number or a row has too many; names the line.
     """
 
     def __init__(self, path: Path, data: NDArray[np.uint8], start: int, dialect: Dialect) -> None:
@@ -132,7 +125,7 @@ class NumberTable:
         )
 
     def column(self, column: int, first: int, last: int) -> NDArray[np.float64]:
-        """Values of rows ``first`` to before ``last``; missing ones are nan."""
+        """Rows ``first`` to before ``last``; missing values are nan."""
         parts = [
             self._block(k)[
                 column, max(first - k * self._block_rows, 0) : last - k * self._block_rows
@@ -170,14 +163,9 @@ _TRIED = 1000  # rows by which a first column without name is recognised as time
 class CsvFile(Recording):
     """Table of a text file.
 
-    A column is a time by its name or unit and holds for the columns right of it, up to the next
-    one.  Missing values at the end of a column end the channel; others are nan.  Where a time
-    starts again and again, as segments of an oscilloscope do, each part is a channel of its own.
-
-    Parameters
-    ----------
-    time_step [s]
-        If the file has no time, or a time without unit.
+    A time, by its name or unit, holds for the columns right of it, up to the next one; without
+    one, ``time_step`` [s] is needed. Missing values at the end of a column end the channel; others
+    are nan. Where a time restarts (segments of an oscilloscope), each part is a channel.
     """
 
     def __init__(self, path: Path, time_step: float | None = None) -> None:
@@ -271,7 +259,7 @@ class CsvFile(Recording):
         return tuple(channels)
 
     def _parts(self, clock: int, notes: list[str]) -> list[tuple[int, int]]:
-        """Rows of each segment, where a time starts again and again from the same value."""
+        """Rows of each segment, where a time restarts from one value."""
         if clock in self._segments:
             return self._segments[clock]
         count, begins, last = int(self._table.filled[clock]), [0], np.inf
@@ -293,7 +281,7 @@ class CsvFile(Recording):
         return parts
 
     def _alike(self, clock: int, parts: list[tuple[int, int]]) -> bool:
-        """True for parts of the same length that start within a step of each other."""
+        """True for parts of one length that start within a step."""
         lengths = [end - begin for begin, end in parts]
         if min(lengths) < _SHORTEST_SEGMENT or max(lengths) - min(lengths) > 2:
             return False
@@ -302,7 +290,7 @@ class CsvFile(Recording):
         return max(starts) - min(starts) <= two[1] - two[0]
 
     def _first_count(self, columns: set[int]) -> float:
-        """First number of a column that counts the rows; refuse one that leaves some out."""
+        """First number of a column that counts the rows; rejects gaps."""
         for column in columns:
             rows = int(self._table.filled[column])
             first, last = (self._table.column(column, k, k + 1)[0] for k in (0, rows - 1))
@@ -337,7 +325,7 @@ class CsvFile(Recording):
 
 
 def _bytes_of(path: Path) -> NDArray[np.uint8]:
-    """Text of the file as bytes that agree with ASCII; mapped, not loaded, but for UTF-16."""
+    """File as bytes that agree with ASCII; mapped, but for UTF-16."""
     with path.open("rb") as file:
         encoding = encoding_of(file.read(_HEAD))
     if encoding.startswith("utf-16"):
@@ -349,14 +337,14 @@ def _bytes_of(path: Path) -> NDArray[np.uint8]:
 def _of(
     values: tuple[Value, ...], place: int, count: int, *, all_of_one: bool = True
 ) -> Value | None:
-    """Value of one of ``count`` channels; a single one is for all if ``all_of_one``."""
+    """Value of one of ``count`` channels; a single one holds for all if ``all_of_one``."""
     if len(values) == count:
         return values[place]
     return values[0] if len(values) == 1 and all_of_one else None
 
 
 def _beside(data: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Table of an oscilloscope of Tektronix that writes its header left of its first rows."""
+    """Tektronix table whose header is left of its first rows."""
     head = data[:200].tobytes()
     if not _LEFT_OF_ROWS.match(head) or data.size > _LARGEST_REWRITTEN:
         return data
@@ -369,7 +357,7 @@ def _beside(data: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 def _with_its_header(path: Path, data: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Table of an R&S RTO or RTE, ``a.Wfm.csv``, under the header that it writes as ``a.csv``."""
+    """R&S RTO or RTE table, ``a.Wfm.csv``, under its header ``a.csv``."""
     beside = path.with_name(path.name[: -len(_APART)] + path.suffix)
     if not path.name.lower().endswith(_APART) or not beside.is_file():
         return data
@@ -398,7 +386,7 @@ def _with_its_header(path: Path, data: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 def _stamps_as_numbers(data: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Table with its time stamps as seconds since the first of them."""
+    """Table with time stamps as seconds since the first."""
     if data.size > _LARGEST_REWRITTEN:
         return data
     lines = data[:_HEAD].tobytes().splitlines(keepends=True)[:_TRIED]
@@ -425,7 +413,7 @@ def _stamps_as_numbers(data: NDArray[np.uint8]) -> NDArray[np.uint8]:
 def _survey(
     path: Path, data: NDArray[np.uint8]
 ) -> tuple[Dialect, tuple[Column, ...] | None, TableHeader, list[str], int]:
-    """Dialect, columns (None without header), what stands above, its lines, and first byte."""
+    """Dialect, columns (None without header), header, its lines, first byte."""
     raw = data[:_HEAD].tobytes()
     encoding = encoding_of(raw)
     mark = 3 if raw[:3] == b"\xef\xbb\xbf" else 0
@@ -464,7 +452,7 @@ def _complete_lines(raw: bytes, cut: bool) -> list[bytes]:
 
 
 def _lines_at(data: NDArray[np.uint8], first: int, last: int) -> list[str]:
-    """Complete lines between two bytes, unless that is the beginning of the file."""
+    """Complete lines between two bytes."""
     if data.size <= _HEAD:
         return []
     lines = data[first:last].tobytes().splitlines()[1:]
@@ -480,7 +468,7 @@ def _named_clocks(
     time_step: float | None,
     notes: list[str],
 ) -> dict[int, float]:
-    """Columns that are times, with their seconds per unit."""
+    """Times with their seconds per unit."""
     found = {}
     for k, column in enumerate(columns):
         if not is_clock(column.name, column.unit) or table.filled[k] < 2:
@@ -500,7 +488,7 @@ def _named_clocks(
 def _first_as_clock(
     path: Path, table: NumberTable, time_step: float | None, notes: list[str]
 ) -> dict[int, float]:
-    """Take an evenly rising first column of a table without names as time in seconds."""
+    """Take an evenly rising first column without name as time in seconds."""
     if time_step is not None or table.rows < 3 or table.filled.size < 2:
         return {}
     steps = np.diff(table.column(0, 0, min(table.rows, _TRIED)))

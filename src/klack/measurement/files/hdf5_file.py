@@ -1,7 +1,6 @@
 """HDF5 files, among them those of MATLAB 7.3, read in parts through h5py; netCDF 3 through SciPy.
 
-Links to other files and data that lie in other files are not followed: a measurement holds its
-own data.
+Links and data in other files are not followed: a measurement holds its own data.
 """
 
 from collections.abc import Mapping
@@ -28,13 +27,7 @@ _MOST_PACKED = 1100  # deflate packs 1032 bytes into one at best
 
 
 class Hdf5File(ArrayRecording):
-    """Data sets of numbers of an HDF5 file.
-
-    Parameters
-    ----------
-    time_step [s]
-        Of data sets without time.
-    """
+    """Data sets of numbers; ``time_step`` [s] for those without time."""
 
     def __init__(self, path: Path, time_step: float | None = None) -> None:
         self._file = _opened(path)
@@ -52,13 +45,7 @@ class Hdf5File(ArrayRecording):
 
 
 class NetCdf3File(ArrayRecording):
-    """Variables of numbers of a netCDF file of version 3 or earlier, read as a whole.
-
-    Parameters
-    ----------
-    time_step [s]
-        Of variables without time.
-    """
+    """Variables of a netCDF file up to version 3, read as a whole; as :class:`Hdf5File`."""
 
     def __init__(self, path: Path, time_step: float | None = None) -> None:
         from scipy.io import netcdf_file
@@ -98,7 +85,7 @@ def _damage(where: str) -> AbstractContextManager[None]:
 
 
 def _group(node: Any, path: str, depth: int) -> StoredGroup:
-    """Content of a group, without following links to other files."""
+    """Content of a group, links to other files excepted."""
     import h5py
 
     arrays, groups = [], []
@@ -139,7 +126,7 @@ def _array(name: str, item: Any) -> StoredArray:
 
 
 def _check_size(name: str, item: Any) -> None:
-    """Refuse an array that cannot lie in the bytes that are stored for it."""
+    """Reject an array larger than the bytes stored for it."""
     packed = 1 if item.chunks is None else _MOST_PACKED
     if item.size * item.dtype.itemsize <= packed * item.id.get_storage_size():
         return
@@ -152,7 +139,7 @@ def _check_size(name: str, item: Any) -> None:
 
 
 def _single(item: Any) -> str | float | None:
-    """Text or single number of a small data set; None if it is an array."""
+    """Text or single number; None for an array."""
     if item.attrs.get("MATLAB_class") == b"char" and item.size <= _LONGEST_TEXT:
         return "".join(chr(c) for c in np.asarray(item[()]).ravel())
     if item.size != 1:

@@ -1,8 +1,7 @@
 """Measurement Data Format of ASAM, versions 3 and 4, read record by record through asammdf.
 
-Values come converted to physical units.  A conversion that is a formula written in the file is not
-computed: such channels are left out, with a note.  Values that stand for a text (``sensor fault``)
-among numbers are missing.
+Values are converted to physical units. A formula written in the file is not computed: such
+channels are left out, with a note. Values that mean a text (``sensor fault``) are missing.
 """
 
 import logging
@@ -37,13 +36,7 @@ _VIRTUAL = (3, 6)  # types of channels that are counted, not stored
 
 
 class MdfFile(Recording):
-    """Channels of all groups of an MDF file that are numbers over time.
-
-    Parameters
-    ----------
-    time_step [s]
-        Of groups without time.
-    """
+    """Numbers over time of all groups; ``time_step`` [s] for those without time."""
 
     def __init__(self, path: Path, time_step: float | None = None) -> None:
         self.path = path
@@ -91,7 +84,7 @@ class MdfFile(Recording):
         return tuple(self._info(name, g, c, times[g]) for name, (g, c) in self._place.items())
 
     def _unread(self, path: Path, g: int, c: int, old: bool) -> str:
-        """Why a channel is left out; empty if it is read."""
+        """Why a channel is left out, or empty."""
         group = self._mdf.groups[g]
         channel = group.channels[c]
         if group.channel_group.cycles_nr < 2:
@@ -197,7 +190,7 @@ class MdfFile(Recording):
 
 @dataclass(frozen=True)
 class _Partial:
-    """Ranges of stored values, each with its conversion or a text, and that of all others."""
+    """Ranges of stored values with conversion or text, and that of all others."""
 
     ranges: tuple[tuple[float, float, Any], ...]
     default: Any
@@ -218,7 +211,7 @@ def _converted(rule: Any, stored: NDArray[Any]) -> Vector:
 
 
 def _partial(conversion: Any) -> _Partial | None:
-    """Numbers for some values and texts for others; None if no value is a number."""
+    """Numbers for some values, texts for others; None without numbers."""
     kind, refs = conversion.conversion_type, conversion.referenced_blocks
     if kind == _TEXT_OF_VALUE:
         ends = [(conversion[f"val_{k}"],) * 2 for k in range(conversion.val_param_nr)]
@@ -252,7 +245,7 @@ def _damage(where: str) -> AbstractContextManager[None]:
 
 
 def _forget_half_open(error: Exception) -> None:
-    """Keep the failed reader from reporting once more when it is deleted."""
+    """Keep the failed reader from reporting again when deleted."""
     for frame, _ in walk_tb(error.__traceback__):
         half: Any = frame.f_locals.get("self")
         if hasattr(half, "_closed"):
@@ -260,7 +253,7 @@ def _forget_half_open(error: Exception) -> None:
 
 
 def _in_record(group: Any, channel: Any, old: bool) -> bool:
-    """False if the channel claims bytes behind its record; asammdf would read there."""
+    """False for bytes behind the record, where asammdf would read."""
     if not old and channel.channel_type in _VIRTUAL:
         return True
     if old:

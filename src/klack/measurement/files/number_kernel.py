@@ -1,8 +1,8 @@
-r"""Numbers out of text, compiled: lines of cells become columns of floats.
+"""Numbers out of text, compiled: lines of cells become columns of floats.
 
-A cell is a decimal number with either decimal mark, an exponent if any, or a word for "missing".
-Mantissa and power of ten are gathered as whole numbers and joined by one division (Clinger 1990,
-fast path), which is exact up to 15 digits and right to two units in the last place beyond.
+A cell is a decimal number with either decimal mark, perhaps an exponent, or a word for "missing".
+Mantissa and power of ten are whole numbers, joined by one division (Clinger 1990, fast path):
+exact up to 15 digits, then right to two units in the last place.
 """
 
 import numpy as np
@@ -27,7 +27,7 @@ MISSING = (
     *("", "-", "na", "nan", "n/a", "#n/a", "null", "inf", "infinity", "∞"),
     *("ol", "ovl", "ovr", "over", "overflow", "***"),
 )
-"""Words for a missing value and signs for "over range", in small letters and without a sign."""
+"""Words for a missing value and signs for "over range", in small letters, unsigned."""
 
 _KEY_BYTES = 7  # of a word, as a number of base 256
 _MISSING_KEYS = tuple(int.from_bytes(word.encode()[:_KEY_BYTES], "big") for word in MISSING)
@@ -65,7 +65,7 @@ def _joined(mantissa: int, power: int) -> float:
 
 @inner
 def _number(data: NDArray[np.uint8], at: int, end: int, decimal: int) -> tuple[float, int]:
-    """Value and the byte behind it; the same byte if there is no number."""
+    """Value and the byte behind it; the same byte without a number."""
     begin = at
     negative = False
     if at < end and (data[at] == _PLUS or data[at] == _MINUS):
@@ -137,25 +137,19 @@ def parse_rows(
 ) -> tuple[int, int, int, int]:
     """Fill the columns of ``out`` from the lines that begin at byte ``at``.
 
+    Returns the rows read, the first byte behind them (of the cell, after an error), 0 or the kind
+    of error, and its column.
+
     Parameters
     ----------
-    data : array of bytes, shape (n,)
-    at
-        First byte of a line.
     separator, decimal
         Bytes; separator 0 stands for runs of blanks.
     comments
-        Lines that begin with one of them are left out, as are empty ones.
+        Lines that begin with one of them are ignored, as are empty ones.
     place (width,)
-        Row of ``out`` that takes each column of the text; -1 leaves the column out.
+        Row of ``out`` for each column of the text, or -1.
     out (columns, most rows)
         Missing cells become nan.
-
-    Returns
-    -------
-    rows, at, error, column : int
-        Rows read, first byte behind them (of the cell, after an error), 0 or the kind of error,
-        and its column.
     """
     end, width, most = data.size, place.size, out.shape[1]
     row = 0

@@ -1,7 +1,4 @@
-"""Opens a measured file with the reader of its format.
-
-The content of the file decides, and its suffix where the content does not tell.
-"""
+"""Opens a measured file with the reader of its format: by content, else by suffix."""
 
 import re
 from pathlib import Path
@@ -24,12 +21,12 @@ def open_recording(path: str | Path, *, time_step: float | None = None) -> Recor
     path
         CSV and other text tables, MDF 3 and 4, TDMS, UFF (sets 58 and 58b), HDF5, netCDF, MATLAB.
     time_step [s]
-        Sampling step, used where the file has no time of its own.
+        Where the file has no time of its own.
 
     Raises
     ------
     InputError
-        If the file does not exist, is of no known format, is damaged or has no time.
+        If the file is missing, damaged, of no known format or without time.
     MissingExtraError
         If the package that reads this format is not installed.
     """
@@ -56,7 +53,7 @@ def open_recording(path: str | Path, *, time_step: float | None = None) -> Recor
 
 
 def _open(path: Path, head: bytes, time_step: float | None) -> Recording:
-    """Open by content; readers are imported when they are needed."""
+    """Open by content; readers are imported when needed."""
     if head[:8] in (b"MDF     ", b"UnFinMF "):
         from klack.measurement.files.mdf_file import MdfFile
 

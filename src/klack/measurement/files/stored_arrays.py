@@ -1,6 +1,6 @@
 """Named arrays of HDF5 and MATLAB files become channels.
 
-Such files have no fixed form.  Understood are
+Such files have no fixed form. Known are
 
 - vectors side by side, one of them the time: ``time``, ``lift``, ``current``;
 - a group or structure per channel: ``lift`` with ``time``, ``values``, ``unit``;
@@ -71,9 +71,9 @@ class StoredArray:
     shape
         One axis, or two for a matrix.
     read
-        Called with the index of a line (0 for a vector), the axis of time, first and last sample.
-    about : mapping of str to str or float
-        Attributes by name in lower case.
+        Arguments: index of a line (0 for a vector), axis of time, first and last sample.
+    about
+        Attributes, names in lower case.
     """
 
     name: str
@@ -82,7 +82,7 @@ class StoredArray:
     whole: Callable[[int, int], NDArray[np.int64]] | None = None
     """Samples of a vector of whole numbers."""
     zero: int = 0
-    """Number that was taken off all, as the first time stamp."""
+    """Number taken off all, as the first time stamp."""
     about: Mapping[str, str | float] = field(default_factory=dict)
 
 
@@ -92,7 +92,7 @@ def stored_array(
     about: Mapping[str, str | float] | None = None,
     reading: Callable[[], AbstractContextManager[Any]] = nullcontext,
 ) -> StoredArray:
-    """Vector or matrix that is held, or one of a file that each ``reading`` reads a part of."""
+    """Vector or matrix held, or of a file that each ``reading`` reads in part."""
 
     def read(line: int, axis: int, first: int, last: int) -> Vector:
         part: tuple[Any, ...] = (slice(first, last),)
@@ -116,7 +116,7 @@ def stored_array(
 
 @dataclass(frozen=True, kw_only=True)
 class StoredGroup:
-    """Arrays, texts and single numbers that belong together, and groups below."""
+    """Arrays, texts and numbers that belong together, and groups below."""
 
     path: str = ""
     arrays: Sequence[StoredArray] = ()
@@ -149,12 +149,7 @@ class _Line:
 
 
 class ArrayRecording(Recording):
-    """Channels of named arrays; the formats give the arrays.
-
-    Parameters
-    ----------
-    time_step [s]
-    """
+    """Channels of named arrays; ``time_step`` [s] for those without time."""
 
     def __init__(self, path: Path, root: StoredGroup, time_step: float | None) -> None:
         notes: list[str] = []
@@ -218,7 +213,7 @@ def _lines(
     time_step: float | None,
     notes: list[str],
 ) -> list[_Line]:
-    """Channels of a group and of those below it; time and step are handed down."""
+    """Channels of a group and of those below, which inherit time and step."""
     notes += left_out(file, group.unread)
     group = _with_info(group)
     group = replace(group, arrays=[_unpacked(array, group) for array in group.arrays])
@@ -235,7 +230,7 @@ def _lines(
 
 
 def _with_info(group: StoredGroup) -> StoredGroup:
-    """A MATLAB timeseries with what its ``TimeInfo`` and ``DataInfo`` say as texts beside it."""
+    """MATLAB timeseries with ``TimeInfo`` and ``DataInfo`` as texts."""
     about, groups = dict(group.about), []
     for below in group.groups:
         key = _ABOUT.get(below.path.rsplit("/", 1)[-1].lower())
@@ -248,7 +243,7 @@ def _with_info(group: StoredGroup) -> StoredGroup:
 
 
 def _own(array: StoredArray, group: StoredGroup) -> dict[str, str | float]:
-    """What is said of an array: its attributes, and values beside it that bear its name."""
+    """Attributes of an array, and values beside it that bear its name."""
     name = _split(array.name)[0].lower()
     if name in _VALUES:
         beside = dict(group.about)
@@ -262,7 +257,7 @@ def _own(array: StoredArray, group: StoredGroup) -> dict[str, str | float]:
 
 
 def _of_all(group: StoredGroup, about: Mapping[str, str | float]) -> dict[str, str | float]:
-    """What is said of all arrays of a group: not of one of them by its name."""
+    """What is said of all arrays of a group."""
     names = tuple(f"{_split(array.name)[0].lower()}_" for array in group.arrays)
     return {key: value for key, value in about.items() if not key.startswith(names)}
 
@@ -275,7 +270,7 @@ def _unpacked(array: StoredArray, group: StoredGroup) -> StoredArray:
 
 
 def _require_one_start(file: str, lines: Sequence[_Line]) -> None:
-    """Refuse channels of one stored time that are said to start apart."""
+    """Reject channels of one stored time that start apart."""
     first: dict[int, _Line] = {}
     for line in lines:
         if line.clock is None:
@@ -295,7 +290,7 @@ def _require_one_start(file: str, lines: Sequence[_Line]) -> None:
 
 
 def _from_first(array: StoredArray) -> StoredArray:
-    """Time stamps since the first one: whole numbers of 19 digits are cut as real ones."""
+    """Stamps since the first one: 19 digits do not fit real numbers."""
     whole = array.whole
     zero = 0 if whole is None else int(whole(0, 1)[0])
     if whole is None or abs(zero) < 2**53:
@@ -376,7 +371,7 @@ def _time_of(
     time_step: float | None,
     notes: list[str],
 ) -> tuple[float, float, tuple[StoredArray, float] | None, int | None]:
-    """Start, step, stored time and its zero: own attributes, then a time, then of the group."""
+    """Start, step, stored time and its zero: by own attributes, a time, the group."""
     date, start = _date(array.about) or _date(about), _start(array.about)
     start = (_start(about) or 0.0) if start is None else start
     step = _step(file, name, array.about)
@@ -432,13 +427,7 @@ _DEEPEST = 8
 
 
 class MatlabFile(ArrayRecording):
-    """Variables and structures of numbers of a MATLAB file.
-
-    Parameters
-    ----------
-    time_step [s]
-        Of variables without time.
-    """
+    """Variables and structures of a MATLAB file."""
 
     def __init__(self, path: Path, time_step: float | None = None) -> None:
         super().__init__(path, _group(read_mat5(path), "", 0), time_step)

@@ -1,8 +1,7 @@
 """TDMS files of LabVIEW and DIAdem, streamed through npTDMS.
 
-Time is what the properties of each channel say (``wf_start_time``, ``wf_start_offset``,
-``wf_increment``), or else a channel of its group that is a time, by numbers or by stamps.  Names
-are ``group/channel``, without the group if there is only one.
+Time is given by properties (``wf_start_time``, ``wf_start_offset``, ``wf_increment``), or by a
+channel of the group, as numbers or stamps. Names are ``group/channel``, without a single group.
 """
 
 import logging
@@ -28,20 +27,14 @@ _SCALES = {
     *("Linear", "Polynomial", "RTD", "Strain", "Table", "Thermistor", "Thermocouple", "Add"),
     *("Subtract", "AdvancedAPI"),
 }
-"""Types of scales that npTDMS applies; of others it returns the stored numbers."""
+"""Scales that npTDMS applies; of others it returns the stored numbers."""
 _SINCE_1904 = 2_082_844_800  # [s] from the zero of LabVIEW to 1970
 _LONGEST = 200  # signs of what npTDMS says
 _HALF = 1 << 63  # of a unit of 2^-64 of a second
 
 
 class TdmsFile(Recording):
-    """Channels of numbers of a TDMS file.
-
-    Parameters
-    ----------
-    time_step [s]
-        Of channels without time.
-    """
+    """Channels of numbers; ``time_step`` [s] for those without time."""
 
     def __init__(self, path: Path, time_step: float | None = None) -> None:
         self.path = path
@@ -104,7 +97,7 @@ class TdmsFile(Recording):
         time_step: float | None,
         notes: list[str],
     ) -> tuple[float, float, str, int | None]:
-        """Start, step, name of the stored time if it is one, and when it is zero."""
+        """Start, step, name of the stored time if any, and its zero."""
         increment = float(channel.properties.get("wf_increment", 0.0) or 0.0)
         if increment > 0:
             start = float(channel.properties.get("wf_start_offset", 0.0))
@@ -125,7 +118,7 @@ class TdmsFile(Recording):
         return 0.0, time_step, "", None
 
     def _unapplied(self, group: Any, channel: Any) -> str:
-        """Scales of other programs, and those of National Instruments that npTDMS leaves out."""
+        """Scales of other programs, and those that npTDMS leaves out."""
         about = {**self._tdms.properties, **group.properties, **channel.properties}
         odd = {
             key: value
@@ -172,7 +165,7 @@ def _opened(path: Path, notes: list[str]) -> Any:
 
 @contextmanager
 def _heard() -> Iterator[list[str]]:
-    """Collect what npTDMS logs of a file instead of writing it to the terminal."""
+    """Collect what npTDMS logs of a file."""
     said: list[str] = []
     kept = [
         (logger, list(logger.handlers), logger.propagate)
@@ -209,7 +202,7 @@ def _is_clock(channel: Any) -> bool:
 
 
 def _nanoseconds(stamp: Any) -> int | None:
-    """Time stamp since 1970 [ns]; the zero of LabVIEW, in 1904, says nothing."""
+    """Time stamp since 1970 [ns]; LabVIEW's zero, 1904, says nothing."""
     if not getattr(stamp, "seconds", 0):
         return None
     return (int(stamp.seconds) - _SINCE_1904) * 10**9 + (

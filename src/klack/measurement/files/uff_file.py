@@ -1,7 +1,7 @@
 """Universal files: sets 58 and 58b of real values over time, read through pyuff.
 
-A universal file says of its values what kind of quantity they are, in SI or in a unit written as
-text.  Sets are read one at a time; the last one stays in memory.
+It names the kind of its values, in SI or in a unit written as text. Sets are read one at a time;
+the last one stays in memory.
 """
 
 from contextlib import AbstractContextManager
@@ -26,7 +26,7 @@ _TIME_RESPONSE, _TIME_AXIS = 1, 17
 _EVEN = 1
 _LARGEST = 2 << 30  # bytes
 _SI = {8: "m", 11: "m/s", 12: "m/s^2", 13: "N", 9: "N", 15: "Pa"}
-"""Unit of a kind of ordinate (record 9, field 1) if the file does not write one."""
+"""Unit of a kind of ordinate (record 9, field 1) if the file has none."""
 
 
 class UffFile(Recording):
@@ -92,7 +92,7 @@ class UffFile(Recording):
         )
 
     def _data(self, number: int) -> Any:
-        """Set ``number``, kept until another one is read."""
+        """Set ``number``, kept until the next."""
         if self._last is None or self._last[0] != number:
             with _damage(f"{self.path.name}: set {number + 1}"):
                 self._last = number, self._uff.read_sets(number)
@@ -142,7 +142,7 @@ def _damage(where: str) -> AbstractContextManager[None]:
 
 
 def _in_si(uff: Any) -> bool:
-    """False if the file says by a set 164 that its units are not SI."""
+    """False if a set 164 says other units."""
     kinds = [int(kind) for kind in uff.get_set_types()]
     if 164 not in kinds:
         return True
@@ -155,7 +155,7 @@ def _header(path: Path, uff: Any, number: int) -> Any:
 
 
 def _name(head: Any) -> str:
-    """Response name, or the first line of the set, or node and direction."""
+    """Response name, first line of the set, or node and direction."""
     for key in ("id1", "rsp_ent_name", "ordinate_axis_lab"):
         text = str(head.get(key, "")).strip()
         if text and text.upper() != "NONE":
