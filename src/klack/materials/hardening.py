@@ -15,27 +15,24 @@ __all__ = [
 ]
 
 LARGEST_YIELD = 1.0 / 50.0
-"""Yield stress over Young's modulus, above which strains are no longer small."""
+"""Yield stress over Young's modulus up to which strains are small."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hardening:
     """Yield stress, and how it rises with plastic strain.
 
+    Rejects softening.
+
     Parameters
     ----------
     yield_stress [Pa]
-        Stress of first yield in a tensile test, Y.
+        Y, in a tensile test.
     isotropic [Pa]
         Rise of the yield stress per equivalent plastic strain.
     kinematic [Pa]
         Shift of the yield surface per equivalent plastic strain (Prager): the same tensile test,
-        an earlier yield when the load is reversed (Bauschinger).
-
-    Raises
-    ------
-    InputError
-        For a yield stress of zero or below, and for hardening below zero (softening).
+        an earlier yield when the load reverses (Bauschinger).
     """
 
     yield_stress: float
@@ -62,8 +59,9 @@ class Hardening:
 HARDNESS_SPREAD = (0.5, 1.15)
 """Lowest and highest yield stress over its estimate from a hardness.
 
-Half: soft annealed steel, which hardens at once.  15 %: steel that hardens little (10 %) and the
-scatter of the conversion between scales (5 %)."""
+Half: soft annealed steel, which hardens at once. 15 %: steel that hardens little (10 %) and scale
+conversion (5 %).
+"""
 
 _ROCKWELL = np.array([20.0, 25.0, 30.0, 35.0, 40.0, 45.0, 50.0, 55.0, 60.0, 65.0, 68.0])
 _VICKERS = np.array([238.0, 266.0, 302.0, 345.0, 392.0, 446.0, 513.0, 595.0, 697.0, 832.0, 940.0])
@@ -71,17 +69,12 @@ _GRAVITY = 9.80665
 
 
 def vickers_of_rockwell(hrc: float) -> float:
-    """Vickers hardness of a Rockwell C hardness (ASTM E140, table for non-austenitic steels).
+    """Vickers hardness of a Rockwell C hardness (ASTM E140, non-austenitic steels, 20 to 68).
 
     Conversions scatter by 5 % between steels.
 
     >>> vickers_of_rockwell(60.0)
     697.0
-
-    Raises
-    ------
-    InputError
-        Outside of 20 to 68.
     """
     if not _ROCKWELL[0] <= hrc <= _ROCKWELL[-1]:
         raise InputError(
@@ -94,10 +87,10 @@ def vickers_of_rockwell(hrc: float) -> float:
 
 
 def yield_of_hardness(vickers: float) -> float:
-    """Estimate of the yield stress [Pa] from a Vickers hardness: a third of it (Tabor 1951).
+    """Yield stress [Pa] from a Vickers hardness: a third of it (Tabor 1951).
 
-    Of steels that harden little it is within 10 %; of soft annealed ones the flow stress at 8 %
-    strain, which is up to twice the yield stress.
+    Within 10 % for steels that harden little; of soft annealed ones the flow stress at 8 % strain,
+    up to twice the yield stress.
 
     >>> round(yield_of_hardness(180.0) / 1e6)
     588

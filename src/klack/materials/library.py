@@ -1,9 +1,9 @@
 """Materials by name: every number with its source, and whether that source was read.
 
-A library material is a place to start, not a certificate: yield stress and hardness are those of
-one condition, and two bars of one grade differ by more than the digits given here.  Ceramics and
-glass have no yield stress: they stay elastic and crack.  No entry hardens: the slope between yield
-and tensile strength is not that of the first per cents of strain, which a contact sees.
+No certificate: yield stress and hardness are those of one condition, and two bars of one grade
+differ by more than the digits. Ceramics and glass have no yield stress: they crack. No entry
+hardens: the slope between yield and tensile strength is not that of the first per cents of strain,
+which matter in a contact.
 """
 
 from collections.abc import Mapping
@@ -37,9 +37,9 @@ class MaterialEntry:
     Parameters
     ----------
     condition
-        What it is, and how it was treated.
+        What it is, and its treatment.
     yield_stress
-        None for a material that cracks and does not yield.
+        None for a material that cracks.
     """
 
     name: str
@@ -57,7 +57,7 @@ class MaterialEntry:
 
     @property
     def verified(self) -> bool:
-        """Whether the source of every number was read."""
+        """Whether every source was read."""
         return all(one.verified for one in self.constants)
 
     @property
@@ -217,7 +217,7 @@ MATERIALS: Mapping[str, MaterialEntry] = MappingProxyType(
 
 
 def find_material(name: str) -> MaterialEntry | None:
-    """Library material of this name, or None; case, blanks and hyphens do not matter."""
+    """Library material, or None; case, blanks and hyphens do not matter."""
     return entry_named(name, MATERIALS)
 
 
@@ -229,11 +229,6 @@ def library_material(name: str) -> MaterialEntry:
     >>> ball = library_material("440c-hardened")
     >>> ball.material.hardening.yield_stress / 1e6, ball.verified
     (1900.0, True)
-
-    Raises
-    ------
-    InputError
-        For an unknown name.
     """
     return require_entry(
         "library_material: name", name, MATERIALS, "give young, poisson, density, and yield."

@@ -14,17 +14,15 @@ _DENSE = 3000.0  # [kg/m^3]; lighter solids, rubber and polymers, may be slower
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Material:
-    """Isotropic linear elastic material; where it yields is asked of analyses that know how.
+    """Isotropic linear elastic material; whether it yields is up to the analysis.
 
     Parameters
     ----------
-    young [Pa]
-        Young's modulus.
     poisson [-]
-        Poisson's ratio, above -1 and below 0.5.
+        Above -1 and below 0.5.
     density [kg/m^3]
     hardening
-        Yield stress and what follows; without it the material is elastic at any stress.
+        Without it elastic at any stress.
     """
 
     name: str
@@ -60,21 +58,21 @@ class Material:
 
     @property
     def lame_lambda(self) -> float:
-        """First Lame constant, E nu / ((1 + nu)(1 - 2 nu)) [Pa]."""
+        """E nu / ((1 + nu)(1 - 2 nu)) [Pa]."""
         nu = self.poisson
         return self.young * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
 
     @property
     def bar_wave_speed(self) -> float:
-        """Speed of longitudinal waves in a thin bar, sqrt(E / rho) [m/s]."""
+        """Longitudinal waves in a thin bar, sqrt(E / rho) [m/s]."""
         return sqrt(self.young / self.density)
 
     @property
     def question(self) -> str | None:
-        """Question about numbers that no solid has in combination; ``None`` for others.
+        """Question about a combination that no solid has; else ``None``.
 
-        Waves along a bar run at 5170 m/s in steel, 1190 in lead, 17 300 in diamond; a modulus in
-        MPa instead of GPa is 30 times below.  Solids of less than 3000 kg/m^3 may be rubber.
+        Bar waves run at 5170 m/s in steel, 1190 in lead, 17 300 in diamond; a modulus in MPa
+        instead of GPa makes them 30 times slower. Solids below 3000 kg/m^3 may be rubber.
 
         >>> Material(name="steel", young=2.1e11, poisson=0.3, density=7850.0).question
         >>> Material(name="steel", young=2.1e8, poisson=0.3, density=7850.0).question[:57]
@@ -91,5 +89,5 @@ class Material:
 
     @property
     def plane_strain_modulus(self) -> float:
-        """E / (1 - nu^2) [Pa]; two bodies in contact have 1/E* = sum of its inverses."""
+        """E / (1 - nu^2) [Pa]; in a contact 1/E* is the sum of both inverses."""
         return self.young / (1.0 - self.poisson**2)

@@ -1,4 +1,4 @@
-"""Libraries of numbers: each with its source, each entry found by its name."""
+"""Libraries of numbers with sources."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,18 +14,17 @@ _Entry = TypeVar("_Entry")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Constant:
-    """A constant of a fluid or a material with its source.
+    """Constant with its source.
 
     Parameters
     ----------
     label
-        What it is, e.g. ``"bulk modulus, isentropic, 20 degC"``.
-    value : float or tuple of float
+        As ``"bulk modulus, isentropic, 20 degC"``.
+    value
         Several for a table over temperature.
     verified
-        True when the source itself was read or recomputed; False for numbers quoted from memory
-        or by a third party, and for estimates, which deserve a look before a result depends on
-        them.
+        The source was read or recomputed; False for numbers from memory or third parties and for
+        estimates.
     """
 
     label: str
@@ -36,7 +35,7 @@ class Constant:
 
 
 def entry_named(name: str, library: Mapping[str, _Entry]) -> _Entry | None:
-    """Entry of this name, or None; case, blanks, hyphens and points do not matter.
+    """Entry, or None; case, blanks, hyphens and points do not matter.
 
     >>> entry_named("iso-vg-46", {"ISO VG 46": 1})
     1
@@ -47,16 +46,7 @@ def entry_named(name: str, library: Mapping[str, _Entry]) -> _Entry | None:
 def require_entry(where: str, name: str, library: Mapping[str, _Entry], otherwise: str) -> _Entry:
     """Entry of this name.
 
-    Parameters
-    ----------
-    library : mapping of str to entry
-    otherwise
-        What to try where no entry has a similar name.
-
-    Raises
-    ------
-    InputError
-        For an unknown name, with the nearest one.
+    ``otherwise`` is what to try where no name is similar.
     """
     found = entry_named(name, library)
     if found is None:

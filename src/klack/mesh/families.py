@@ -1,9 +1,9 @@
-"""Element families: how many nodes, which of them span a face, which lie on an edge.
+"""Element families: nodes, and those on faces and edges.
 
-Node order is that of Abaqus and CalculiX (corners first, then mid-edge nodes), so that imported
-meshes need no reordering.  Faces are listed so that their normal points *out* of the element: for
-a 3-D face the corners run anticlockwise when seen from outside; for a plane (axisymmetric) element
-the material lies to the left of the edge, and the outward normal is the tangent turned by -90 deg.
+Node order is that of Abaqus and CalculiX: corners first, then mid-edge nodes. Face normals point
+*out* of the element: corners of a 3-D face run anticlockwise seen from outside; a plane
+(axisymmetric) element is left of its edge, and the outward normal is the tangent turned by -90
+deg.
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ __all__ = ["FAMILIES", "ElementFamily", "Face"]
 
 @dataclass(frozen=True, slots=True)
 class Face:
-    """One side of an element: its own family and the local nodes that span it."""
+    """One side of an element: its family and local nodes."""
 
     family: str
     nodes: tuple[int, ...]
@@ -25,19 +25,16 @@ class ElementFamily:
 
     Parameters
     ----------
-    name
-        For example ``"tet10"``.
     dimension
-        3 for solids, 2 for plane (axisymmetric) elements and for faces of solids, 1 for edges.
+        3 for solids, 2 for plane (axisymmetric) elements and faces of solids, 1 for edges.
     corners
-        Number of corner nodes; they come first.
-    edges : tuple of pairs of int
-        Local corner numbers of every edge.  In a quadratic family node ``corners + i`` is the
-        middle of edge ``i``.
+        Number; they come first.
+    edges
+        Local corners. In a quadratic family node ``corners + i`` is the middle of edge ``i``.
     faces
         Sides of codimension one.
     quadratic
-        True when every edge has a mid node.
+        Every edge has a mid node.
     """
 
     name: str
@@ -84,7 +81,7 @@ _FACE_NAMES |= {(3, True): "tri6", (4, False): "quad4", (4, True): "quad8"}
 def _face(
     corners: tuple[int, ...], edges: tuple[tuple[int, int], ...], n_corners: int, quadratic: bool
 ) -> Face:
-    """Face with its mid nodes looked up among the element's edges."""
+    """Face with its mid nodes."""
     nodes = list(corners)
     size = len(corners)
     if quadratic:

@@ -1,7 +1,7 @@
 """Axisymmetric meshes (r, z) of six-node triangles, from profiles.
 
-The triangles come from netgen; the nodes are then put exactly on the straight edges and arcs of
-the profiles, the mid nodes too, and nodes on the axis get r = 0.
+Triangles come from netgen; all nodes are then put exactly on the edges and arcs of the profiles,
+those on the axis at r = 0.
 """
 
 from collections.abc import Mapping
@@ -24,7 +24,7 @@ __all__ = ["mesh_meridian"]
 
 @dataclass(frozen=True)
 class _Triangulation:
-    """Output of netgen, with every boundary segment on a known curve."""
+    """Output of netgen, boundary segments on known curves."""
 
     points: NDArray[np.float64]  # (n, 2) [m]
     triangles: NDArray[np.int64]  # (n, 3)
@@ -37,27 +37,17 @@ class _Triangulation:
 def mesh_meridian(profiles: Mapping[str, Profile], sizing: MeshSizing) -> Mesh:
     """Mesh of six-node triangles of one body made of one or several solids.
 
-    Solids that share an edge (or a part of one) are joined there.  Surfaces are the named edges
-    on the outside of the body, faces ``line3`` with the outward normal to the right of the walk;
-    edges on the axis are no surfaces.  Nodes of an inner edge between two solids are the node set
-    of the same name.
+    Solids are joined at shared edges (or parts). Surfaces are the named outer edges off the axis,
+    faces ``line3`` with the outward normal to the right of the walk. Nodes of an inner edge
+    between solids are the node set of the same name.
+
+    Rejects solids that overlap or do not touch, and elements too coarse for an arc.
 
     Parameters
     ----------
     profiles : mapping of solid name to Profile
     sizing
         Refinements are rings (r, z), or points (0, 0, z) on the axis.
-
-    Returns
-    -------
-    Mesh
-        Of dimension 2.
-
-    Raises
-    ------
-    InputError
-        If solids overlap or do not touch, a sized surface does not exist, or the elements are too
-        coarse for an arc.
     """
     if not profiles:
         raise InputError(
@@ -130,7 +120,7 @@ def _triangulate(profiles: Mapping[str, Profile], sizing: MeshSizing) -> _Triang
 
 
 def _require_no_overlap(profiles: Mapping[str, Profile], shape: Any) -> None:
-    """Every profile must be one region, and no region be there twice."""
+    """Each profile must be one region, none there twice."""
     expected = sum(profile.area for profile in profiles.values()) * MM**2
     area = sum(face.mass for face in shape.faces)
     if len(shape.faces) != len(profiles) or abs(area - expected) > 1e-6 * expected:
@@ -144,7 +134,7 @@ def _require_no_overlap(profiles: Mapping[str, Profile], shape: Any) -> None:
 
 
 def _meridian_points(refinement: Any, shape: Any) -> NDArray[np.float64]:
-    """Points of constant size in the plane, within the box of the shape, shape (n, 2) [mm]."""
+    """Points of constant size within the box of the shape, shape (n, 2) [mm]."""
     if not refinement.is_ring:
         x, y, z = refinement.position
         if np.hypot(x, y) > 0:
@@ -180,7 +170,7 @@ def _read_netgen(mesh: Any, curves: tuple[Curve, ...]) -> _Triangulation:
 
 
 def _corners_on_curves(tri: _Triangulation) -> NDArray[np.float64]:
-    """Corner nodes put exactly on the profiles; corners of the profile exactly on their place."""
+    """Corner nodes exactly on the profiles and their corners."""
     points = tri.points.copy()
     for k, curve in enumerate(tri.curves):
         nodes = np.unique(tri.segments[tri.segment_curves == k])
@@ -196,7 +186,7 @@ def _corners_on_curves(tri: _Triangulation) -> NDArray[np.float64]:
 
 
 def _unique_edges(triangles: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Edges (n, 2) with ascending nodes, and for every triangle the numbers of its three edges."""
+    """Edges (n, 2), nodes ascending, and the three edges of each triangle."""
     local = np.array(FAMILIES["tri6"].edges)
     pairs = np.sort(triangles[:, local].reshape(-1, 2), axis=1)
     edges, inverse = np.unique(pairs, axis=0, return_inverse=True)
@@ -204,7 +194,7 @@ def _unique_edges(triangles: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDAr
 
 
 def _find_edges(edges: NDArray[np.int64], segments: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Find the number of the edge that each segment is."""
+    """Edge that each segment is."""
     base = int(edges.max()) + 1
     keys = edges[:, 0] * base + edges[:, 1]
     wanted = np.sort(segments, axis=1)

@@ -1,4 +1,4 @@
-"""A finite-element mesh: points, blocks of elements, named surfaces and node sets."""
+"""Finite-element mesh: points, element blocks, named surfaces and node sets."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -31,11 +31,11 @@ class ElementBlock:
     Parameters
     ----------
     family
-        Key of :data:`klack.mesh.families.FAMILIES`, of dimension 3 or 2.
+        Key of :data:`klack.mesh.families.FAMILIES`.
     connectivity (n_elements, n_nodes)
-        Node numbers, Abaqus order.
+        Abaqus order.
     solid
-        Name of the solid; the material is chosen by it.
+        It chooses the material.
     """
 
     family: str
@@ -89,7 +89,7 @@ class Mesh:
     Parameters
     ----------
     points (n, 3) or (n, 2) [m]
-        Three columns x, y, z for a solid; two columns r, z for an axisymmetric body (axis r = 0).
+        x, y, z of a solid; r, z of an axisymmetric body (axis r = 0).
     node_sets : mapping of str to int array
     """
 
@@ -100,7 +100,7 @@ class Mesh:
 
     @property
     def dimension(self) -> int:
-        """3 for a solid, 2 for an axisymmetric body; also the degrees of freedom per node."""
+        """3 for a solid, 2 if axisymmetric; also the degrees of freedom per node."""
         return int(self.points.shape[1])
 
     @property
@@ -110,7 +110,7 @@ class Mesh:
 
     @property
     def dof_count(self) -> int:
-        """Number of degrees of freedom; that of node i and direction d is dimension * i + d."""
+        """Degrees of freedom; of node i and direction d: dimension * i + d."""
         return self.node_count * self.dimension
 
     @property
@@ -120,17 +120,11 @@ class Mesh:
 
     @property
     def solids(self) -> tuple[str, ...]:
-        """Names of the solids, in order of first appearance."""
+        """Solids in order of first appearance."""
         return tuple(dict.fromkeys(block.solid for block in self.blocks))
 
     def surface(self, name: str) -> Surface:
-        """Surface by name.
-
-        Raises
-        ------
-        InputError
-            If there is none of that name; the text lists the names there are.
-        """
+        """Surface of a name."""
         if name not in self.surfaces:
             known = ", ".join(sorted(self.surfaces)) or "none"
             got, hint = "a name that the mesh does not have", "check the spelling, or name the face"
@@ -149,13 +143,7 @@ class Mesh:
         return replace(self, points=self.points + np.asarray(shift))
 
     def placed(self, pose: Pose) -> Self:
-        """Turn and shift the mesh of a solid rigidly.
-
-        Raises
-        ------
-        InputError
-            For an axisymmetric body, which cannot leave its axis.
-        """
+        """Turn and shift the mesh of a solid rigidly; not an axisymmetric one."""
         if self.dimension != 3:
             raise InputError(
                 "mesh: rigid displacement",
@@ -184,7 +172,7 @@ _SIMPLICES: dict[str, tuple[tuple[int, ...], ...]] = {
 
 
 def simplices(block: FaceBlock) -> NDArray[np.int64]:
-    """Triangles or segments of every face through all its nodes, shape (f, dimension)."""
+    """Triangles or segments through all nodes of the faces, shape (f, dimension)."""
     local = np.array(_SIMPLICES[block.family])
     return block.connectivity[:, local].reshape(-1, local.shape[1])
 
@@ -196,11 +184,11 @@ class FaceTable:
     Parameters
     ----------
     keys (n, 4)
-        Corner nodes in ascending order, -1 in front where there are fewer than four; rows sorted.
+        Corner nodes, ascending, -1 in front where fewer than four; rows sorted.
     block, element, side (n,)
-        Block, element within the block, and number of the face.
+        Element within the block, number of the face.
     shared (n,)
-        True for a face between two elements.
+        Between two elements.
     """
 
     blocks: tuple[ElementBlock, ...]
@@ -239,7 +227,7 @@ class FaceTable:
         )
 
     def find(self, corners: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Find the row of the face with these corners, shape (m, 2..4); -1 where there is none."""
+        """Row of the face with these corners (m, 2..4), or -1."""
         wanted = _corner_keys(corners)
         void = np.dtype((np.void, 4 * 8))
         # big-endian without sign sorts as bytes like the numbers themselves
@@ -252,7 +240,7 @@ class FaceTable:
 
     @cached_property
     def _place(self) -> tuple[NDArray[np.int64], ...]:
-        """Row of every face, by block: shape (n_elements, n_sides)."""
+        """Row of every face, by block (n_elements, n_sides)."""
         tables = []
         for number, part in enumerate(self.blocks):
             table = np.empty((len(part.connectivity), len(part.topology.faces)), dtype=np.int64)
@@ -262,7 +250,7 @@ class FaceTable:
         return tuple(tables)
 
     def surface(self, name: str, rows: NDArray[np.int64]) -> Surface:
-        """Surface of the faces in ``rows``, in the order and sense of their elements."""
+        """Surface of faces, in order and sense of their elements."""
         parts: dict[str, list[NDArray[np.int64]]] = {}
         rows = np.asarray(rows)
         for number, part in enumerate(self.blocks):
@@ -276,7 +264,7 @@ class FaceTable:
 
 
 def outer_surface(mesh: Mesh, name: str = "skin") -> Surface:
-    """Build the surface of all faces that belong to one element only."""
+    """Surface of all faces of one element only."""
     table = FaceTable.of(mesh.blocks)
     return table.surface(name, np.flatnonzero(~table.shared))
 

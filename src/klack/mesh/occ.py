@@ -1,4 +1,4 @@
-"""Profiles as OpenCASCADE shapes, in millimetres (its STEP writer always declares them)."""
+"""Profiles as OpenCASCADE shapes, in millimetres (as its STEP writer declares)."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -55,14 +55,14 @@ def revolved_solids(profiles: Mapping[str, Profile]) -> list[Any]:
 
 
 def glue(solids: Sequence[Any]) -> Any:
-    """One shape of solids that share their common faces; names survive."""
+    """One shape of solids sharing common faces; names survive."""
     from netgen.occ import Glue
 
     return Glue(list(solids)) if len(solids) > 1 else solids[0]
 
 
 def matching_curves(edge: Any, candidates: Sequence[Curve]) -> list[Curve]:
-    """Profile edges on which a (possibly split) edge in the plane lies; the nearest if none."""
+    """Profile edges on which a (split) edge lies; the nearest if none."""
     low, high = edge.parameter_interval
     p = edge.Value(0.5 * (low + high))
     ends = [(p.x, p.y), (edge.start.x, edge.start.y), (edge.end.x, edge.end.y)]
@@ -74,6 +74,6 @@ def matching_curves(edge: Any, candidates: Sequence[Curve]) -> list[Curve]:
 
 
 def box_mm(shape: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Lowest and highest corner of the box around a shape, shape (3,) each [mm]."""
+    """Lowest and highest corner of a shape, shape (3,) each [mm]."""
     low, high = shape.bounding_box
     return np.array([low.x, low.y, low.z]), np.array([high.x, high.y, high.z])

@@ -1,11 +1,11 @@
 r"""Meridian of a body of revolution: a closed chain of straight edges and circular arcs.
 
-The body is the profile turned once around the z axis.  Its exact mass properties follow from
-Green's theorem along the (anticlockwise) boundary,
+Turned around the z axis; exact mass properties follow from Green's theorem along the
+(anticlockwise) boundary,
 
 .. math:: \iint r^m z^n \, dr\, dz = \oint \frac{r^{m+1}}{m+1} z^n \, dz ,
 
-so a mesh can be checked against them: area (m=0), volume 2 pi (m=1), moments of inertia (m=3).
+area (m=0), volume 2 pi (m=1), moments of inertia (m=3).
 """
 
 from dataclasses import dataclass, field
@@ -22,7 +22,7 @@ __all__ = ["Arc", "Curve", "Line", "Profile", "on_axis"]
 Point = tuple[float, float]
 
 SAME = 1e-9
-"""Points closer than this, relative to the size of the profile, are the same point."""
+"""Distance of equal points over the size of the profile."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,7 @@ class Curve:
     start, end : (r, z) [m]
     centre : (r, z) [m] or None
     angle [rad]
-        Angle turned from start to end, positive anticlockwise.
+        From start to end, positive anticlockwise.
     """
 
     start: Point
@@ -45,7 +45,7 @@ class Curve:
 
     @property
     def radius(self) -> float:
-        """Radius of the arc [m]; infinite for a straight edge."""
+        """Radius [m]; infinite for a straight edge."""
         if self.centre is None:
             return np.inf
         return float(np.hypot(self.start[0] - self.centre[0], self.start[1] - self.centre[1]))
@@ -75,7 +75,7 @@ class Curve:
         return np.where(s == 0, start, np.where(s == 1, end, arc))
 
     def fraction(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Fraction of the length of the nearest point of the edge, clipped to [0, 1]."""
+        """Fraction of the length at the nearest point of the edge, in [0, 1]."""
         points = np.asarray(points, dtype=float)
         start, end = np.array(self.start), np.array(self.end)
         if self.centre is None:
@@ -107,7 +107,7 @@ class Curve:
 
 @cache
 def _gauss(order: int) -> tuple[NDArray, NDArray]:
-    """Points and weights of Gauss on [-1, 1]; the eigenvalues behind them take their time."""
+    """Gauss points and weights on [-1, 1], kept: their eigenvalues take time."""
     return np.polynomial.legendre.leggauss(order)
 
 
@@ -117,7 +117,7 @@ def on_axis(curve: Curve) -> bool:
 
 
 def crossings(a: Curve, b: Curve) -> NDArray[np.float64]:
-    """Points (n, 2) where two edges cross [m]; edges on one line or circle give none."""
+    """Points (n, 2) where edges cross [m]; none on one line or circle."""
     if a.centre is None and b.centre is not None:
         a, b = b, a
     scale = a.length + b.length
@@ -172,7 +172,7 @@ def _circle_circle(a: Curve, b: Curve) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """Straight edge from the end of the edge before to ``end`` (r, z) [m]."""
+    """Straight edge from the edge before to ``end`` (r, z) [m]."""
 
     end: Point
     name: str = ""
@@ -184,12 +184,10 @@ class Arc:
 
     Parameters
     ----------
-    end, centre : (r, z) [m]
     name
-        Name of the surface that the arc sweeps; edges of one name make one surface.
+        Of the surface; edges of one name make one surface.
     clockwise
-        Sense of travel.  None takes the shorter way; for a half circle the way that stays at
-        r >= 0.
+        None: the shorter way; for a half circle the way at r >= 0.
     """
 
     end: Point
@@ -200,14 +198,14 @@ class Arc:
 
 @dataclass(frozen=True)
 class Profile:
-    """Closed meridian (r, z) of one solid; r is the distance from the axis z.
+    """Closed meridian (r, z) of one solid.
 
     Parameters
     ----------
     start : (r, z) [m]
-        Where the first edge begins and the last one must end.
-    edges : tuple of Line or Arc
-        Either sense is accepted; :attr:`curves` is always anticlockwise in the (r, z) plane.
+        The last edge must end there.
+    edges
+        In either sense; :attr:`curves` is anticlockwise in the (r, z) plane.
 
     Examples
     --------
@@ -233,12 +231,12 @@ class Profile:
 
     @property
     def curves(self) -> tuple[Curve, ...]:
-        """Edges with both ends, anticlockwise (material to the left)."""
+        """Edges with both ends, anticlockwise (material left)."""
         return self._curves
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the surfaces, in order; edges on the axis sweep none."""
+        """Surfaces in order; edges on the axis sweep none."""
         used = [c.name for c in self.curves if c.name and not on_axis(c)]
         return tuple(dict.fromkeys(used))
 
@@ -253,7 +251,7 @@ class Profile:
         return 2 * np.pi * self._integral(1, 0)
 
     def surface_area(self, name: str) -> float:
-        """Area of the surface swept by the edges called ``name`` [m^2]."""
+        """Area swept by the edges called ``name`` [m^2]."""
         if name not in self.names:
             raise InputError(
                 f"Profile.surface_area('{name}')",
@@ -288,7 +286,7 @@ def _text(point: NDArray | Point) -> str:
 
 
 def _chain(start: Point, edges: tuple[Line | Arc, ...]) -> tuple[Curve, ...]:
-    """Edges with both ends; checks numbers, closure and r >= 0."""
+    """Edges with both ends; checks numbers, closure, r >= 0."""
     corners = np.array([start, *(edge.end for edge in edges)], dtype=float)
     centres = np.array([e.centre for e in edges if isinstance(e, Arc)], dtype=float)
     if len(edges) < 2 or not (np.all(np.isfinite(corners)) and np.all(np.isfinite(centres))):
@@ -377,7 +375,7 @@ def _half_circle_sense(where: str, start: Point, end: Point, centre: Point) -> b
 
 
 def _require_simple(curves: tuple[Curve, ...]) -> None:
-    """Raise if two edges touch or cross anywhere but at the corner that they share."""
+    """Reject edges that touch or cross but at their shared corner."""
     count = len(curves)
     corners = np.array([curve.start for curve in curves])
     size = float(np.ptp(corners, axis=0).max())

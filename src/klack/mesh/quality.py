@@ -1,10 +1,9 @@
-r"""Checks of a mesh before any equation is solved with it.
+"""Checks of a mesh before any equation is solved with it.
 
-The shape of an element is judged by its scaled Jacobian at the corners: the determinant of the
-edge tangents there over the product of their lengths, times the factor that makes it 1 for the
-ideal corner.  In a serendipity element the tangent at a corner depends on the three nodes of the
-edge only, :math:`t = 4 x_m - 3 x_0 - x_1` (linear: :math:`x_1 - x_0`), so this is exact for every
-family.
+The scaled Jacobian at the corners is the determinant of the edge tangents over the product of
+their lengths, times the factor that makes it 1 for the ideal corner. The tangent at a corner of a
+serendipity element depends on the edge only, :math:`t = 4 x_m - 3 x_0 - x_1` (linear: :math:`x_1 -
+x_0`), so it is exact for every family.
 """
 
 from collections.abc import Sequence
@@ -32,7 +31,7 @@ __all__ = [
 
 
 class PoorElementError(InputError):
-    """An element is inverted or too flat; ``elements`` is the number of all of them."""
+    """An element is inverted or too flat; ``elements`` counts them."""
 
     elements: int = 0
 
@@ -43,13 +42,15 @@ class MeshSummary:
 
     Parameters
     ----------
-    families : mapping of family to number of elements
+    families
+        Elements of each.
     smallest_edge, largest_edge [m]
     worst_quality [-]
-        Smallest scaled Jacobian; 1 ideal, 0 degenerate.
+        Smallest scaled Jacobian.
     worst_element
-        Which element has it, and where.
-    surfaces : mapping of surface name to number of faces
+        With its place.
+    surfaces
+        Faces of each.
     """
 
     nodes: int
@@ -63,7 +64,7 @@ class MeshSummary:
 
 
 def _corner_stars(family: ElementFamily) -> list[list[tuple[int, int]]]:
-    """For every corner its neighbours and the number of the edge, in right-handed order."""
+    """Neighbours of each corner with edge numbers, right-handed."""
     stars: list[list[tuple[int, int]]] = []
     for corner in range(family.corners):
         star = []
@@ -110,12 +111,7 @@ def _right_handed(name: str, corner: int, star: list[tuple[int, int]]) -> list[t
 
 
 def scaled_jacobians(points: NDArray[np.float64], block: ElementBlock) -> NDArray[np.float64]:
-    """Scaled Jacobian at every corner, shape (n_elements, n_corners) [-].
-
-    Parameters
-    ----------
-    points (n, 2) or (n, 3) [m]
-    """
+    """Scaled Jacobian at every corner, shape (n_elements, n_corners) [-]."""
     family = block.topology
     x = points[block.connectivity]
     result = np.empty((len(x), family.corners))
@@ -135,7 +131,7 @@ def scaled_jacobians(points: NDArray[np.float64], block: ElementBlock) -> NDArra
 
 
 def edge_lengths(mesh: Mesh) -> NDArray[np.float64]:
-    """Straight length of every element edge, repeated where elements share it [m]."""
+    """Straight length of every element edge [m], repeated where shared."""
     parts = []
     for block in mesh.blocks:
         pairs = block.connectivity[:, np.array(block.topology.edges)]
@@ -144,7 +140,7 @@ def edge_lengths(mesh: Mesh) -> NDArray[np.float64]:
 
 
 def corner_volume(mesh: Mesh) -> float:
-    """Volume [m^3] of the elements with straight edges; a plane mesh is turned once around."""
+    """Volume [m^3] of elements with straight edges; a plane mesh is turned."""
     total = 0.0
     for block in mesh.blocks:
         x = mesh.points[block.connectivity[:, : block.topology.corners]]
@@ -178,7 +174,7 @@ def _linear_volume(x: NDArray[np.float64], shape: str) -> float:
 
 
 def _worst(mesh: Mesh) -> tuple[float, int, ElementBlock, NDArray[np.float64]]:
-    """Smallest scaled Jacobian, number of its element (counted over all blocks), block, place."""
+    """Smallest scaled Jacobian, number of its element over all blocks, block, place."""
     found = []
     before = 0
     for block in mesh.blocks:
@@ -197,7 +193,7 @@ def _place(x: NDArray[np.float64]) -> str:
 
 
 def mesh_summary(mesh: Mesh) -> MeshSummary:
-    """Sum up a mesh: counts, edge lengths and worst element."""
+    """Counts, edge lengths and worst element."""
     quality, number, block, place = _worst(mesh)
     worst = f"element {number} ({block.family}, solid '{block.solid}')"
     lengths = edge_lengths(mesh)
@@ -222,16 +218,9 @@ def require_positive_jacobians(
     smallest: float = 0.0,
     numbers: Sequence[NDArray[np.int64]] | None = None,
 ) -> None:
-    """Raise :class:`PoorElementError` if an element is inverted or worse than ``smallest``.
+    """Reject an element whose scaled Jacobian is not above ``smallest``.
 
-    Parameters
-    ----------
-    where
-        Start of the error text: what made or read the mesh.
-    smallest [-]
-        Every scaled Jacobian must be above it.
-    numbers
-        Element numbers for the text, one array per block; None counts from 0.
+    ``numbers`` are element numbers for the message, by block; default: from 0.
     """
     quality, number, block, place = _worst(mesh)
     if numbers is not None:
@@ -248,7 +237,7 @@ def require_positive_jacobians(
 
 
 def require_connected(where: str, mesh: Mesh) -> None:
-    """Raise :class:`InputError` if the elements form several parts, or a node has no element."""
+    """Reject elements in several parts, and nodes of no element."""
     rows = [np.repeat(b.connectivity[:, :1], b.connectivity.shape[1] - 1, 1) for b in mesh.blocks]
     i = np.concatenate([row.ravel() for row in rows])
     j = np.concatenate([block.connectivity[:, 1:].ravel() for block in mesh.blocks])

@@ -21,11 +21,11 @@ class Pose:
     Parameters
     ----------
     rotation (3,) [rad]
-        Rotation vector: its direction is the axis, its length the angle.
+        Rotation vector: axis times angle.
     about (3,) [m]
-        Point that the rotation leaves in place, in the drawing.
+        Fixed point of the rotation, in the drawing.
     shift (3,) [m]
-        Translation after the rotation.
+        After the rotation.
     """
 
     rotation: Vector
@@ -39,18 +39,18 @@ class Pose:
         return cls(rotation=np.zeros(3), about=np.zeros(3), shift=shift)
 
     def of(self, points: Vector) -> Vector:
-        """Move points of the drawing, shape (..., 3) [m], to where they are now."""
+        """Points of the drawing, shape (..., 3) [m], where they are now."""
         R = rotation_matrix(self.rotation)
         return (np.asarray(points) - self.about) @ R.T + self.about + self.shift
 
     def drawn(self, points: Vector) -> Vector:
-        """Move points, shape (..., 3) [m], back to where they are in the drawing."""
+        """Points, shape (..., 3) [m], where they are in the drawing."""
         R = rotation_matrix(self.rotation)
         return (np.asarray(points) - self.about - self.shift) @ R + self.about
 
 
 def rotation_matrix(rotation: Vector) -> NDArray[np.float64]:
-    r"""Matrix, shape (3, 3), that turns by a rotation vector, shape (3,) [rad].
+    r"""Matrix (3, 3) of a rotation vector (3,) [rad].
 
     .. math:: R = I + \frac{\sin\theta}{\theta} W + \frac{1 - \cos\theta}{\theta^2} W^2,
         \qquad W x = \theta \times x
@@ -79,12 +79,12 @@ def rigid_placement(
     about: Vector,
     centre: Vector,
 ) -> Vector:
-    """Translation of ``centre`` [m] and rotation vector [rad] of a body off its axis, shape (6,).
+    """Translation of ``centre`` [m] and rotation vector [rad] of an off-axis body, shape (6,).
 
     Parameters
     ----------
     aside, lean (2,) [m], [rad]
-        Position of its axis at the height of ``about``, and slope of the axis.
+        Of its axis, at the height of ``about``.
     about, centre (3,) [m]
     """
     rotation = np.array([-lean[1], lean[0], 0.0])  # z x d

@@ -24,16 +24,15 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Refinement:
-    """Constant element size within a distance of a point or ring.
+    """Element size within a distance of a point or ring.
 
     Parameters
     ----------
     position : (r, z) or (x, y, z) [m]
-        Two numbers are a ring around the axis (a point of the meridian), three a point in space.
+        Two numbers are a ring around the axis, three a point.
     size [m]
-        Edge length of the elements.
     radius [m]
-        Distance up to which ``size`` holds; beyond it elements grow by the grading.
+        Beyond it elements grow by the grading.
     """
 
     position: tuple[float, ...]
@@ -59,19 +58,19 @@ class Refinement:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MeshSizing:
-    """Wanted edge lengths of the elements.
+    """Wanted edge lengths.
 
     Parameters
     ----------
     size [m]
-        Largest edge length anywhere.
+        Largest anywhere.
     surfaces [m]
-        Largest edge length on a named surface.
+        Largest on a named surface.
     refinements
-        Zones of constant small size, typically the contact ring.
+        Typically the contact ring.
     grading [-]
-        Growth of the edge length per distance from a fine zone, above 0 up to 1: 0.3 is usual,
-        0.15 smooth, 0.5 coarse.
+        Growth per distance from a fine zone, above 0 up to 1: 0.3 is usual, 0.15 smooth, 0.5
+        coarse.
 
     Examples
     --------
@@ -106,7 +105,7 @@ class MeshSizing:
         return min(sizes)
 
     def require_surfaces(self, known: tuple[str, ...]) -> None:
-        """Raise :class:`InputError` if a sized surface is not among ``known``."""
+        """Reject a sized surface that is not among ``known``."""
         for name in self.surfaces:
             if name not in known:
                 raise InputError(
@@ -129,7 +128,7 @@ def _steps(refinement: Refinement) -> NDArray[np.float64]:
 
 
 def disc_points(refinement: Refinement) -> NDArray[np.float64]:
-    """Lattice over the disc of a ring refinement in the meridian, shape (n, 2) [m]."""
+    """Lattice over the disc of a ring in the meridian, shape (n, 2) [m]."""
     radius = refinement.radius
     steps = _steps(refinement)
     offsets = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -138,7 +137,7 @@ def disc_points(refinement: Refinement) -> NDArray[np.float64]:
 
 
 def ball_points(refinement: Refinement) -> NDArray[np.float64]:
-    """Lattice over the ball (point) or torus (ring) of a refinement, shape (n, 3) [m]."""
+    """Lattice over the ball (point) or torus (ring), shape (n, 3) [m]."""
     h, radius = _SPACING * refinement.size, refinement.radius
     if refinement.is_ring:
         disc = disc_points(refinement)
@@ -170,11 +169,9 @@ _SECONDS = {2: (8.0, 1.0e-3), 3: (20.0, 1.4e-3)}
 def element_count(
     sizing: MeshSizing, dimension: int, measure: float, surfaces: Mapping[str, float]
 ) -> dict[str, float]:
-    """Elements that each wanted size causes.
+    """Elements that each wanted size causes, by ``"size"``, ``"surfaces.tip"``, ``"contact.size"``.
 
-    A size of 1 um instead of 1 mm makes a thousand million times as many tetrahedra.  The estimate
-    is 0.5 to 1.5 of what netgen makes at a single size; the grading between two sizes is left out.
-    Compared with the memory is what mesh, stiffness and mass of so many elements take.
+    0.5 to 1.5 of what netgen makes at a single size; the grading between sizes is left out.
 
     Parameters
     ----------
@@ -182,13 +179,8 @@ def element_count(
         3 for tetrahedra, 2 for triangles of the half section.
     measure [m^3] or [m^2]
         Volume of the body, area of its half section.
-    surfaces : mapping of str to float [m^2] or [m]
-        Area of each named surface, length of each named edge.
-
-    Returns
-    -------
-    dict of str to float
-        By the words for the size: ``"size"``, ``"surfaces.tip"``, ``"contact.size"``.
+    surfaces [m^2] or [m]
+        Area of each surface, length of each edge.
 
     Examples
     --------
@@ -210,19 +202,19 @@ def element_count(
 
 
 def mesh_nodes(sizing: MeshSizing, dimension: int, measure: float) -> float:
-    """Nodes of a mesh, roughly; see :func:`element_count` for the parameters."""
+    """Nodes of a mesh, roughly; arguments as :func:`element_count`."""
     count = sum(element_count(sizing, dimension, measure, {}).values())
     return _NODES[dimension] * _GROWN[dimension] * count
 
 
 def run_time(nodes: float, dimension: int) -> float:
-    """Time [s] of a first run of an impact on two cores, roughly, from the nodes of all bodies."""
+    """Time [s] of a first impact on two cores, roughly, by the nodes of all bodies."""
     least, each = _SECONDS[dimension]
     return least + each * nodes
 
 
 def element_memory(dimension: int, count: float) -> float:
-    """Memory [byte] of a number of elements with their stiffness and mass matrix."""
+    """Memory [byte] of elements with their stiffness and mass."""
     return _BYTES[dimension] * count
 
 
@@ -233,13 +225,7 @@ def require_meshable(
     measure: float,
     surfaces: Mapping[str, float],
 ) -> None:
-    """Refuse sizes that make more elements than fit into the memory.
-
-    Raises
-    ------
-    InputError
-        It names the size that is to blame, and one that would fit.
-    """
+    """Reject sizes whose elements do not fit into memory; names one that would fit."""
     counts = element_count(sizing, dimension, measure, surfaces)
     total = sum(counts.values())
     needed = element_memory(dimension, total)
@@ -261,7 +247,7 @@ def require_meshable(
 
 
 def _region(refinement: Refinement, dimension: int) -> float:
-    """Volume [m^3] or area [m^2] where a refined size holds; it grows from there on."""
+    """Volume [m^3] or area [m^2] where a refined size holds."""
     radius = refinement.radius + refinement.size
     if dimension == 2:
         return pi * radius**2

@@ -1,7 +1,7 @@
-"""Outer surface of a mesh as triangles that a graphics processor can draw.
+"""Outer surface of a mesh as triangles for a graphics processor.
 
-Vertices are those of the mesh, mid nodes included, once for every smooth part of the surface: they
-carry a normal, and a crease between two parts stays sharp.  A half section is revolved.
+Vertices are the nodes, once for every smooth part of the surface: each has a normal, and creases
+stay sharp. A half section is revolved.
 """
 
 from collections.abc import Mapping
@@ -20,13 +20,13 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _CREASE = np.cos(np.radians(35.0))
-"""Neighbouring triangles whose normals differ by more are parts of their own."""
+"""Angle of normals from which neighbouring triangles are parts of their own."""
 
 _TURNS = (24, 72)
 """Fewest and most segments of a revolved half section."""
 
 _VERTICES = 30_000
-"""Of a revolved half section, about, above the fewest segments."""
+"""About, of a revolved half section, above the fewest segments."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -36,21 +36,21 @@ class Skin:
     Parameters
     ----------
     points, normals (v, 3) [m], [-]
-        Of each vertex.
+        Of vertices.
     node (v,)
         Node of the mesh.
     angle (v,) [rad]
-        To which the half section is turned; empty for a solid.
+        Of the turned half section; empty for a solid.
     face (v,)
-        Place among ``faces``; -1 where the surface has no name.
+        Among ``faces``; else -1.
     faces
         Named surfaces.
     triangles (t, 3)
-        Vertices, anticlockwise seen from outside.
+        Anticlockwise seen from outside.
     element_edges (e, 2)
-        Vertices: sides of the elements.
+        Sides of the elements.
     creases (k, 2)
-        Vertices: where two smooth parts or two named surfaces meet, once on either side.
+        Where two smooth parts or named surfaces meet, once on either side.
     """
 
     points: Floats
@@ -66,7 +66,7 @@ class Skin:
 
 @dataclass(frozen=True, eq=False)
 class _Corners:
-    """Triangles on points before they are split at creases; ``sides`` are pairs of points."""
+    """Triangles before the split at creases; ``sides`` are pairs of points."""
 
     points: Floats
     triangles: Ints
@@ -75,7 +75,7 @@ class _Corners:
 
 
 def skin_of_mesh(mesh: Mesh) -> Skin:
-    """Outer surface of a solid, or of the body of revolution of a half section."""
+    """Outer surface of a solid, or of a revolved half section."""
     names = tuple(mesh.surfaces)
     outer = outer_surface(mesh)
     faces = {
@@ -96,7 +96,7 @@ def _keys(connectivity: Ints, family: str) -> Ints:
 
 
 def _names_of(block: FaceBlock, faces: Mapping[str, list[Ints]]) -> Ints:
-    """Which named surface each face belongs to; the first one of several; -1 for none."""
+    """First named surface of each face, or -1."""
     keys = _keys(block.connectivity, block.family)
     found = np.full(len(keys), -1)
     rows = {row.tobytes(): i for i, row in enumerate(np.ascontiguousarray(keys))}
@@ -193,7 +193,7 @@ def _revolved_corners(
 
 
 def _split(corners: _Corners, node: Ints, angle: Floats, names: tuple[str, ...]) -> Skin:
-    """One vertex for every point of every smooth part."""
+    """One vertex for each point of each smooth part."""
     triangles, face = corners.triangles, corners.face
     normals = _triangle_normals(corners.points, triangles)
     kept = np.linalg.norm(normals, axis=1) > 0
@@ -239,7 +239,7 @@ def _triangle_normals(points: Floats, triangles: Ints) -> Floats:
 def _smooth_parts(
     triangles: Ints, face: Ints, unit: Floats, points: int
 ) -> tuple[Ints, Ints, Ints]:
-    """Smooth part of each triangle; ends of the edges between parts, and both parts there."""
+    """Part of each triangle; ends of edges between parts, and both parts there."""
     count = len(triangles)
     ends = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     owner = np.repeat(np.arange(count), 3)

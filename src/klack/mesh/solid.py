@@ -1,8 +1,8 @@
 """Solid meshes of ten-node tetrahedra from CAD: STEP files and revolved profiles.
 
-Netgen (with OpenCASCADE inside) makes the mesh; it models in millimetres, here and only here.
-Mid nodes lie on the true geometry.  Named faces become surfaces; a face between two solids of one
-body is no surface, its nodes are a node set of the same name.
+Netgen (with OpenCASCADE) makes the mesh, in millimetres here alone. Mid nodes lie on the true
+geometry. Named faces become surfaces; one between two solids of a body becomes a node set of its
+name.
 """
 
 import re
@@ -38,51 +38,34 @@ _NO_AREA = 1e-9  # mm^2
 
 
 def mesh_step(path: str | Path, sizing: MeshSizing) -> Mesh:
-    """Mesh all solids of a STEP file as one body.
+    """Mesh all solids of a STEP file as one body of ``tet10``.
+
+    Rejects files without solids, a solid inside out, solids that do not touch, and what netgen
+    cannot mesh.
 
     Parameters
     ----------
     path
-        STEP file (AP203, AP214 or AP242); its declared unit of length is respected.  Names of
-        solids and faces are kept; those without get ``solid1``, ``face1`` and so on.
+        AP203, AP214 or AP242; its unit of length is respected.  Solids and faces without names are
+        called ``solid1``, ``face1`` and so on.
     sizing
         Refinements are points (x, y, z) or rings (r, z) around the z axis.
-
-    Returns
-    -------
-    Mesh
-        Of dimension 3, elements ``tet10``.
-
-    Raises
-    ------
-    InputError
-        If the file is not STEP, has no solid, a solid is inside out, a sized surface is not there,
-        the solids do not touch, or netgen cannot mesh it.
     """
     shape = read_step(Path(path))
     return _mesh_shape(f"mesh_step: {path}", shape, sizing)
 
 
 def mesh_revolved(profiles: Mapping[str, Profile], sizing: MeshSizing) -> Mesh:
-    """Mesh the full turn of one or several profiles (one per solid) as one body.
+    """Mesh the full turn of profiles, one per solid, as one body of ``tet10``.
 
-    Parameters
-    ----------
-    profiles : mapping of solid name to Profile
-    sizing
-        Refinements are points (x, y, z) or rings (r, z) around the z axis.
-
-    Returns
-    -------
-    Mesh
-        Of dimension 3, elements ``tet10``; surfaces named like the edges of the profiles.
+    Surfaces are called like the edges of the profiles; ``sizing`` as :func:`mesh_step`.
     """
     shape = _glued("mesh_revolved", revolved_solids(profiles))
     return _mesh_shape("mesh_revolved", shape, sizing)
 
 
 def write_step_revolved(profiles: Mapping[str, Profile], path: str | Path) -> None:
-    """Write the full turn of one or several profiles as a STEP file with named faces, in mm."""
+    """Write the full turn of profiles as a STEP file with named faces, in mm."""
     from netgen.occ import Compound
 
     solids = revolved_solids(profiles)
@@ -99,10 +82,7 @@ def write_step_revolved(profiles: Mapping[str, Profile], path: str | Path) -> No
 def read_step(path: Path) -> Any:
     """Shape of a STEP file: one solid, or several that share their common faces.
 
-    Raises
-    ------
-    InputError
-        If the file is not STEP, has no solid, or its solids overlap.
+    Rejects files without solids, and overlapping ones.
     """
     from netgen.occ import OCCGeometry
 
@@ -155,7 +135,7 @@ def _require_areas(where: str, shape: Any) -> None:
 
 
 def _glued(where: str, solids: list[Any]) -> Any:
-    """One shape of solids that share faces; overlapping solids are refused."""
+    """One shape of solids that share faces; rejects overlap."""
     shape = glue(solids)
     if len(shape.solids) != len(solids):
         raise InputError(
@@ -168,17 +148,17 @@ def _glued(where: str, solids: list[Any]) -> Any:
 
 
 def solid_names(shape: Any) -> tuple[str, ...]:
-    """Name of each solid of a shape; solid1, solid2, ... of those without."""
+    """Names of solids; solid1, solid2, ... where missing."""
     return _names(shape.solids, "solid")
 
 
 def face_names(shape: Any) -> tuple[str, ...]:
-    """Name of each face of a shape; face1, face2, ... of those without."""
+    """Names of faces; face1, face2, ... where missing."""
     return _names(shape.faces, "face")
 
 
 def _names(shapes: Any, kind: str) -> tuple[str, ...]:
-    """Names of solids or faces; those without are named by their position in the list."""
+    """Names, or positions in the list."""
     return tuple(shape.name or f"{kind}{k + 1}" for k, shape in enumerate(shapes))
 
 
@@ -242,7 +222,7 @@ def _refined_points(refinement: Refinement, shape: Any) -> NDArray[np.float64]:
 
 
 def _read_netgen(netgen: Any, solids: tuple[str, ...], faces: tuple[str, ...]) -> Mesh:
-    """Our mesh from netgen's, with our orientation and mid-node order."""
+    """Our mesh from netgen's, in our orientation and order."""
     points = np.asarray(netgen.Coordinates()) / MM
     elements = netgen.Elements3D().NumPy()
     nodes = elements["nodes"].astype(np.int64) - 1
@@ -267,10 +247,9 @@ def _read_netgen(netgen: Any, solids: tuple[str, ...], faces: tuple[str, ...]) -
 
 
 def _abaqus_order(points: NDArray[np.float64], nodes: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Ten-node tetrahedra with positive volume and mid nodes in the order of our edges.
+    """Ten-node tetrahedra with positive volume and mid nodes in our order.
 
-    Which mid node lies on which edge is found from the coordinates: the mid node whose mean
-    distance from the middle of the chord is smallest.
+    The mid node of an edge is that nearest, on average, to the middle of the chord.
     """
     corners = points[nodes[:, :4]]
     volume = np.linalg.det(corners[:, 1:] - corners[:, :1])
@@ -295,7 +274,7 @@ def _abaqus_order(points: NDArray[np.float64], nodes: NDArray[np.int64]) -> NDAr
 def _named_faces(
     netgen: Any, blocks: tuple[ElementBlock, ...], names: tuple[str, ...]
 ) -> tuple[dict[str, Surface], dict[str, NDArray[np.int64]]]:
-    """Surfaces of the outer faces (normals from the elements), node sets of the inner ones."""
+    """Surfaces of outer faces (normals from the elements), node sets of inner ones."""
     table = FaceTable.of(blocks)
     triangles = netgen.Elements2D().NumPy()
     rows = table.find(triangles["nodes"][:, :3].astype(np.int64) - 1)

@@ -1,4 +1,4 @@
-"""Content of a STEP file before meshing: its solids and faces with their positions."""
+"""Content of a STEP file before meshing: solids and faces with positions."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,15 +21,15 @@ class StepPart:
     Parameters
     ----------
     name
-        As :func:`~klack.mesh.solid.mesh_step` gives it.
+        As of :func:`~klack.mesh.solid.mesh_step`.
     named
-        Whether the file says the name; otherwise it is a number of the list of faces.
+        In the file; else it is a number of the list.
     count
         Solids or faces of this name.
     size [m^3] or [m^2]
-        Volume or area of all of them.
+        Total.
     low, high (3,) [m]
-        Corners of the box around all of them.
+        Corners of the box around all.
     """
 
     name: str
@@ -49,13 +49,7 @@ class StepContent:
 
 
 def step_content(path: str | Path) -> StepContent:
-    """Solids and faces of a STEP file under the names that a case uses.
-
-    Raises
-    ------
-    InputError
-        If the file is not STEP, has no solid, or its solids overlap.
-    """
+    """Solids and faces of a STEP file under the names that a case uses."""
     shape = read_step(Path(path))
     return StepContent(
         solids=_parts(list(shape.solids), solid_names(shape), MM**3),
@@ -64,7 +58,7 @@ def step_content(path: str | Path) -> StepContent:
 
 
 def _parts(shapes: list, names: tuple[str, ...], unit: float) -> tuple[StepPart, ...]:
-    """One entry for each name; ``unit`` is a cubic or square metre in millimetres."""
+    """One entry per name; ``unit`` is a cubic or square metre in millimetres."""
     parts = []
     for name in dict.fromkeys(names):
         here = [shape for shape, other in zip(shapes, names, strict=True) if other == name]

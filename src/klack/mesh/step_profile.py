@@ -1,8 +1,8 @@
 """Half section of a turned part from its STEP file.
 
-The solid is cut with the half plane y = 0, x >= 0.  It is a body of revolution if the cut is one
-outline of straight edges and arcs whose full turn has the volume and the surface of the solid
-(Pappus), and if a second half plane cuts the same area.
+The solid is cut with the half plane y = 0, x >= 0. It is a body of revolution if the cut is one
+outline of straight edges and arcs whose full turn has its volume and surface (Pappus), and a
+second half plane cuts the same area.
 """
 
 from pathlib import Path
@@ -31,23 +31,21 @@ class NotTurnedError(InputError):
 
 
 def profiles_of_step(path: str | Path) -> dict[str, Profile]:
-    """Half section of every solid of a STEP file.
+    """Half section of every solid of a STEP file, [m].
 
-    Names of edges are those of the faces that they sweep, as :func:`~klack.mesh.solid.mesh_step`
-    gives them; of a face that is cut into parts round the axis, the part that lies in the plane.
+    Edges are named as the faces that they sweep (:func:`~klack.mesh.solid.mesh_step`), or the part
+    of a face that lies in the plane.
 
     Raises
     ------
     NotTurnedError
-        If a solid is no body of revolution around z.
-    InputError
-        If the file cannot be read.
+        For a solid that is no body of revolution around z.
     """
     return profiles_of_shape(str(path), read_step(Path(path)))
 
 
 def profiles_of_shape(where: str, shape: Any) -> dict[str, Profile]:
-    """Half section of every solid of a shape of OpenCASCADE, in metres."""
+    """Half section of every solid of an OpenCASCADE shape [m]."""
     faces = list(zip(face_names(shape), shape.faces, strict=True))
     names = solid_names(shape)
     return {
@@ -86,7 +84,7 @@ def _z_axis() -> Any:
 
 
 def _cut(solid: Any, low: Points, high: Points) -> Any:
-    """Faces that the half plane y = 0, x >= 0 has in common with a solid."""
+    """Faces that the half plane shares with a solid."""
     from netgen.occ import Axes, WorkPlane
 
     width = 2.0 * float(np.max(np.abs([low[:2], high[:2]])))
@@ -96,7 +94,7 @@ def _cut(solid: Any, low: Points, high: Points) -> Any:
 
 
 def _curve(where: str, edge: Any, size: float) -> Curve:
-    """An edge of the cut as a straight line or an arc [m]."""
+    """Edge of the cut as a line or arc [m]."""
     first, last = edge.parameter_interval
     points = np.array([_rounded(edge.Value(s)) for s in np.linspace(first, last, 9)])
     start, end, middle = points[0], points[-1], points[4]
@@ -139,7 +137,7 @@ def _centre(a: Points, b: Points, c: Points) -> Points:
 
 
 def _chained(where: str, curves: list[Curve], size: float) -> list[Curve]:
-    """Curves in the order of a walk, each from the end of the one before."""
+    """Curves in the order of a walk."""
     rest = list(curves)
     walk = [rest.pop(0)]
     near = 1e-6 * size / MM
@@ -162,7 +160,7 @@ def _chained(where: str, curves: list[Curve], size: float) -> list[Curve]:
 
 
 def _name_at(curve: Curve, faces: list[tuple[str, Any]]) -> str:
-    """Name of the face that the middle of an edge lies on."""
+    """Face on which the middle of an edge lies."""
     from netgen.occ import Pnt, Vertex
 
     r, z = (float(x) * MM for x in curve.at(0.5))
@@ -177,7 +175,7 @@ def _edge(curve: Curve, name: str) -> Line | Arc:
 
 
 def _swept(curve: Curve) -> float:
-    """Area of the full turn of an edge [m^2]: length times the way of its centroid."""
+    """Area of the turned edge [m^2]: length times way of its centroid."""
     points = curve.at(np.linspace(0.0, 1.0, 2001))[:, 0]
     mean = (points[0] + points[-1] + 4 * points[1::2].sum() + 2 * points[2:-1:2].sum()) / 6000.0
     return float(2.0 * np.pi * mean * curve.length)

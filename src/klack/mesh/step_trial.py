@@ -1,10 +1,9 @@
 """First reading of a STEP file in a separate process.
 
-OpenCASCADE reads whatever a file says.  Of files with a few wrong digits or a lost line one in six
-brought it to an end without a word (a segmentation fault), some keep it busy without end: that may
-not happen in the process that holds the work of a user.  The second reading, of a file that passed,
-takes as long as the first; meshing takes far longer.  A file that passed is not tried again by this
-process until it changes.
+Of files with a few wrong digits or a lost line, one in six ends OpenCASCADE with a segmentation
+fault, some keep it busy without end: not in the process that holds the work of a user. The second
+reading takes as long as the first; meshing takes far longer. A file that passed is not tried again
+until it changes.
 """
 
 import re
@@ -37,11 +36,8 @@ os._exit(0)
 def require_readable_step(path: Path, patience: float = _PATIENCE) -> None:
     """Read a STEP file, and forget it.
 
-    Raises
-    ------
-    InputError
-        If an entity is missing or there twice, which OpenCASCADE passes over, if it breaks on the
-        file, or does not come to an end within ``patience`` [s].
+    Rejects missing and repeated entities, which OpenCASCADE ignores, a file that breaks it, and
+    one that takes longer than ``patience`` [s].
     """
     state = path.stat()
     _try(path, patience, (state.st_dev, state.st_ino, state.st_size, state.st_mtime_ns))
@@ -59,7 +55,7 @@ def _require_entities(path: Path) -> None:
 
 @cache  # a file that was refused is tried again: memory may have been short
 def _try(path: Path, patience: float, state: tuple[int, ...]) -> None:
-    """Look for what is lost, and start the child; ``state`` identifies a version of the file."""
+    """Look for losses, and start the child; ``state`` identifies a version of the file."""
     _require_entities(path)
     if not sys.executable:  # inside of another program
         return

@@ -1,13 +1,12 @@
 """Solid meshes of a full turn, swept from an axisymmetric mesh.
 
-Every triangle of the meridian becomes one ring of wedges, every wedge three tetrahedra.  The
-diagonals follow one rule everywhere: on the quadrilateral between two columns of nodes the diagonal
-goes from the column with the lower number in this layer to the other column in the next layer, so
-neighbours agree without being asked.  On the axis a column is a single node, and the tetrahedra
-that lose their volume there are dropped.  Nodes are placed in (r, z, theta), mid nodes halfway in
-theta on the mid node of the meridian: all nodes of a surface lie on the exact surface of
-revolution.  A fine meridian with 12-24 layers resolves a contact ring with far fewer points than an
-unstructured mesh.
+Every triangle of the meridian becomes one ring of wedges, every wedge three tetrahedra. The
+diagonal of the quadrilateral between two columns of nodes goes from the column with the lower
+number in this layer to the other one in the next layer, so neighbours agree. On the axis a column
+is a single node, and tetrahedra without volume are dropped. Nodes are placed in (r, z, theta), mid
+nodes halfway in theta on the mid node of the meridian: all nodes of a surface lie on the exact
+surface of revolution. A fine meridian with 12-24 layers resolves a contact ring with far fewer
+points than an unstructured mesh.
 """
 
 from dataclasses import dataclass
@@ -35,7 +34,7 @@ _STAIRCASE = (
 
 @dataclass(frozen=True)
 class _Ring:
-    """Corner nodes of the solid: columns of ``layers`` nodes, one node per column on the axis."""
+    """Corner nodes: columns of ``layers`` nodes, one node per column on the axis."""
 
     first: NDArray[np.int64]  # node of layer 0, by meridian node (-1 for mid nodes)
     axis: NDArray[np.bool_]  # by meridian node
@@ -44,31 +43,23 @@ class _Ring:
     layer: NDArray[np.int64]  # by corner node
 
     def node(self, column: NDArray[np.int64], layer: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Find the number of the node of a column in a layer."""
+        """Node of a column in a layer."""
         return self.first[column] + np.where(self.axis[column], 0, layer % self.layers)
 
 
 def sweep(meridian: Mesh, layers: int, start_angle: float = 0.0) -> Mesh:
     """Turn a mesh of six-node triangles once around its axis into ten-node tetrahedra.
 
+    Solids, surfaces and node sets stay; x = r cos(theta), y = r sin(theta).
+
     Parameters
     ----------
     meridian
-        Of dimension 2, all elements ``tri6``.
+        All elements ``tri6``.
     layers
-        Elements around the circumference, at least 6.
+        Elements around, at least 6.
     start_angle [rad]
-        Angle of the first layer; two bodies in contact need not match.
-
-    Returns
-    -------
-    Mesh
-        x = r cos(theta), y = r sin(theta); the same solids, surfaces and node sets.
-
-    Raises
-    ------
-    InputError
-        If the mesh is not made of six-node triangles, or ``layers`` is too small.
+        Of the first layer; two bodies in contact need not match.
     """
     _require_sweepable(meridian, layers)
     count = 3.0 * meridian.element_count * layers
@@ -142,7 +133,7 @@ def _ring(meridian: Mesh, layers: int) -> _Ring:
 
 
 def _tetrahedra(ring: _Ring, triangles: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Corner tetrahedra (n, 4) with positive volume, those without volume left out."""
+    """Corner tetrahedra (n, 4) with positive volume."""
     order = np.argsort(triangles, axis=1)
     columns = np.take_along_axis(triangles, order, axis=1)
     # cyclic permutations of (0, 1, 2) keep the sense of the triangle
@@ -161,7 +152,7 @@ def _tetrahedra(ring: _Ring, triangles: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def _triangles(ring: _Ring, surface: Surface) -> NDArray[np.int64]:
-    """Corner triangles (n, 3) of a surface, anticlockwise from outside."""
+    """Corner triangles (n, 3), anticlockwise from outside."""
     lines = np.concatenate([block.connectivity[:, :2] for block in surface.blocks])
     layer = np.arange(ring.layers)
     a, b = lines[:, :1], lines[:, 1:]
@@ -176,7 +167,7 @@ def _triangles(ring: _Ring, surface: Surface) -> NDArray[np.int64]:
 
 
 def _keys(ring: _Ring, pairs: NDArray[np.int64]) -> NDArray[np.int64]:
-    """One number per pair of corner nodes, the same for both orders."""
+    """Number of a pair of corner nodes, in either order."""
     pairs = np.sort(pairs.reshape(-1, 2), axis=1)
     return pairs[:, 0] * len(ring.column) + pairs[:, 1]
 
@@ -184,7 +175,7 @@ def _keys(ring: _Ring, pairs: NDArray[np.int64]) -> NDArray[np.int64]:
 def _middles(
     meridian: Mesh, ring: _Ring, keys: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Meridian node and (half-integer) layer of the mid node of every edge."""
+    """Meridian node and (half-integer) layer of each mid node."""
     p, q = np.divmod(keys, len(ring.column))
     a, b = ring.column[p], ring.column[q]
     origin = np.where(a == b, a, -1)
@@ -199,7 +190,7 @@ def _middles(
 def _meridian_middles(
     meridian: Mesh, a: NDArray[np.int64], b: NDArray[np.int64]
 ) -> NDArray[np.int64]:
-    """Mid node of the meridian edges between the corner nodes ``a`` and ``b``."""
+    """Mid node of meridian edges between corner nodes."""
     count = meridian.node_count
     keys, middles = [], []
     for block in meridian.blocks:

@@ -1,11 +1,10 @@
-r"""Low pass of a sensor, solved exactly for a signal that runs straight between its samples.
+r"""Low pass of a sensor, exact for a signal that is straight between its samples.
 
 .. math:: y = \sum_i \frac{r_i}{s - p_i}\, x, \qquad \sum_i \frac{-r_i}{p_i} = 1
 
-with the poles :math:`p_i` of a Butterworth (1930) or of a Bessel polynomial (Thomson 1949); both
-lose 3 dB at the cut-off.  A Butterworth low pass keeps the level of high frequencies longest and
-overshoots a step, from order 2 on by 4 to 11 %; that of Bessel keeps the shape, and overshoots by
-less than 1 %.
+with the poles :math:`p_i` of a Butterworth (1930) or Bessel polynomial (Thomson 1949), 3 dB down
+at the cut-off. Butterworth keeps the level of high frequencies longest and overshoots a step, from
+order 2 on by 4 to 11 %; Bessel keeps the shape, and overshoots by less than 1 %.
 """
 
 from dataclasses import dataclass
@@ -30,7 +29,7 @@ class LowPass:
     Parameters
     ----------
     cut_off [Hz]
-        Where 3 dB are lost.
+        Of 3 dB.
     order
         Poles.
     """
@@ -55,30 +54,30 @@ class LowPass:
 
     @property
     def delay(self) -> float:
-        """Time [s] by which slow changes are shown late."""
+        """Delay of slow changes [s]."""
         return float(np.sum(-1.0 / self.poles).real)
 
     @property
     def words(self) -> str:
-        """For example ``Bessel low pass of order 2 at 80 kHz``."""
+        """As ``Bessel low pass of order 2 at 80 kHz``."""
         name = self.kind.capitalize()
         return f"{name} low pass of order {self.order} at {self.cut_off / 1e3:.6g} kHz"
 
     def __call__(self, values: Floats, step: float) -> Floats:
-        """Signal behind the low pass, same shape; at rest before its first sample."""
+        """Signal behind the low pass, at rest before its first sample."""
         return low_passed(values, self.poles, step)
 
 
 def low_passed(values: Floats, poles: NDArray[np.complex128], step: float) -> Floats:
     """Signal behind a low pass of single poles and unit gain at rest.
 
-    A sine sampled at the step h loses a further ``sinc^2(f h)`` by the straight lines between its
-    samples: 0.8 % at 50 kHz and 1 us.
+    Straight lines between the samples of a sine lose a further ``sinc^2(f h)``: 0.8 % at 50 kHz
+    and 1 us.
 
     Parameters
     ----------
     values (..., n)
-        Samples; before the first one the signal is taken to rest there.
+        Before the first one the signal rests there.
     poles (order,) [1/s]
     step [s]
 
@@ -104,7 +103,7 @@ def low_passed(values: Floats, poles: NDArray[np.complex128], step: float) -> Fl
 
 
 def _residues(poles: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Residues of the product of ``-p / (s - p)``; the poles are all different."""
+    """Residues of the product of ``-p / (s - p)``, poles all different."""
     distance = poles[:, None] - poles[None, :]
     np.fill_diagonal(distance, 1.0)
     return np.asarray(np.prod(-poles) / np.prod(distance, axis=1))

@@ -1,4 +1,4 @@
-"""Sampled signals and spectra that carry their axis and their unit."""
+"""Sampled signals and spectra with axis and unit."""
 
 from dataclasses import dataclass
 
@@ -19,9 +19,9 @@ class TimeSeries:
     step [s]
     values (n,) [unit]
     unit
-        For example ``"N"``.
+        As ``"N"``.
     start [s]
-        Time of the first value.
+        Of the first value.
     """
 
     step: float
@@ -60,9 +60,9 @@ class Spectrum:
     frequency (k,) [Hz]
         Uniform, from 0.
     values (k,) [unit]
-        Complex for a spectrum, real for a density.
+        Complex, or real for a density.
     unit
-        For example ``"N s"``.
+        As ``"N s"``.
     """
 
     frequency: NDArray[np.float64]

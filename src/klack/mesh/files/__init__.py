@@ -1,1 +1,1 @@
-"""Finished meshes from files of other programs, one folder for each format."""
+"""Finished meshes from files of other programs, one folder per format."""

@@ -23,7 +23,7 @@ class MeshReader(Protocol):
         solids: Sequence[str] | None,
         solids_only: bool,
     ) -> MeshModel:
-        """Read the mesh; raise where neither the call nor the file gives a unit of length."""
+        """Read the mesh; reject a missing unit of length."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,16 +33,13 @@ class MeshFormat:
     Parameters
     ----------
     path
-        Where its :class:`MeshReader` is, below ``klack.mesh.files``.
+        Of its :class:`MeshReader`, below ``klack.mesh.files``.
     program
-        Whose files these are, in words.
-    endings
-        Of the names of such files.
+        In words.
     mark
-        Pattern of a line that only these files have: it decides where formats share an ending.
+        Pattern of a line that only these files have, for shared endings.
     open_end
-        Whether the format has neither an end mark nor counts of all its content: what a file
-        loses behind a whole block is not seen.
+        The format has neither an end mark nor all counts: a file cut behind a whole block passes.
     """
 
     path: str
@@ -53,7 +50,7 @@ class MeshFormat:
 
     @property
     def reader(self) -> MeshReader:
-        """The function that reads such files; imported on first use."""
+        """Reader, imported on first use."""
         module, _, name = self.path.rpartition(".")
         return cast("MeshReader", getattr(import_module(f"klack.mesh.files.{module}"), name))
 
@@ -91,6 +88,6 @@ MESH_FORMATS: Mapping[str, str] = {
 
 
 def format_of(path: Path) -> MeshFormat:
-    """Format of a file with one of the endings of :data:`MESH_FORMATS`."""
+    """Format of an ending in :data:`MESH_FORMATS`."""
     *marked, last = (one for one in FORMATS if path.suffix.lower() in one.endings)
     return next((one for one in marked if path.is_file() and one.marks(path)), last)

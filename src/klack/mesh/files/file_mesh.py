@@ -1,7 +1,7 @@
 """From the nodes, elements and sets of a file to a mesh.
 
-Every reader hands over what its file holds, in the numbers of the file and in the node order of
-:mod:`klack.mesh.families`; what follows is the same for all formats.
+Readers give numbers of the file and the node order of :mod:`klack.mesh.families`; the rest is the
+same for all formats.
 """
 
 from collections.abc import Mapping, Sequence
@@ -35,7 +35,7 @@ _FARTHEST = 1e4  # [m] of a node from the origin
 
 
 def require_near(path: Path, points: NDArray[np.float64], numbers: Ints) -> None:
-    """Raise for a node so distant that its unit or its columns must be wrong."""
+    """Reject a node so distant that its unit or its columns must be wrong."""
     far = np.abs(points).max(axis=1) > _FARTHEST
     if far.any():
         at = int(np.argmax(far))
@@ -48,7 +48,7 @@ def require_near(path: Path, points: NDArray[np.float64], numbers: Ints) -> None
 
 
 def require_right_of_axis(path: Path, mesh: Mesh, numbers: Ints) -> None:
-    """Raise for a node of an axisymmetric mesh that lies left of the axis."""
+    """Reject a node left of the axis."""
     if mesh.dimension != 2:
         return
     lowest = int(np.argmin(mesh.points[:, 0]))
@@ -62,9 +62,9 @@ def require_right_of_axis(path: Path, mesh: Mesh, numbers: Ints) -> None:
 
 
 def require_sound(path: Path, mesh: Mesh, numbers: Sequence[Ints]) -> None:
-    """Raise for elements on the same corners, and inverted ones; some at a time, for the memory.
+    """Reject elements on the same corners, and inverted ones; in parts, for the memory.
 
-    Two elements in one place count their mass and stiffness twice, and all their outer faces go.
+    Two elements in one place count mass and stiffness twice, and lose their outer faces.
     """
     for corners in sorted({block.topology.corners for block in mesh.blocks}):
         alike = [i for i, block in enumerate(mesh.blocks) if block.topology.corners == corners]
@@ -91,7 +91,7 @@ def require_sound(path: Path, mesh: Mesh, numbers: Sequence[Ints]) -> None:
 
 
 def same_nodes(nodes: Ints) -> tuple[int, int] | None:
-    """Rows of the first two elements on the same nodes, in whatever order these stand."""
+    """Rows of the first two elements on the same nodes, in any order."""
     ordered = np.sort(nodes, axis=1)
     # equal rows have equal sums; others hardly ever, and are told apart below
     weights = np.array([pow(0x9E3779B97F4A7C15, k, 1 << 64) for k in range(1, nodes.shape[1] + 1)])
@@ -113,10 +113,10 @@ class FileElements:
     Parameters
     ----------
     name
-        Of the solid, or of the surface that surface elements mark.
+        Of the solid, or the marked surface.
     numbers (n,)
     nodes (n, k)
-        Node numbers of the file; of surface elements the corners are enough.
+        Of the file; of surface elements corners are enough.
     """
 
     family: str
@@ -132,22 +132,19 @@ class FileMesh:
     Parameters
     ----------
     numbers (n,)
-        Of the nodes, in any order.
+        Of the nodes.
     points (n, 3) [unit of the file]
     solids, faces
-        Elements with volume (in an axisymmetric mesh: plane ones), and those that mark surfaces.
-    node_sets : mapping of name to node numbers
+        Elements with volume (plane ones, if axisymmetric), and those that mark surfaces.
     faces_of_sets
-        True: a node set that holds all nodes of some outer faces is a surface as well.
+        A node set that holds all nodes of some outer faces is a surface too.
     loose_faces
-        True: surface elements on no solid are ignored, since they have no stiffness.
+        Surface elements on no solid are ignored, since they have no stiffness.
     solids_only
-        True: surface elements on no solid are left out and counted.
+        Surface elements on no solid are left out and counted.
     left_out
-        Elements of other kinds that the reader left out already, by their type.
-    foreign_materials
-        As in :class:`~klack.mesh.files.mesh_model.MeshModel`.
-    materials, sections : mappings
+        Elements of other kinds left out by the reader, by type.
+    foreign_materials, materials, sections
         As in :class:`~klack.mesh.files.mesh_model.MeshModel`.
     """
 
@@ -168,13 +165,10 @@ class FileMesh:
 def mesh_model(
     path: Path, raw: FileMesh, unit_length: float, wanted: Sequence[str] | None
 ) -> MeshModel:
-    """Build the mesh: only nodes of its elements, surfaces and sets on them, checked.
+    """Build the mesh of the wanted solids: nodes of its elements, surfaces and sets, checked.
 
-    Raises
-    ------
-    InputError
-        For nodes that are missing, nodes and elements that are there twice, solids that are not
-        there, surface elements on no solid, points left of the axis, and inverted elements.
+    Rejects missing and repeated nodes, repeated and inverted elements, missing solids, surface
+    elements on no solid, and points left of the axis.
     """
     require_positive(f"{path}: unit of length", unit_length, "m")
     solids = tuple(part for part in raw.solids if len(part.numbers))
@@ -242,7 +236,7 @@ def _dimension(path: Path, solids: tuple[FileElements, ...]) -> int:
 
 
 def _merged(parts: tuple[FileElements, ...]) -> tuple[FileElements, ...]:
-    """One part for each solid and family, in order of first appearance."""
+    """One part for each solid and family."""
     groups: dict[tuple[str, str], list[FileElements]] = {}
     for name in dict.fromkeys(part.name for part in parts):
         for part in parts:
@@ -262,7 +256,7 @@ def _merged(parts: tuple[FileElements, ...]) -> tuple[FileElements, ...]:
 
 
 def _require_once(path: Path, kind: str, ascending: Ints) -> None:
-    """Raise for a number that is there twice."""
+    """Reject a number that comes twice."""
     twice = np.flatnonzero(ascending[1:] == ascending[:-1])
     if len(twice):
         raise InputError(
@@ -296,7 +290,7 @@ class _NodeNumbers:
         return rows
 
     def present(self, numbers: Ints) -> Ints:
-        """Selected nodes that the file defines, numbered from 0."""
+        """Defined nodes among some, from 0."""
         rows, found = self._find(np.asarray(numbers, dtype=np.int64))
         return np.unique(rows[found])
 
@@ -341,9 +335,9 @@ _MIRRORED = {
 
 
 def _turned(points: NDArray[np.float64], block: ElementBlock) -> ElementBlock:
-    """Turn elements round whose sense differs between programs: plane ones and wedges.
+    """Turn elements whose sense differs between programs: plane ones and wedges.
 
-    A plane mesh has the sense of its drawing, and VTK numbers a wedge from its other side.
+    A plane mesh has the sense of its drawing; VTK numbers a wedge from its other side.
     """
     if block.family not in _MIRRORED:
         return block

@@ -24,7 +24,7 @@ _HEAD = 20_000  # bytes in which a script shows what it is
 
 
 def refuse_script(path: Path) -> None:
-    """Raise for commands of ANSYS (MAPDL) under an ending that is also that of another program."""
+    """Reject commands of ANSYS under the ending of another program."""
     if path.suffix.lower() not in _ENDINGS or not path.is_file():
         return
     with path.open("rb") as stream:
@@ -51,26 +51,25 @@ def read_mesh_file(
     Parameters
     ----------
     path
-        With one of the endings of :data:`~klack.mesh.files.catalogue.MESH_FORMATS`.
+        With an ending of :data:`~klack.mesh.files.catalogue.MESH_FORMATS`.
     unit_length [m]
-        Unit of the coordinates: 1e-3 for millimetres.  None where the file names it.
+        1e-3 for millimetres; None where the file names it.
     solids
-        Keep these solids only; None keeps all.
+        To keep; None keeps all.
     solids_only
-        Leave out beams, springs, masses, rigid elements, and shells on no solid, with a warning
-        that counts them; they are an error otherwise.  Volumes that klack does not know (pyramids,
-        gaskets) are an error in any case: the body would have a hole.
+        Leave out beams, springs, masses, rigid elements, and shells on no solid; else they are an
+        error.  Unknown volumes (pyramids, gaskets) always are: the body would have a hole.
 
     Raises
     ------
     InputError
-        With file and place, if the file cannot be read, is of another kind, names no unit, or
-        holds a body of no plausible size (the sign of a wrong unit).
+        If the file cannot be read, is of another kind, names no unit, or holds a body of no
+        plausible size (the sign of a wrong unit).
 
     Warns
     -----
     AccuracyWarning
-        With the number and type of the elements that were left out.
+        With number and type of the elements that were left out.
     """
     path = Path(path)
     refuse_lfs_pointer(path)

@@ -1,4 +1,4 @@
-"""A mesh as a file holds it: with the numbers of the file, its materials and its unit."""
+"""A mesh as of a file: numbers, materials and unit."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,7 +13,7 @@ __all__ = ["FileMaterial", "MeshModel"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FileMaterial:
-    """Elastic material as the file has it, in the units of the file.
+    """Elastic material in the units of the file.
 
     Parameters
     ----------
@@ -35,18 +35,17 @@ class MeshModel:
     Parameters
     ----------
     node_numbers (n_nodes,)
-        Number in the file of every node of the mesh.
+        Of the file.
     element_numbers
-        The same for the elements, one array per block.
-    materials : mapping of name to FileMaterial
-    sections : mapping of solid name to material name
-        Where the file says it.
+        Of the file, by block.
+    sections
+        Material by solid, where given.
     unit_length [m]
-        Length of one unit of the file.
+        One unit of the file.
     left_out
-        Elements of the file that are no solids and were left out, counted by their type.
-    foreign_materials : mapping of name to str
-        Materials that are not isotropic and linear, and what they are.
+        Elements that are no solids, counted by type.
+    foreign_materials
+        Materials that are not isotropic and linear, in words.
     """
 
     mesh: Mesh

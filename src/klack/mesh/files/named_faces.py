@@ -17,7 +17,7 @@ ALSO_OTHERS = (
     "add 'elements: solids-only' next to the file in the case to leave them out, or remove "
     "them from the file."
 )
-"""What to try with a file that holds elements besides solids."""
+"""Advice for a file with elements besides solids."""
 LOOSE = "surface elements on no solid"
 
 
@@ -28,9 +28,9 @@ class MarkedFaces:
     Parameters
     ----------
     numbers (n,)
-        Element numbers of the file, for error texts.
+        Of the file.
     corners (n, 2..4)
-        Nodes counted from 0; -1 for a node of no element.
+        From 0; -1 for a node of no element.
     """
 
     name: str
@@ -46,29 +46,17 @@ def named_faces(
     *,
     all_solids: bool,
 ) -> tuple[dict[str, Surface], dict[str, Ints]]:
-    """Find the faces of solid elements that surface elements and node sets name.
+    """Faces of solids that surface elements and node sets name, and inner ones as node sets.
+
+    Surface elements between two solid elements have no side; those on no solid are rejected, since
+    shells are not modelled.
 
     Parameters
     ----------
-    where
-        The file, for error texts.
-    sets : mapping of name to sorted nodes
-        Node sets that may cover faces.
+    sets
+        Sorted nodes that may cover faces.
     all_solids
-        True: every surface element must lie on a solid.  False: the solids of some may be left
-        out.
-
-    Returns
-    -------
-    surfaces : dict of Surface
-        Outer faces.
-    inner : dict of node arrays
-        Nodes of surface elements between two solid elements: they have no side.
-
-    Raises
-    ------
-    InputError
-        For surface elements on no solid element: shells are not modelled.
+        False: the solids of some surface elements may be left out.
     """
     count = 1 + max(int(block.connectivity.max()) for block in blocks)
     near = np.zeros(count + 1, dtype=bool)  # the last place is that of -1
@@ -101,7 +89,7 @@ def named_faces(
 
 
 def loose_faces(blocks: tuple[ElementBlock, ...], marks: tuple[MarkedFaces, ...]) -> int:
-    """Count surface elements that lie on no face of these solids."""
+    """Count surface elements on no face of these solids."""
     if not marks:
         return 0
     near = np.zeros(2 + max(int(block.connectivity.max()) for block in blocks), dtype=bool)
@@ -118,7 +106,7 @@ def loose_faces(blocks: tuple[ElementBlock, ...], marks: tuple[MarkedFaces, ...]
 def _with_faces_on(
     blocks: tuple[ElementBlock, ...], near: NDArray[np.bool_]
 ) -> tuple[ElementBlock, ...]:
-    """Elements that may have a face with all nodes among those of interest."""
+    """Elements that may have a face among the nodes of interest."""
     parts = []
     for block in blocks:
         touched = near[block.connectivity].sum(axis=1) >= block.topology.dimension

@@ -1,4 +1,4 @@
-"""What is refused of any mesh file: its size, its unit, and the extent of its body."""
+"""What is rejected of any mesh file: size, unit, and extent of the body."""
 
 from pathlib import Path
 
@@ -32,15 +32,7 @@ _UNITS = {"m": 1.0, "cm": 1e-2, "in": 0.0254, "mm": 1e-3, "um": 1e-6}
 
 
 def require_plausible_size(where: str, mesh: Mesh, unit_length: float) -> None:
-    """Raise :class:`InputError` for a body of more than 2 m or less than 10 um.
-
-    Parameters
-    ----------
-    where
-        Start of the error text: the file.
-    unit_length [m]
-        Unit that the coordinates were read in, for the hint.
-    """
+    """Reject a body of more than 2 m or less than 10 um; ``unit_length`` [m] is for the hint."""
     size = float(np.ptp(mesh.points, axis=0).max())
     if SMALLEST_BODY <= size <= LARGEST_BODY:
         return
@@ -60,7 +52,7 @@ def require_plausible_size(where: str, mesh: Mesh, unit_length: float) -> None:
 
 
 def _likely_unit(extent: float) -> str:
-    """Unit that makes the extent that of a part of a valve: 1 mm to 0.5 m."""
+    """Unit by which a part of a valve has 1 mm to 0.5 m."""
     for name in ("mm", "m", "um", "cm", "in"):
         if 1e-3 <= extent * _UNITS[name] <= 0.5:
             return name
@@ -68,7 +60,7 @@ def _likely_unit(extent: float) -> str:
 
 
 def require_unit(path: Path, unit_length: float | None) -> float:
-    """Unit of length that the user gave; raise where the file names none either."""
+    """Given unit of length; rejected where the file names none either."""
     if unit_length is None:
         raise InputError(
             str(path),
@@ -80,11 +72,11 @@ def require_unit(path: Path, unit_length: float | None) -> float:
 
 
 LARGEST_BYTES = 2_000_000_000
-"""Largest size of a mesh file, or of all files of one model together."""
+"""Largest size of the files of one model."""
 
 
 def read_bytes(path: Path, kind: str) -> bytes:
-    """Content of a mesh file; raise if it is missing, empty or too large."""
+    """Content of a mesh file; rejects it if missing, empty or too large."""
     if not path.is_file():
         raise InputError(
             str(path),

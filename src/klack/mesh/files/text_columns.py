@@ -1,7 +1,6 @@
 """Numbers in fixed columns of a text file, many lines at once.
 
-Old finite-element formats are punched cards: what a number means is said by its columns.  Here the
-text stays one array of bytes; a block of columns is cut out of many lines and turned into numbers
+The text stays one array of bytes; blocks of columns are cut out of many lines and converted
 without a loop over lines.
 """
 
@@ -27,11 +26,8 @@ class TextLines:
 
     Parameters
     ----------
-    text : uint8 array
     start, end (n_lines,)
-        First byte of every line, and the one behind its last.
-    file
-        For error texts.
+        First byte of a line, and the one behind its last.
     """
 
     text: NDArray[np.uint8]
@@ -41,7 +37,7 @@ class TextLines:
 
     @classmethod
     def of(cls, data: bytes, file: str) -> "TextLines":
-        """Find the lines of a text; Windows line ends are accepted."""
+        """Lines of a text; Windows line ends are accepted."""
         text = np.frombuffer(data, dtype=np.uint8)
         ends = np.flatnonzero(text == ord("\n"))
         start = np.concatenate([[0], ends + 1])
@@ -62,12 +58,7 @@ class TextLines:
         return f"{self.file}:{row + 1}"
 
     def cells(self, rows: NDArray[np.int64], first: int, width: int, count: int = 1) -> Cells:
-        """Cut ``count`` fields of ``width`` columns out of lines, blank behind their end.
-
-        Returns
-        -------
-        uint8 array, shape (len(rows), count, width)
-        """
+        """Fields of ``width`` columns, (len(rows), count, width), blank behind the line end."""
         out = np.empty((len(rows), count * width), dtype=np.uint8)
         column = np.arange(first, first + count * width)
         last = max(len(self.text) - 1, 0)
@@ -85,7 +76,7 @@ class TextLines:
         return out.reshape(len(rows), count, width)
 
     def _evenly_spaced(self, rows: NDArray[np.int64], length: int) -> Cells | None:
-        """Table of lines that follow at equal distance and are long enough; None for others."""
+        """Table of long enough lines at equal distance, else None."""
         start = self.start[rows]
         step = int(start[1] - start[0]) if len(rows) > 1 else 0
         stop = int(start[0]) + step * len(rows) if len(rows) else 0
@@ -98,13 +89,7 @@ class TextLines:
     def whole(
         self, rows: NDArray[np.int64], width: int, count: int, what: str
     ) -> NDArray[np.int64]:
-        """Whole numbers in the first ``count`` fields of lines, shape (len(rows), count).
-
-        Raises
-        ------
-        InputError
-            With file and line, for a field that is none.
-        """
+        """Whole numbers in the first ``count`` fields, shape (len(rows), count)."""
         out = np.empty((len(rows), count), dtype=np.int64)
         for begin in range(0, len(rows), _CHUNK):
             part = rows[begin : begin + _CHUNK]
@@ -139,18 +124,9 @@ class TextLines:
 
 
 def integers(cells: Cells) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Whole numbers in fields of text.
+    """Whole numbers in fields (..., width) of text, and which are good (of at most 18 digits).
 
-    Parameters
-    ----------
-    cells (..., width)
-
-    Returns
-    -------
-    values (...)
-        A blank field is 0.
-    good (...)
-        False where a field is no whole number (of at most 18 digits).
+    A blank field is 0.
     """
     columns = np.ascontiguousarray(np.moveaxis(cells, -1, 0))  # short axes are slow at the end
     filled = columns != ord(" ")
@@ -176,14 +152,9 @@ _REAL[np.frombuffer(b"eEdD", np.uint8)] = ord("E")
 
 
 def reals(cells: Cells) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Real numbers in fields of text, also in the forms ``1.5-3`` and ``1.5D-3`` of Fortran.
+    """Real numbers in fields of text, also as Fortran's ``1.5-3`` and ``1.5D-3``; which are finite.
 
-    Returns
-    -------
-    values (...)
-        A blank field is 0.
-    good (...)
-        False where a field is no finite number.
+    A blank field is 0.
     """
     shape, width = cells.shape[:-1], cells.shape[-1]
     text = _REAL[cells.reshape(-1, width)]
@@ -202,7 +173,7 @@ def reals(cells: Cells) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
 
 
 def _with_exponent_letter(text: Cells) -> Cells:
-    """Put the E into ``1.5-3``: before a sign that follows a digit or a point."""
+    """Put the E into ``1.5-3``, before a sign after a digit or point."""
     sign = (text == ord("-")) | (text == ord("+"))
     figure = ((text - np.uint8(ord("0"))) < 10) | (text == ord("."))
     bare = np.zeros(text.shape, dtype=bool)
@@ -236,15 +207,9 @@ Ranges = list[tuple[int, int]]
 
 
 def within(ordered: NDArray[np.int64], ranges: Sequence[tuple[int, int]]) -> NDArray[np.int64]:
-    """Choose those numbers that lie in one of the ranges.
+    """Ascending numbers that lie in a range (first, last).
 
-    A huge range costs no more than a small one.
-
-    Parameters
-    ----------
-    ordered (n,)
-        Numbers that exist, ascending.
-    ranges : sequence of (first, last)
+    Huge ranges cost no more than small ones.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Keywords of an Abaqus or CalculiX file, collected: parts, instances, assembly, materials."""
+"""Keywords of an Abaqus or CalculiX file: parts, instances, assembly, materials."""
 
 import warnings
 from collections.abc import Sequence
@@ -34,7 +34,7 @@ class Placement:
     shift (3,)
     turn (3, 3)
     about (3,)
-        A point of the axis, after the shift.
+        Of the axis, after the shift.
     """
 
     shift: Points
@@ -47,7 +47,7 @@ class Placement:
         return not self.shift[[0, 2]].any() and np.array_equal(self.turn, np.eye(3))
 
     def of(self, points: Points) -> Points:
-        """Points of the part, shape (n, 3), where the instance has them."""
+        """Points (n, 3) of the part, where the instance has them."""
         if not self.shift.any() and np.array_equal(self.turn, np.eye(3)):
             return points
         moved = points + self.shift
@@ -57,10 +57,10 @@ class Placement:
 
 
 def read_placement(keyword: Keyword) -> Placement:
-    r"""Placement of an *INSTANCE; without data lines it is left where the part is drawn.
+    r"""Placement of an *INSTANCE; without data lines as the part is drawn.
 
-    The data lines of *INSTANCE hold a translation :math:`t` and, in a second line, two points
-    :math:`a, b` of an axis and an angle in degrees.  The translation comes first:
+    Data lines: a translation :math:`t`, then two points :math:`a, b` of an axis and an angle in
+    degrees,
 
     .. math:: x' = R\,(x + t - a) + a .
     """
@@ -88,7 +88,7 @@ def read_placement(keyword: Keyword) -> Placement:
 
 
 def add_instance(root: Scope, name: str, part: Scope, placement: Placement, place: str) -> None:
-    """Put an instance into the assembly; its sets and surfaces are called ``name.set``."""
+    """Put an instance into the assembly, its sets and surfaces as ``name.set``."""
     if name.upper() in root.instances:
         raise InputError(
             f"{place}: *INSTANCE",
@@ -138,7 +138,7 @@ _MARKER_SIDES = {"", "SPOS", "SNEG", "S1", "S2"}  # of surface elements: each is
 
 
 def read_surface(scope: Scope, keyword: Keyword) -> None:
-    """Put the surface of one *SURFACE keyword into its scope, all sets of which are known."""
+    """Put a *SURFACE into its scope, whose sets are known."""
     name = keyword.parameter("NAME")
     kind = keyword.parameters.get("TYPE", "ELEMENT").upper()
     if "COMBINE" in keyword.parameters:
@@ -180,7 +180,7 @@ def _combine(scope: Scope, keyword: Keyword, name: str) -> None:
 
 
 def _selections(scope: Scope, lines: Sequence[DataLine]) -> list[FaceSelection]:
-    """Faces of all data lines; lines with one number each are looked up together."""
+    """Faces of all data lines; those with one number are looked up together."""
     found: list[FaceSelection] = []
     single: dict[str, list[DataLine]] = {}
     for line in lines:
@@ -202,7 +202,7 @@ def _selections(scope: Scope, lines: Sequence[DataLine]) -> list[FaceSelection]:
 
 
 def _wrong_sides(scope: Scope, label: str, rows: Integers) -> NDArray[np.bool_]:
-    """True for every element that has no such face."""
+    """True for elements without such a face."""
     side = int(label[1:]) if label[:1] == "S" and is_integer(label[1:]) else 0
     wrong = [
         not (label == "" or 1 <= side <= len(FAMILIES[group.family].faces))
@@ -243,23 +243,21 @@ _END_OF_MATERIAL = {"MATERIAL", "STEP", "PART", "ASSEMBLY", "SOLID SECTION", "NO
 
 @dataclass(frozen=True, slots=True)
 class Deck:
-    """Content of a file: all instances in one scope, and the materials."""
+    """Content of a file: all instances in one scope, and materials."""
 
     scope: Scope
     materials: dict[str, FileMaterial]
     foreign: dict[str, str]
-    """Materials that are not isotropic, and what they are."""
+    """Materials that are not isotropic, in words."""
 
 
 def read_deck(path: Path, *, solids_only: bool = False) -> Deck:
-    """Read all keywords that describe the model, without its steps.
-
-    With ``solids_only`` elements of other kinds are left out.
+    """Read all keywords of the model, without its steps; perhaps solids only.
 
     Warns
     -----
     AccuracyWarning
-        Once, if the file holds *TRANSFORM or constraints between nodes, which are ignored.
+        Once, of *TRANSFORM or constraints between nodes, which are ignored.
     """
     reader = _Reader(path, Scope(solids_only=solids_only))
     in_step = False
@@ -272,7 +270,7 @@ def read_deck(path: Path, *, solids_only: bool = False) -> Deck:
 
 @dataclass
 class _Material:
-    """A *MATERIAL of which the values are still coming."""
+    """A *MATERIAL with values still to come."""
 
     name: str
     elastic: tuple[float, float] | None = None
@@ -403,7 +401,7 @@ class _Reader:
             )
 
     def finish(self) -> Deck:
-        """Resolve what had to wait for the end of the file."""
+        """Resolve what waits for the end of the file."""
         if (opened := self.opened or self.assembly) is not None:
             raise InputError(
                 f"{opened.place}: *{opened.name}",
@@ -447,7 +445,7 @@ class _Reader:
 
 
 def _slip(name: str) -> str | None:
-    """Keyword that is read and differs in one letter: left out, added, another, or two swapped."""
+    """Known keyword that differs in one letter: missing, added, another, or two swapped."""
     for known in _READ:
         shorter = min(len(name), len(known))
         first = next((i for i in range(shorter) if name[i] != known[i]), shorter)
@@ -475,7 +473,7 @@ def _first_record(
 
 
 def _finish(scope: Scope) -> None:
-    """Resolve surfaces and sections, which may name sets that come after them."""
+    """Resolve surfaces and sections, which may name later sets."""
     for keyword in scope.waiting:
         if keyword.name == "SURFACE":
             read_surface(scope, keyword)

@@ -48,21 +48,20 @@ class ElementGroup:
     Parameters
     ----------
     family
-        "" for elements that are left out, of which only the numbers are kept.
+        "" for ignored elements, with numbers alone.
     solid
         False for surface elements.
     numbers (n,)
-        As in the file.
     nodes (n, k)
-        Rows of the nodes.
+        Rows.
     first
-        Row of the first element; the others follow.
+        Row of the first element.
     elset
-        Set that the keyword names, or "".
+        Of the keyword, or "".
     instance
-        Instance of a part, or "".
+        Of a part, or "".
     kind
-        Type of the element in the file.
+        Element type in the file.
     """
 
     family: str
@@ -81,7 +80,7 @@ class ElementGroup:
         return np.arange(self.first, self.first + len(self.numbers))
 
     def adopted(self, instance: str, first_node: int, first_element: int) -> "ElementGroup":
-        """Elements of an instance, with its name before the set."""
+        """Elements of an instance."""
         return replace(
             self,
             nodes=self.nodes + first_node if first_node else self.nodes,
@@ -94,7 +93,7 @@ class ElementGroup:
 def read_elements(keyword: Keyword, *, solids_only: bool) -> tuple[str, bool, NDArray[np.int64]]:
     """Family, whether it is a solid, and the records of one *ELEMENT keyword.
 
-    With ``solids_only`` elements of other kinds have the family "" and records of their number.
+    With ``solids_only`` others have the family "" and records of their number.
     """
     kind = keyword.parameter("TYPE").upper()
     if _is_left_out(keyword, kind):
@@ -114,7 +113,7 @@ def read_elements(keyword: Keyword, *, solids_only: bool) -> tuple[str, bool, ND
 
 
 def place_of_element(keyword: Keyword, label: int, count: int) -> str:
-    """Place of the record number ``count``, from 1, of an element."""
+    """Place of record ``count``, from 1, of an element."""
     kind = keyword.parameter("TYPE").upper()
     found: Iterable[tuple[DataLine, Sequence[str]]]
     if _is_left_out(keyword, kind):
@@ -137,7 +136,7 @@ def _record(family: str, kind: str) -> tuple[int, str]:
 def _is_left_out(keyword: Keyword, kind: str) -> bool:
     """True for elements that are neither solids nor fit to mark a surface.
 
-    A beam with a third node for its direction marks nothing either.
+    So is a beam with a third node for its direction.
     """
     if _SOLID.match(kind) or not _MAY_BE_LEFT_OUT.fullmatch(kind):
         return False

@@ -1,6 +1,6 @@
 """Named faces of a mesh from a keyword file: by face number, by surface elements, by nodes.
 
-A face is one number here, its code: eight times the row of its element plus its side.
+The code of a face is eight times the row of its element plus its side.
 """
 
 from collections.abc import Iterator, Sequence
@@ -27,13 +27,13 @@ _SIDES = 8
 
 @dataclass(frozen=True, slots=True)
 class RowBlock:
-    """Elements of one family and solid, with their rows among all elements of the file."""
+    """Elements of one family and solid, with rows in the file."""
 
     elements: ElementBlock
     rows: Integers
 
     def near(self, nodes: Mask) -> "RowBlock":
-        """Elements that can have a face with all its corners among ``nodes``."""
+        """Elements that can have a face with all corners among ``nodes``."""
         family = self.elements.topology
         corners = self.elements.connectivity[:, : family.corners]
         count = np.zeros(len(corners), dtype=np.int8)
@@ -53,7 +53,7 @@ class _Faces:
 
     @classmethod
     def near(cls, blocks: Sequence[RowBlock], nodes: Mask) -> "_Faces":
-        """All faces with their corners among ``nodes``, and some more."""
+        """Faces with corners among ``nodes``, and some more."""
         kept = [block.near(nodes) for block in blocks]
         table = FaceTable.of([block.elements for block in kept])
         first = np.cumsum([0, *(len(block.rows) for block in kept)])
@@ -64,7 +64,7 @@ class _Faces:
 
 @dataclass(frozen=True, slots=True)
 class _Marking:
-    """Surface elements, the code of the face on which each lies (-1: none), and what is inside."""
+    """Surface elements, codes of their faces (-1: none), and which are inside."""
 
     group: ElementGroup
     codes: Integers
@@ -91,7 +91,7 @@ def _markings(blocks: Sequence[RowBlock], scope: Scope) -> Iterator[_Marking]:
 
 
 def _corner_candidates(group: ElementGroup) -> list[list[int]]:
-    """Local corner nodes; a three-node line has its middle last (gmsh) or second (Abaqus)."""
+    """Local corner nodes; a three-node line has its middle last (gmsh) or second."""
     if group.family == "line3":
         return [[0, 2], [0, 1]]
     return [list(range(FAMILIES[group.family].corners))]
@@ -100,8 +100,8 @@ def _corner_candidates(group: ElementGroup) -> list[list[int]]:
 def left_out(scope: Scope, blocks: Sequence[RowBlock]) -> dict[str, int]:
     """Count, by type, the elements that are neither solids nor faces of solids.
 
-    Surface elements carry no stiffness here, so they must be faces of solid elements; all others
-    raise unless only the solids are wanted.
+    Surface elements carry no stiffness, so they must be faces of solids; others are rejected
+    unless only solids are wanted.
     """
     counts: dict[str, int] = {}
     for group in scope.groups:
@@ -122,7 +122,7 @@ def left_out(scope: Scope, blocks: Sequence[RowBlock]) -> dict[str, int]:
 
 
 class FaceFinder:
-    """Turns sets and *SURFACE keywords into surfaces of the mesh."""
+    """Turns sets and *SURFACE keywords into surfaces."""
 
     def __init__(self, blocks: Sequence[RowBlock], scope: Scope) -> None:
         self._blocks, self._scope = blocks, scope
@@ -200,7 +200,7 @@ class FaceFinder:
         return mask
 
     def _exposed(self, nodes: Mask) -> Integers:
-        """Codes of the faces of one element only, all corners of which are among ``nodes``."""
+        """Codes of outer faces with all corners among ``nodes``."""
         keys, codes = [], []
         for block in self._blocks:
             near = block.near(nodes)
@@ -242,7 +242,7 @@ class FaceFinder:
 
 
 def _packed(corners: Integers) -> tuple[NDArray[np.uint64], NDArray[np.uint64]]:
-    """Corner nodes of faces in ascending order, in two numbers: 32 bits for every corner."""
+    """Corner nodes of faces, ascending, in two numbers of 32 bits per corner."""
     ordered = np.sort(corners, axis=1).astype(np.uint64) + np.uint64(1)
     half = np.uint64(32)
     columns = [*ordered.T, *[np.zeros(len(ordered), dtype=np.uint64)] * (4 - ordered.shape[1])]

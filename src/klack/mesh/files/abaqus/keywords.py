@@ -1,11 +1,8 @@
-"""Keyword files of Abaqus and CalculiX, taken apart into keywords and blocks of data lines.
+"""Keyword files of Abaqus and CalculiX: keywords and blocks of data lines.
 
-A keyword starts with one ``*``, a comment with two.  Keywords, parameters and set names do not
-care about capitals.  A keyword line that ends with a comma continues in the next line.  Files that
-are included must lie in the folder of the main file or below it.  Text is UTF-8, or Latin-1 where
-it is not UTF-8.
-
-The data lines stay bytes until they are asked for, in large pieces or line by line.
+A keyword starts with one ``*``, a comment with two; case does not matter. A keyword line that ends
+with a comma continues. Includes must lie in the folder of the main file or below. Text is UTF-8,
+else Latin-1.
 """
 
 import re
@@ -29,7 +26,7 @@ _PART = re.compile(r'((?:"[^"]*"|[^,])*)(?:,|$)')  # between commas outside quot
 
 @dataclass(frozen=True, slots=True)
 class DataLine:
-    """Fields between commas, stripped, and their position (``file:line``)."""
+    """Stripped fields between commas, and their place (``file:line``)."""
 
     place: str
     fields: tuple[str, ...]
@@ -37,7 +34,7 @@ class DataLine:
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """Data lines that follow each other: a slice of a file, and the number of its first line."""
+    """Consecutive data lines: a slice of a file, and its first line number."""
 
     file: str
     text: bytes
@@ -46,7 +43,7 @@ class Segment:
     line: int
 
     def lines(self) -> Iterator[tuple[int, bytes]]:
-        """Number and text of every line that is not empty."""
+        """Number and text of non-empty lines."""
         position, number = self.start, self.line
         while position < self.end:
             end = self.text.find(b"\n", position, self.end)
@@ -70,7 +67,7 @@ class Segment:
 
 @dataclass(slots=True)
 class Keyword:
-    """One keyword with its parameters (names in capitals) and data lines."""
+    """Keyword with parameters (names in capitals) and data lines."""
 
     name: str
     parameters: dict[str, str]
@@ -90,13 +87,13 @@ class Keyword:
         return value
 
     def lines(self) -> Iterator[DataLine]:
-        """Data lines one by one, without the empty ones."""
+        """Non-empty data lines."""
         for segment in self.segments:
             for number, line in segment.lines():
                 yield DataLine(f"{segment.file}:{number}", _fields(_decoded(line)))
 
     def pieces(self) -> Iterator[bytes]:
-        """Data lines as text, some megabytes of whole lines at a time."""
+        """Data lines as text, some megabytes at a time."""
         waiting: list[bytes] = []
         size = 0
         for segment in self.segments:
@@ -111,7 +108,7 @@ class Keyword:
 
 
 def read_keywords(path: Path) -> Iterator[Keyword]:
-    """All keywords of a file and of those that it includes, in order."""
+    """Keywords of a file and its includes, in order."""
     current: Keyword | None = None
     for found in _Source(path).content(path, ()):
         if isinstance(found, Keyword):
@@ -169,7 +166,7 @@ def _require_short(place: str, size: int, longest: int) -> None:
 
 
 def _next_star(text: bytes, position: int) -> int:
-    """Start of the next line whose first sign is a star; ``position`` is the start of a line."""
+    """Start of the next line with a star; ``position`` is the start of a line."""
     while (star := text.find(b"*", position)) >= 0:
         begin = max(text.rfind(b"\n", position, star) + 1, position)
         if not text[begin:star].strip():
@@ -189,7 +186,7 @@ class _Source:
         self._bytes = 0
 
     def content(self, path: Path, above: tuple[Path, ...]) -> Iterator[Keyword | Segment]:
-        """Keywords without their data lines, and the data lines after them."""
+        """Keywords without data lines, and the data lines after them."""
         text = self._read(path)
         position, line = 0, 1
         while position < len(text):
@@ -272,7 +269,7 @@ class _Source:
 
 
 def _keyword_line(text: bytes, position: int, line: int, place: str) -> tuple[int, int, str]:
-    """Where the text continues, in which line, and the keyword line, joined; "" for a comment."""
+    """Next position and line, and the joined keyword line; "" for a comment."""
     words = b""
     while position < len(text):
         end = text.find(b"\n", position)

@@ -1,8 +1,7 @@
-"""Numbers in keyword files: whole blocks at once, and line by line where a block is irregular.
+"""Numbers in keyword files.
 
-A block is read at once if every field is a plain number and every line has its fields.  All else
-is read again line by line, which takes what is unusual but right and names the line of what is
-wrong.
+A block is read at once if every field is a plain number and every line has its fields; else line
+by line, which takes what is unusual but right and names the wrong line.
 """
 
 import re
@@ -58,22 +57,21 @@ def integer(line: DataLine, text: str) -> int:
 
 
 def is_integer(text: str) -> bool:
-    """Only digits, and no more of them than 64 bits hold."""
+    """Only digits, as many as 64 bits hold."""
     return text.isascii() and text.isdecimal() and len(text) <= _DIGITS
 
 
 def records(
     keyword: Keyword, lengths: tuple[int, int], what: str
 ) -> Iterator[tuple[DataLine, list[str]]]:
-    """Yield records with their first line; a record may span several lines.
+    """Records with their first line; a record may span lines.
 
     Parameters
     ----------
     lengths : (least, most)
-        Fields per record; one with fewer than ``most`` is only complete if it is one line with
-        at least ``least``.
+        Fields; one with fewer than ``most`` is complete only as one line with at least ``least``.
     what
-        For the error text: what a record holds.
+        Content of a record, for errors.
     """
     least, most = lengths
     fields: list[str] = []
@@ -95,7 +93,7 @@ def _wrong_length(line: DataLine, came: int, what: str) -> NoReturn:
 
 
 def node_records(keyword: Keyword) -> tuple[Integers, NDArray[np.float64]]:
-    """Numbers and coordinates, shape (n, 3), of *NODE; a third coordinate left out is zero."""
+    """Numbers and coordinates (n, 3) of *NODE; a missing third one is zero."""
     parts = []
     for piece in keyword.pieces():
         table = _node_table(piece)
@@ -143,7 +141,7 @@ def _nodes_by_line(keyword: Keyword) -> tuple[Integers, NDArray[np.float64]]:
 
 
 def integer_records(keyword: Keyword, width: int, what: str) -> Integers:
-    """Records of ``width`` whole numbers each, shape (n, width), over one or more lines."""
+    """Records of ``width`` whole numbers, shape (n, width), over one or more lines."""
     parts: list[Integers] = []
     rest = b""
     for piece in keyword.pieces():
@@ -177,7 +175,7 @@ def _records_by_line(keyword: Keyword, width: int, what: str) -> Integers:
 
 
 def integer_list(keyword: Keyword) -> Integers | None:
-    """All numbers of the data lines, or None if they are not only whole numbers above zero."""
+    """All numbers of the data lines, or None if not whole and above zero."""
     parts = []
     for piece in keyword.pieces():
         found = _block(piece, int)
@@ -188,9 +186,9 @@ def integer_list(keyword: Keyword) -> Integers | None:
 
 
 def _block(piece: bytes, kind: type) -> tuple[NDArray, Integers, bytes] | None:
-    """Numbers of whole lines, how many there are up to the end of every line, and tidy text.
+    """Numbers of whole lines, their count up to the end of each, and tidy text.
 
-    None if a field is empty or no plain number.
+    None if a field is no plain number.
     """
     text = piece.translate(None, b" \t").strip(b"\n")
     if b",," in text or b"\n," in text or text.startswith(b","):

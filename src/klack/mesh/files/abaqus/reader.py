@@ -1,12 +1,12 @@
 """Meshes from Abaqus and CalculiX input files (.inp).
 
-Read are nodes, solid and axisymmetric elements, sets, surfaces, instances of parts, and, as extra
-information, elastic materials and sections.  Steps, loads and constraints are ignored.  A set
-of surface elements (membranes, shells, plane elements: what gmsh and most preprocessors write for
-a named surface) becomes a surface, provided that every one of them lies on a solid element.
+Read are nodes, solid and axisymmetric elements, sets, surfaces, instances of parts, elastic
+materials and sections; steps, loads and constraints are ignored.  A set of surface elements
+(membranes, shells, plane elements: what gmsh and most preprocessors write for a named surface)
+becomes a surface if each lies on a solid element.
 
-Read by hand: meshio (5.3.5) reads one of two instances of a part and no surfaces, and refuses
-axisymmetric elements and numbers such as ``1.D0``.
+meshio (5.3.5) reads one of two instances of a part and no surfaces, and rejects axisymmetric
+elements and numbers such as ``1.D0``.
 """
 
 from collections.abc import Sequence
@@ -45,23 +45,17 @@ def read_abaqus(
     Returns
     -------
     MeshModel
-        Of dimension 3 (C3D elements), or 2 (CAX elements: x is r, y is z).  The solids are called
+        Of dimension 3 (C3D elements), or 2 (CAX elements: x is r, y is z). The solids are called
         after the element sets of *SOLID SECTION; without sections after the sets of *ELEMENT, or
-        after the *ELSET that is made of whole such sets (a physical group of gmsh).  Where there
-        are several instances of parts, sets and surfaces are called ``instance.set``, and ``set``
-        too if that is unique; solids have the shorter name.  Numbers of nodes and elements are
-        those of the file; where instances repeat them, they are counted on through it from 1.
-
-    Raises
-    ------
-    InputError
-        With file and line, if the file is cut off, uses what is not supported, or names nodes,
-        elements or sets that it does not define.
+        after the *ELSET that is made of whole such sets (a physical group of gmsh). Of several
+        instances, sets and surfaces are called ``instance.set``, and ``set`` too if that is
+        unique; solids have the shorter name. Node and element numbers are those of the file; where
+        instances repeat them, they count through the file from 1.
 
     Warns
     -----
     AccuracyWarning
-        Once, if constraints between nodes (*TIE, *EQUATION, ...) or *TRANSFORM are ignored.
+        Once, of ignored constraints between nodes (*TIE, *EQUATION, ...) and *TRANSFORM.
     """
     path = Path(path)
     unit_length = require_unit(path, unit_length)
@@ -125,7 +119,7 @@ def _require_solids(path: Path, scope: Scope) -> None:
 
 @dataclass(frozen=True, slots=True)
 class _SolidNames:
-    """Name of the solid of every element: its place in a list, -1 for surface elements."""
+    """Solid of every element: place in a list, -1 for surface elements."""
 
     shown: list[str]
     of_element: NDArray[np.int32]
@@ -164,7 +158,7 @@ def _solid_names(scope: Scope) -> tuple[_SolidNames, dict[str, str]]:
 
 
 def _label(scope: Scope, group: ElementGroup) -> str:
-    """Name of the solid as long as nothing else gives it one."""
+    """Name of a solid without another."""
     if group.elset:
         names = scope.elements.sets.names
         return names.shortest(names.require(group.place, group.elset))
@@ -172,7 +166,7 @@ def _label(scope: Scope, group: ElementGroup) -> str:
 
 
 def _blocks(scope: Scope, names: _SolidNames) -> tuple[RowBlock, ...]:
-    """One block per solid and family, with nodes as rows of the scope."""
+    """One block per solid and family, nodes as rows."""
     found: dict[tuple[int, str], list[tuple[NDArray[np.int64], NDArray[np.int64]]]] = {}
     for group in scope.groups:
         if not group.solid:
@@ -224,7 +218,7 @@ def _kept(
 def _used_nodes(
     scope: Scope, blocks: Sequence[RowBlock], labels: NDArray[np.int64]
 ) -> NDArray[np.int64]:
-    """Rows of the nodes of the elements: by instance, in it by number."""
+    """Rows of used nodes, by instance and number."""
     mask = np.zeros(len(labels), dtype=bool)
     for block in blocks:
         mask[block.elements.connectivity] = True
@@ -236,13 +230,13 @@ def _used_nodes(
 
 
 def _unique(numbers: NDArray[np.int64], rows: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Numbers of the file; where instances share them, counted on through the file from 1."""
+    """Numbers of the file, or counted from 1 where instances share them."""
     own = numbers[rows]
     return own if len(distinct(own)) == len(own) else rows + 1
 
 
 def _points(scope: Scope) -> NDArray[np.float64]:
-    """Coordinates of all nodes, which the scope then holds no longer."""
+    """Coordinates of all nodes, taken out of the scope."""
     points = scope.points[0] if len(scope.points) == 1 else np.concatenate(scope.points)
     scope.points.clear()
     return points

@@ -1,4 +1,4 @@
-"""One level of a keyword file: a part, an instance of it, or the assembly (or a flat file)."""
+"""One level of a keyword file: a part, an instance, or the assembly (or a flat file)."""
 
 from dataclasses import dataclass, field
 
@@ -19,29 +19,28 @@ _SMALLEST = 1e-9  # sine of the angle between axes, relative length
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NodeSystem:
-    r"""Frame of node coordinates, :math:`x = a + x_1' e_1 + x_2' e_2 + x_3' e_3`.
+    """Frame of node coordinates, :math:`x = a + x_1' e_1 + x_2' e_2 + x_3' e_3`.
 
     Parameters
     ----------
     origin (3,)
     axes (3, 3)
-        One unit vector per row.
+        Unit vectors in rows.
     """
 
     origin: NDArray[np.float64]
     axes: NDArray[np.float64]
 
     def of(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Global coordinates of points in this frame, shape (n, 3)."""
+        """Global coordinates of points, shape (n, 3)."""
         return self.origin + points @ self.axes
 
 
 def read_system(keyword: Keyword) -> NodeSystem | None:
-    """Frame of a *SYSTEM; None, the global one, if it has no data.
+    """Frame of a *SYSTEM; None (global) without data.
 
-    The first line holds the origin and a point of the first axis, the second a point of the plane
-    of the first and second axis.  Without the second line the third axis stays, and the first one
-    is laid into the plane z = 0.
+    First line: origin and a point of the first axis; second: a point of the plane of the first and
+    second axis. Without it the third axis stays, and the first one is laid into the plane z = 0.
     """
     rows = [[number(line, t) for t in line.fields] for line in keyword.lines() if line.fields]
     lengths = [len(row) for row in rows]
@@ -79,7 +78,7 @@ Integers = NDArray[np.int64]
 
 @dataclass
 class Entities:
-    """Nodes or elements of a scope: their numbers, how many there are, and their sets."""
+    """Nodes or elements of a scope: numbers, count, and sets."""
 
     kind: str
     sets: NamedSets
@@ -88,7 +87,7 @@ class Entities:
 
     @classmethod
     def of(cls, kind: str) -> "Entities":
-        """Without any yet; ``kind`` is ``"node"`` or ``"element"``."""
+        """None yet; ``kind`` is ``"node"`` or ``"element"``."""
         return cls(kind, NamedSets(Names(f"{kind} set")))
 
     def copy(self) -> "Entities":
@@ -98,14 +97,14 @@ class Entities:
 
 @dataclass(frozen=True, slots=True)
 class FaceSelection:
-    """Faces of elements that a *SURFACE names.
+    """Faces that a *SURFACE names.
 
     Parameters
     ----------
     elements
         Rows.
     side
-        Number of the face from 1; 0 for the exposed faces, and for surface elements.
+        From 1; 0 for exposed faces, and for surface elements.
     """
 
     elements: Integers
@@ -114,7 +113,7 @@ class FaceSelection:
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """A *SOLID SECTION: key of the element set, and material ("" without)."""
+    """A *SOLID SECTION: key of the element set, material or ""."""
 
     elset: str
     material: str
@@ -122,7 +121,7 @@ class Section:
 
 @dataclass(frozen=True, slots=True)
 class Instance:
-    """A part in the assembly, with the rows of its first node and element there."""
+    """A part in the assembly, with the rows of its first node and element."""
 
     name: str
     scope: "Scope"
@@ -134,7 +133,7 @@ class Instance:
 class Scope:
     """Nodes, elements, sets, surfaces and sections of one level.
 
-    Nodes and elements are rows here, counted from 0 in the order of the file.
+    Nodes and elements are rows, from 0 in the order of the file.
     """
 
     nodes: Entities = field(default_factory=lambda: Entities.of("node"))
@@ -152,7 +151,7 @@ class Scope:
     waiting: list[Keyword] = field(default_factory=list)  # until all sets are known
 
     def copy(self) -> "Scope":
-        """Independent copy of the scope of a finished part."""
+        """Copy of a finished part."""
         return Scope(
             nodes=self.nodes.copy(),
             elements=self.elements.copy(),
@@ -184,7 +183,7 @@ class Scope:
                 self.waiting.append(keyword)
 
     def named(self, line: DataLine, text: str, kind: str) -> Integers:
-        """Rows of nodes or elements that a data line names: a set, a number, instance.number."""
+        """Rows that a data line names: a set, a number, instance.number."""
         own = self._entities(kind)
         if own.sets.names.find(text) is not None:
             return own.sets.resolve(line.place, text)
@@ -291,7 +290,7 @@ class Scope:
         own.sets.add(keyword.place, name, rows + first if first else rows)
 
     def _source(self, keyword: Keyword) -> tuple["Scope", int, int]:
-        """Scope whose numbers a set lists: that of its INSTANCE, or this one."""
+        """Scope whose numbers a set lists: its INSTANCE, or this one."""
         if "INSTANCE" not in keyword.parameters:
             return self, 0, 0
         name = keyword.parameter("INSTANCE")

@@ -21,13 +21,7 @@ T = TypeVar("T")
 
 @dataclass
 class Names(Generic[T]):
-    """Named items that a file defines piece by piece.
-
-    Parameters
-    ----------
-    kind
-        ``"node set"``, ``"element set"`` or ``"surface"``, for error texts.
-    """
+    """Named items that a file defines piece by piece; ``kind`` is for errors."""
 
     kind: str
     _shown: dict[str, str] = field(default_factory=dict)
@@ -48,11 +42,11 @@ class Names(Generic[T]):
         return key
 
     def parts(self, key: str) -> list[T]:
-        """All parts, which the caller may replace by fewer."""
+        """Parts, which the caller may merge."""
         return self._parts[key]
 
     def find(self, name: str) -> str | None:
-        """Key of a name; a name that only one instance has is known without the instance."""
+        """Key of a name, without the instance if only one has it."""
         key = name.upper()
         if key in self._parts:
             return key
@@ -82,7 +76,7 @@ class Names(Generic[T]):
             self._owners.setdefault(key, []).append(own)
 
     def shortest(self, key: str) -> str:
-        """Name to show where only one can be: without the instance, if that is unique."""
+        """Name without the instance if that is unique."""
         plain = self._plain.get(key)
         if plain is None or plain.upper() in self._parts:
             return self._shown[key]
@@ -91,11 +85,8 @@ class Names(Generic[T]):
     def public(self, *, single: bool) -> Iterator[tuple[str, str]]:
         """Names to show, with their keys.
 
-        Parameters
-        ----------
-        single
-            True where there is one instance: its names are shown without it, if they are free.
-            Otherwise those of instances come with the instance, and without it too if unique.
+        With a ``single`` instance names are shown without it, if free; else with the instance, and
+        without it too if unique.
         """
         for key, shown in self._shown.items():
             short = self.shortest(key)
@@ -141,7 +132,7 @@ def _sorted_run(labels: Integers, rows: Integers) -> _Run:
 
 
 def distinct(values: Integers) -> Integers:
-    """Ascending, each once; by sorting, which beats hashing for numbers that are nearly sorted."""
+    """Ascending, each once; sorted, which beats hashing where numbers are nearly sorted."""
     if (values[1:] > values[:-1]).all():
         return values
     ordered = np.sort(values, kind="stable")
@@ -151,8 +142,8 @@ def distinct(values: Integers) -> Integers:
 class Numbering:
     """Numbers of a file, looked up while reading.
 
-    They lie in sorted runs, each at least twice as long as the next, so that neither many small
-    blocks nor few large ones are slow.
+    In sorted runs, each at least twice as long as the next: neither many small blocks nor few
+    large ones are slow.
     """
 
     def __init__(self, runs: tuple[_Run, ...] = ()) -> None:
@@ -173,12 +164,12 @@ class Numbering:
         return rows
 
     def within(self, first: int, last: int, step: int) -> Integers:
-        """Rows of the known numbers among first, first + step, ... up to last."""
+        """Rows of the known numbers among first, first + step, ... last."""
         found = [run.within(first, last, step) for run in self._runs]
         return np.concatenate(found) if found else np.empty(0, dtype=np.int64)
 
     def repeated(self, labels: Integers) -> int | None:
-        """Smallest number that is already known, or repeated in ``labels``."""
+        """Smallest number already known, or twice in ``labels``."""
         ordered = labels if (labels[1:] > labels[:-1]).all() else np.sort(labels)
         twice = ordered[1:][ordered[1:] == ordered[:-1]]
         known = ordered[self.find(ordered) >= 0]
@@ -186,7 +177,7 @@ class Numbering:
         return int(found.min()) if len(found) else None
 
     def add(self, labels: Integers, first_row: int) -> None:
-        """Take in new numbers, whose rows count on from ``first_row``."""
+        """Take new numbers, rows from ``first_row``."""
         if not len(labels):
             return
         run = _sorted_run(labels, np.arange(first_row, first_row + len(labels)))
@@ -199,7 +190,7 @@ class Numbering:
 
 
 LARGEST_MEMBERS = 200_000_000
-"""Most members of all node sets, or of all element sets, together."""
+"""Most members of all node sets, or all element sets."""
 
 _FLAGS = {"GENERATE", "INTERNAL", "UNSORTED"}
 _MANY = 50
@@ -211,12 +202,7 @@ _PER_ARRAY = 20  # numbers that would take the memory of an empty array
 class NamedSets:
     """Sets of nodes or of elements, by name.
 
-    Parameters
-    ----------
-    names : Names of int arrays
-        Rows of the members.
-    size
-        Members that were added so far.
+    Members are rows; ``size`` counts those added so far.
     """
 
     names: Names[Integers]
@@ -238,7 +224,7 @@ class NamedSets:
         return self.members(self.names.require(place, name))
 
     def add(self, place: str, name: str, rows: Integers) -> None:
-        """Add members to a set, which is made if it is new."""
+        """Add members to a set, perhaps new."""
         self._count(place, len(rows))
         key = self.names.add(name, rows)
         if len(self.names.parts(key)) > _MANY:  # repetitions must not pile up
@@ -265,10 +251,7 @@ def read_members(
 ) -> Integers:
     """Rows of what *NSET or *ELSET lists: numbers, names of sets, or GENERATE ranges.
 
-    Parameters
-    ----------
-    resolve : function of a data line and a text to int array
-        Rows of a value that is not a number that is known; raises if there is no such set.
+    ``resolve`` gives the rows of a text that is no known number.
     """
     flags = {name for name, value in keyword.parameters.items() if not value}
     if unknown := flags - _FLAGS:
@@ -293,7 +276,7 @@ def read_members(
 def _mixed_members(
     keyword: Keyword, numbering: Numbering, resolve: Callable[[DataLine, str], Integers]
 ) -> Iterator[Integers]:
-    """Rows of numbers, and of what is no known number: every name once."""
+    """Rows of numbers, and of names, each once."""
     labels, names = array("q"), set()
     for line in keyword.lines():
         for text in line.fields:
@@ -314,7 +297,7 @@ def _mixed_members(
 
 
 def _collected(parts: Iterable[Integers]) -> Integers:
-    """All parts in one, without letting many of them, or repetitions, pile up."""
+    """All parts in one, without piling up many or repeated ones."""
     found: list[Integers] = []
     size, limit = 0, _FEW
     for part in parts:

@@ -1,7 +1,7 @@
-"""Blocks and commands of an ANSYS (MAPDL) archive, as CDWRITE and Workbench write it.
+"""Blocks and commands of an ANSYS (MAPDL) archive, as of CDWRITE and Workbench.
 
-Nodes, elements and components stand in blocks of fixed columns, which a line such as ``(19i9)``
-declares; all else are commands with fields between commas.
+Nodes, elements and components are in blocks of fixed columns, declared by a line such as
+``(19i9)``; all else are commands with fields between commas.
 """
 
 import re
@@ -24,14 +24,14 @@ _NODES_PER_ELEMENT = 20
 
 @dataclass(frozen=True, slots=True)
 class ElementTable:
-    """Elements of all EBLOCKs.
+    """Elements of all EBLOCKs, by number.
 
     Parameters
     ----------
     material, kind, number (n,)
-        Material number, number of the element type, and number of the element.
+        Material, element type, element.
     nodes (n, 20)
-        0 where there is none.
+        0 for none.
     row (n,)
         Line of the file.
     """
@@ -52,7 +52,7 @@ class Archive:
     node_numbers (n,)
     points (n, 3)
     commands : tuple of (line, fields)
-        Fields stripped, names of commands in capitals, parameters replaced by their values.
+        Names in capitals, parameters replaced by their values.
     components : tuple of (name, "NODE" or "ELEM", ranges of numbers)
     """
 
@@ -65,13 +65,7 @@ class Archive:
 
 
 def read_archive(path: Path) -> Archive:
-    """Read the blocks and commands of an archive.
-
-    Raises
-    ------
-    InputError
-        With file and line, for blocks that are cut off or no numbers, and files without blocks.
-    """
+    """Read the blocks and commands of an archive."""
     data = read_bytes(path, _KIND)
     if b"\0" in data[:4096]:
         raise InputError(
@@ -144,14 +138,14 @@ def _command_rows(lines: TextLines) -> list[int]:
 
 
 def _fields(lines: TextLines, row: int) -> tuple[str, ...]:
-    """Fields of a command without its comment; its name in capitals."""
+    """Fields of a command without comment, name in capitals."""
     text = lines.line(row)[:640].partition("!")[0]
     name, *rest = (field.strip() for field in text.split(","))
     return (name.upper(), *rest)
 
 
 def _set(fields: tuple[str, ...]) -> dict[str, str]:
-    """Parameter that a command sets by ``*SET,name,value`` or ``name=value``, in capitals."""
+    """Parameter set by ``*SET,name,value`` or ``name=value``, in capitals."""
     if fields[0] == "*SET" and len(fields) > 2:
         return {fields[1].upper(): fields[2]}
     name, equals, value = (part.strip() for part in fields[0].partition("="))
@@ -179,7 +173,7 @@ _FORMAT = re.compile(
 
 
 class _Block:
-    """Lines of numbers behind a command and the format of their columns."""
+    """Number lines after a command, and the format of their columns."""
 
     def __init__(
         self, lines: TextLines, row: int, following: list[int], fields: tuple[str, ...]
@@ -206,7 +200,7 @@ class _Block:
         return form, np.arange(row + 2, end)
 
     def _until_mark(self, rows: NDArray[np.int64], width: int) -> NDArray[np.int64]:
-        """Lines in front of the end mark -1, which may also be in the command behind."""
+        """Lines before the end mark -1, which may be in the command behind."""
         first = self._lines.cells(rows, 0, width)[:, 0]
         text = np.char.strip(np.ascontiguousarray(first).view(f"S{width}").ravel())
         marks = np.flatnonzero(text == b"-1")
@@ -228,13 +222,13 @@ class _Block:
         )
 
     def _require_count(self, came: int, position: int) -> None:
-        """Number of items that the command declares, where it does."""
+        """Check the declared number of items."""
         text = _field(self._fields, position)
         if text.isdecimal() and int(text[:18]) != came:
             self._cut_off(self._row, f"{came} lines of items", f"{text}, according to the command")
 
     def nodes(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Numbers and global Cartesian coordinates of the nodes."""
+        """Numbers and global Cartesian coordinates."""
         form, rows = self._open()
         width = int(form["width"])
         if not form["reals"] or int(form["reals"]) < 3 or not int(form["real_width"]):
@@ -250,7 +244,7 @@ class _Block:
         return numbers, points
 
     def elements(self) -> ElementTable:
-        """Elements; those with more than eight nodes continue in a second line."""
+        """Elements; more than eight nodes continue in a second line."""
         form, rows = self._open()
         width, lines = int(form["width"]), self._lines
         rows = self._until_mark(rows, width)
@@ -280,7 +274,7 @@ class _Block:
         return ElementTable(head[:, 0], head[:, 1], head[:, 10], nodes, first)
 
     def members(self) -> Ranges:
-        """Members of a component: a negative number ends a range."""
+        """Members of a component; a negative number ends a range."""
         form, rows = self._open()
         width, each = int(form["width"]), int(form["integers"])
         text = _field(self._fields, 3)
@@ -301,7 +295,7 @@ class _Block:
 
 
 def _starts(counts: list[int]) -> NDArray[np.int64]:
-    """First lines of the elements, from the number of nodes that each of them declares."""
+    """First lines of elements, from their declared numbers of nodes."""
     starts = []
     row = 0
     while row < len(counts):

@@ -1,10 +1,10 @@
 """Meshes from ANSYS: archives of MAPDL (.cdb), and input files of Workbench (.dat).
 
-Read are SOLID185, SOLID186, SOLID187 and SOLID285 (and the older 45, 95 and 92), with their
-degenerate forms, components, linear elastic materials and the /UNITS command.  Loads, constraints
-and contact settings are ignored.
+Read are SOLID185, SOLID186, SOLID187 and SOLID285 (and the older 45, 95 and 92), degenerate forms,
+components, linear elastic materials and /UNITS; loads, constraints and contact settings are
+ignored.
 
-Read by hand: mapdl-archive (0.4.2) takes 222 of 300 damaged archives, this reader 17.
+mapdl-archive (0.4.2) takes 222 of 300 damaged archives, this reader 17.
 """
 
 import re
@@ -59,19 +59,9 @@ _TETRAHEDRA = (92, 187, 285)
 
 
 def shapes_of(lines: TextLines, table: ElementTable, kind: Ints) -> Ints:
-    """Number in :data:`SHAPES` for every element.
+    """Number in :data:`SHAPES` for every element of a kind (185, ...).
 
-    Parameters
-    ----------
-    lines
-        For the places in error texts.
-    kind (n,)
-        185, 186, ...
-
-    Raises
-    ------
-    InputError
-        For pyramids, other repeated nodes, and elements that miss some of their mid nodes.
+    Rejects pyramids, other repeated nodes, and elements that miss some mid nodes.
     """
     nodes = table.nodes
     K, L, M, N, O, P = nodes[:, 2:8].T  # noqa: E741
@@ -137,7 +127,7 @@ def faces_of(
     nodes (n, 20)
     kind (n,)
     option (n,)
-        KEYOPT(1), which is the shape of MESH200.
+        KEYOPT(1), the shape of MESH200.
     """
     facet = kind == 200
     count = (nodes > 0).sum(axis=1)
@@ -180,7 +170,8 @@ def read_ansys_archive(
 ) -> MeshModel:
     """Read mesh, components and materials of an ANSYS archive.
 
-    Parameters are those of :func:`klack.mesh.files.mesh_file.read_mesh_file`.
+    Parameters are those of :func:`klack.mesh.files.mesh_file.read_mesh_file`.  Pyramids and files
+    without any unit are rejected.
 
     Returns
     -------
@@ -190,12 +181,6 @@ def read_ansys_archive(
         it; the other one is a node set.  A component of nodes is a node set, and if it holds all
         nodes of some outer faces a surface as well; so is one of surface elements (SURF154,
         CONTA174, MESH200).
-
-    Raises
-    ------
-    InputError
-        With file and line, for pyramids, elements of other kinds, blocks that are cut off, and
-        files that name no unit if none is given.
     """
     path = Path(path)
     archive = read_archive(path)
@@ -261,7 +246,7 @@ _FORMULA = re.compile(r"[A-Za-z_(][\w%()*/+-]*|\d+[*/+-][\w%()*/+-]+")
 
 
 def _no_number(archive: Archive, row: int, text: str, expected: str) -> InputError:
-    """A formula or a parameter that the file does not set is no damage."""
+    """A formula or an unset parameter is no damage."""
     if _FORMULA.fullmatch(text):
         return InputError(
             archive.lines.place(row),
@@ -274,7 +259,7 @@ def _no_number(archive: Archive, row: int, text: str, expected: str) -> InputErr
 
 
 def _element_types(archive: Archive) -> tuple[dict[int, int], dict[int, int]]:
-    """Element (185, ...) and first KEYOPT of every type number, from ET, ETBLOCK and KEYOPT."""
+    """Element (185, ...) and first KEYOPT by type number, from ET, ETBLOCK and KEYOPT."""
     kinds: dict[int, int] = {}
     first_option: dict[int, int] = {}
     for row, fields in archive.commands:
@@ -303,7 +288,7 @@ def _look_up(table: Mapping[int, int], labels: Ints) -> Ints:
 
 
 def _left_out(archive: Archive, kinds: Mapping[int, int]) -> dict[str, int]:
-    """Count the elements that carry stiffness or mass and have no volume."""
+    """Count elements that have stiffness or mass but no volume."""
     counts: dict[str, int] = {}
     for label in np.unique(archive.elements.kind).tolist():
         kind = kinds.get(label, 0)
@@ -400,7 +385,7 @@ def _solids(
 def _faces(
     archive: Archive, table: ElementTable, kinds: Mapping[int, int], options: Mapping[int, int]
 ) -> Iterator[FileElements]:
-    """Surface elements, once for each component that holds them."""
+    """Surface elements, once per component."""
     if not len(table.number):
         return
     kind, option = _look_up(kinds, table.kind), _look_up(options, table.kind)
@@ -427,9 +412,9 @@ def _sections(
 
 
 def _materials(archive: Archive) -> tuple[dict[str, FileMaterial], dict[str, str]]:
-    """Isotropic materials of MP and MPDATA, and what the others are.
+    """Isotropic materials of MP and MPDATA, and what others are.
 
-    One that depends on temperature is left out.
+    Those that depend on temperature are left out.
     """
     found: dict[int, dict[str, float | None]] = {}
     for row, fields in archive.commands:

@@ -1,12 +1,11 @@
 """Meshes from Gmsh (.msh 2.2 and 4.1, ASCII and binary).
 
-Physical groups name the parts: those of volumes are solids, those of surfaces on them are
-surfaces; all others are node sets.  A plane mesh in z = 0 is an axisymmetric body: x is r, y is z.
+Physical groups of volumes are solids, of surfaces on them surfaces; all others are node sets. A
+plane mesh in z = 0 is axisymmetric: x is r, y is z.
 
-Read by hand, not by meshio (5.3.5): that loses the numbers of the nodes and all physical groups of
-an entity but the first, takes another node for one that the file does not define, and reads no
-quadratic wedges and no file in which an entity has no group.  Nor is it faster (477 000 tetrahedra:
-3.5 s against 2.3 s as text, 0.4 s against 0.1 s binary).
+meshio (5.3.5) loses node numbers and all physical groups of an entity but the first, takes another
+node for an undefined one, and reads no quadratic wedges and no entity without group; nor is it
+faster (477 000 tetrahedra: 3.5 s against 2.3 s as text, 0.4 s against 0.1 s binary).
 """
 
 from collections.abc import Sequence
@@ -56,21 +55,15 @@ def read_gmsh(
 ) -> MeshModel:
     """Read the mesh of a Gmsh file.
 
-    Parameters are those of :func:`klack.mesh.files.mesh_file.read_mesh_file`.
-    ``solids_only`` leaves out shells on no solid; curves and points are node sets anyway.
+    Parameters are those of :func:`klack.mesh.files.mesh_file.read_mesh_file`; ``solids_only``
+    leaves out shells on no solid. Pyramids, other orders and elements in two groups of volumes are
+    rejected.
 
     Returns
     -------
     MeshModel
         Solids, surfaces and node sets are called as their physical groups, or ``volume_7``,
-        ``surface_3`` where these have no names.  Elements in no group are one solid that is called
-        as the file.
-
-    Raises
-    ------
-    InputError
-        With file and section, for pyramids, elements of other orders, an element in two groups of
-        volumes, and files that are cut off.
+        ``surface_3``; elements in no group are one solid called as the file.
     """
     path = Path(path)
     unit_length = require_unit(path, unit_length)
@@ -143,7 +136,7 @@ def _refuse_two_groups(path: Path, element: int, groups: str) -> None:
 
 
 def _require_once(path: Path, bodies: list[GmshElements]) -> None:
-    """A file of version 2 repeats an element for each of its groups."""
+    """A file of version 2 repeats elements for each group."""
     for kind in {part.kind for part in bodies}:
         same = [part for part in bodies if part.kind == kind]
         if len({part.groups for part in same}) < 2:
@@ -164,7 +157,7 @@ def _solid(path: Path, content: GmshContent, part: GmshElements) -> FileElements
 
 
 def _face(part: GmshElements, name: str) -> FileElements:
-    """Only the corners of surface elements count, so a quadrilateral may have 9 nodes."""
+    """Only corners of surface elements count: a quadrilateral may have 9 nodes."""
     family = {8: "line2", 9: "tri3", 10: "quad4", 16: "quad4"}.get(part.kind)
     family = family or _FAMILIES[part.kind][0]
     return FileElements(
@@ -176,7 +169,7 @@ def _face(part: GmshElements, name: str) -> FileElements:
 
 
 def _node_sets(content: GmshContent, dimension: int) -> dict[str, NDArray[np.int64]]:
-    """Nodes of all groups below the dimension of the body."""
+    """Nodes of groups below the dimension of the body."""
     parts: dict[str, list[NDArray[np.int64]]] = {}
     for part in content.elements:
         if _dimension(part) < dimension:

@@ -1,4 +1,4 @@
-"""Sections of a Gmsh file (.msh 2 and 4.1, ASCII and binary): nodes, elements, physical groups."""
+"""Sections of a Gmsh file: nodes, elements, physical groups."""
 
 import re
 from dataclasses import dataclass, field
@@ -23,10 +23,10 @@ class Stream(Protocol):
     """Numbers of a section, one after the other."""
 
     def whole(self, count: int) -> Ints:
-        """Numbers that the binary form holds in four bytes."""
+        """Numbers of four bytes in binary form."""
 
     def sizes(self, count: int) -> Ints:
-        """Numbers that the binary form holds as sizes."""
+        """Numbers that binary form holds as sizes."""
 
     def real(self, count: int) -> NDArray[np.float64]:
         """Finite real numbers."""
@@ -49,7 +49,7 @@ class TextStream:
         return len(self._values) - self._at
 
     def require_end(self) -> None:
-        """Raise for numbers behind those that were counted."""
+        """Reject numbers behind the counted ones."""
         if self.left:
             refuse(self._place, f"{self.left} numbers more than its counts", "as many as it counts")
 
@@ -71,7 +71,7 @@ class TextStream:
 
 
 class BinaryStream:
-    """Numbers of a binary section; its end is not known before they are read."""
+    """Numbers of a binary section, whose end is unknown before."""
 
     def __init__(self, place: str, data: bytes, at: int, order: str, size: int) -> None:
         self._place, self._data, self.at = place, data, at
@@ -112,7 +112,7 @@ class BinaryStream:
 
 
 def whole_of(place: str, values: NDArray[np.float64]) -> Ints:
-    """Turn reals into whole numbers; raise for a fraction."""
+    """Reals as whole numbers; rejects fractions."""
     if (np.abs(values) > 2**53).any() or (values != np.rint(values)).any():
         refuse(place, "a number with a fraction, or a huge one", "whole numbers")
     return values.astype(np.int64)
@@ -134,22 +134,22 @@ NODE_COUNTS = {
     **{1: 2, 2: 3, 3: 4, 4: 4, 5: 8, 6: 6, 7: 5, 8: 3, 9: 6, 10: 9, 11: 10},
     **{12: 27, 13: 18, 14: 14, 15: 1, 16: 8, 17: 20, 18: 15, 19: 13},
 }
-"""Nodes of the element types that Gmsh makes at order 1 and 2, by their number."""
+"""Nodes of Gmsh element types of order 1 and 2, by number."""
 
 
 @dataclass(frozen=True, slots=True)
 class GmshElements:
-    """Elements of one type with the same physical groups.
+    """Elements of one type and the same physical groups.
 
     Parameters
     ----------
     kind
-        Element type of Gmsh.
+        Of Gmsh.
     groups
-        Numbers of the physical groups, of the dimension of the elements.
+        Of the dimension of the elements.
     numbers (n,)
     nodes (n, k)
-        Node numbers, in the order of Gmsh.
+        In the order of Gmsh.
     """
 
     kind: int
@@ -180,13 +180,7 @@ class GmshContent:
 
 
 def read_content(path: Path) -> GmshContent:
-    """Read all sections of interest.
-
-    Raises
-    ------
-    InputError
-        With file and section, for other formats, other versions, and counts that do not fit.
-    """
+    """Read all sections of interest."""
     data = read_bytes(path, _KIND)
     reader = _Reader(path, data)
     return reader.read()
@@ -223,7 +217,7 @@ class _Reader:
         return self._content
 
     def _section(self, name: str, start: int) -> int:
-        """Read one section that starts at a byte; give the byte behind it."""
+        """Read a section at a byte; returns the byte behind."""
         place = f"{self._path}: ${name}"
         if name == "MeshFormat":
             start = self._format(place, start)
@@ -282,7 +276,7 @@ class _Reader:
                 refuse(place, repr(line[:40]), 'dimension, number and "name"')
 
     def _numbers(self, name: str, place: str, start: int) -> int:
-        """Read a section of numbers; give the byte behind them."""
+        """Read numbers; returns the byte behind."""
         old = self._version.startswith("2")
         if not self._binary:
             end = self._data.find(f"$End{name}".encode(), start)
@@ -322,7 +316,7 @@ class _Reader:
         self._content.point_parts.append(points)
 
     def _take(self, kind: int, groups: tuple[int, ...], rows: Ints) -> None:
-        """Take elements: number and nodes in every row."""
+        """Take elements: number and nodes in rows."""
         self._content.elements.append(GmshElements(kind, groups, rows[:, 0], rows[:, 1:]))
 
     def _node_count(self, place: str, kind: int) -> int:
@@ -368,7 +362,7 @@ class _Reader:
             left -= count
 
     def _take_tagged(self, place: str, kind: int, tags: int, rows: Ints) -> None:
-        """Split elements by their first tag, which is the physical group (0: none)."""
+        """Split elements by their first tag, the physical group (0: none)."""
         group = rows[:, 1] if tags else np.zeros(len(rows), dtype=np.int64)
         for label in np.unique(group).tolist():
             own = rows[group == label]
@@ -412,7 +406,7 @@ class _Reader:
 
 
 def _alike(values: Ints, width: int, most: int) -> int:
-    """Number of rows from the start with the type and number of tags of the first one."""
+    """Rows from the start with type and tag count of the first."""
     done, step = 1, 64
     while done < most:
         last = min(done + step, most)

@@ -1,9 +1,8 @@
 """Cards of a Nastran file: small, large and free fields, continuations, includes.
 
-A card has a name and data fields; eight of them stand in one line of small fields (8 columns each)
-or of free fields (between commas), four in one of large fields (16 columns; the name or the mark
-of the continuation has a ``*``).  A line continues in the next one if that has no name, but blanks
-or a mark that starts with ``+`` or ``*``.  ``$`` starts a comment.
+A line has a name and eight small data fields (8 columns each, or between commas) or four large
+ones (16 columns; the name or continuation mark has a ``*``). It continues in the next line if that
+has no name, but blanks or a mark that starts with ``+`` or ``*``. ``$`` starts a comment.
 """
 
 import re
@@ -30,16 +29,8 @@ _INCLUDE = re.compile(rb"^[ \t]*INCLUDE[ \t]+['\"]?([^'\"\r\n$]+)", re.IGNORECAS
 def text_with_includes(path: Path) -> tuple[bytes, tuple[tuple[int, str, int], ...]]:
     """Text of the file with its includes, and the origin of its lines.
 
-    Returns
-    -------
-    text : bytes
-    pieces : tuple of (line, file name, its line there)
-        Where a run of lines begins; lines of the text count from 0, those of a file from 1.
-
-    Raises
-    ------
-    InputError
-        For files that are missing, binary, too large, outside the folder, or included twice.
+    An origin (line, file name, its line there) begins each run; lines of the text count from 0, of
+    a file from 1. Includes outside the folder, or twice, are rejected.
     """
     folder = path.resolve().parent
     parts: list[bytes] = []
@@ -122,22 +113,14 @@ _MESH_CARDS = (b"GRID", b"GRID*", b"CHEXA", b"CHEXA*", b"CTETRA", b"CTETRA*", b"
 
 @dataclass(frozen=True, slots=True)
 class Card:
-    """One card as text.
-
-    Parameters
-    ----------
-    place
-        File and line.
-    fields
-        Data fields, stripped, without blanks at the end.
-    """
+    """One card; fields stripped, without blanks at the end."""
 
     place: str
     name: str
     fields: list[str]
 
     def field(self, number: int) -> str:
-        """Data field, counted from 1 behind the name; "" if it is not there."""
+        """Data field, from 1 behind the name, or ""."""
         return self.fields[number - 1] if number <= len(self.fields) else ""
 
     def integer(self, number: int, what: str) -> int:
@@ -155,7 +138,7 @@ class Card:
         return float(text)
 
     def refuse(self, got: str, expected: str) -> None:
-        """Raise for a card that cannot be used."""
+        """Reject the card."""
         raise InputError(
             f"{self.place}: {self.name}",
             got=got,
@@ -171,22 +154,23 @@ class BulkData:
     Parameters
     ----------
     lines
-        Of the file with its includes; line ends cut at ``$``.
+        With includes; ends cut at ``$``.
     rows (n_cards,)
-        First line of every card of the bulk data.
+        First line of each card.
     counts (n_cards,)
-        Number of its lines, counted in ``order``.
+        Its lines, counted in ``order``.
     order
         Lines of the bulk data without comments and empty ones.
     position (n_cards,)
-        Place of the first line in ``order``.
-    words : bytes array
+        Of the first line in ``order``.
+    words
         First field of every line in ``order``, in capitals.
-    names : bytes array, shape (n_cards,)
+    names (n_cards,)
         In capitals, without ``*``.
     head
         Lines before BEGIN BULK.
-    pieces : tuple of (first line, file name, its first line there)
+    pieces
+        As of :func:`text_with_includes`.
     """
 
     lines: TextLines
@@ -225,11 +209,11 @@ class BulkData:
         return tuple(self._by_name)
 
     def numbers_of(self, name: str) -> NDArray[np.int64]:
-        """Which cards have this name, in the order of the file."""
+        """Cards of a name, in the order of the file."""
         return self._by_name.get(name, np.empty(0, dtype=np.int64))
 
     def cards(self, name: str) -> Iterator[Card]:
-        """Cards of one name as text: for cards of which there are few."""
+        """Cards of one name as text: for few cards."""
         for number in self.numbers_of(name).tolist():
             first = self.position[number]
             fields: list[str] = []
@@ -240,17 +224,9 @@ class BulkData:
             yield Card(self.place(int(self.rows[number])), name, fields)
 
     def tables(self, name: str, most: int) -> Iterator[tuple[NDArray[np.int64], NDArray[np.uint8]]]:
-        """Yield first lines and data fields of all cards of one name, many at once.
+        """First lines (n,) and data fields (n, most, width) of all cards of one name, many at once.
 
-        Parameters
-        ----------
-        most
-            Number of data fields of interest; blanks fill up.
-
-        Yields
-        ------
-        rows (n,)
-        cells (n, most, width)
+        Blanks fill up to ``most`` fields.
         """
         numbers = self.numbers_of(name)
         for begin in range(0, len(numbers), _CHUNK):
@@ -259,7 +235,7 @@ class BulkData:
                 yield self.rows[same], self._cells(same, most)
 
     def _of_same_form(self, cards: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
-        """Cards with the same number of lines, each in the same kind of fields."""
+        """Cards with equal numbers of lines and kinds of fields."""
         counts = np.minimum(self.counts[cards], 8)
         key = counts.copy()
         for line in range(int(counts.max(initial=0))):
@@ -271,7 +247,7 @@ class BulkData:
 
     @cached_property
     def _kinds(self) -> NDArray[np.int8]:
-        """0 small fields, 1 large ones, 2 and 3 the same between commas or tabs, by line."""
+        """By line: 0 small fields, 1 large ones; 2 and 3 the same between commas or tabs."""
         lines = self.lines
         kinds = np.zeros(len(lines), dtype=np.int8)
         kinds[self.order[np.char.find(self.words, b"*") >= 0]] = 1
@@ -304,7 +280,7 @@ class BulkData:
         return out[:, :most]
 
     def _free(self, rows: NDArray[np.int64]) -> NDArray[np.uint8]:
-        """Fields between commas; four in a line whose first field has a ``*``."""
+        """Fields between commas; four after a ``*``."""
         words = [_fields(self.lines.line(row), self.place(row)) for row in rows.tolist()]
         count = len(words[0])
         longest = max((len(word) for fields in words for word in fields), default=1)
@@ -323,7 +299,7 @@ class BulkData:
 
 
 def _fields(text: str, place: str) -> list[str]:
-    """Data fields of one line, stripped: eight, or four of large fields."""
+    """Stripped data fields of a line: eight, or four large ones."""
     if "," in text:
         head, *words = [word.strip() for word in text.split(",")]
         count = 4 if "*" in head else 8
@@ -343,11 +319,7 @@ def _fields(text: str, place: str) -> list[str]:
 def read_bulk(path: Path) -> BulkData:
     """Read a file and its includes, and find the cards.
 
-    Raises
-    ------
-    InputError
-        If it is no text or does not end with ENDDATA, an include is missing or lies outside the
-        folder, or a continuation does not follow its card.
+    Rejects a file without ENDDATA and continuations that do not follow their card.
     """
     data, pieces = text_with_includes(path)
     lines = TextLines.of(data, path.name)
@@ -396,7 +368,7 @@ def _require_marks_in_order(
     continued: NDArray[np.int64],
     names: NDArray[np.bytes_],
 ) -> None:
-    """Require the mark at the end of a line at the start of the next one."""
+    """The mark at the end of a line must start the next one."""
     for begin in range(0, len(continued), _CHUNK):
         part = continued[begin : begin + _CHUNK]
         mark = np.char.lstrip(names[part], b"+*")
@@ -456,7 +428,7 @@ def _filled(lines: TextLines) -> NDArray[np.int64]:
 def _split(
     path: Path, lines: TextLines, filled: NDArray[np.int64]
 ) -> tuple[tuple[str, ...], NDArray[np.int64]]:
-    """Lines in front of BEGIN BULK as text, and the lines of the bulk data up to ENDDATA."""
+    """Lines before BEGIN BULK as text, and those up to ENDDATA."""
     words = _names(lines.cells(filled, 0, 8)[:, 0])
     begin = np.flatnonzero(np.char.startswith(words, b"BEGIN"))
     first = int(begin[0]) + 1 if len(begin) else 0

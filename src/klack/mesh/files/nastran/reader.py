@@ -1,12 +1,11 @@
 """Meshes from Nastran bulk data (.bdf, .dat, .nas).
 
-Read are GRID in any coordinate system, the solids CTETRA, CHEXA and CPENTA (linear and
-quadratic), PSOLID, MAT1, the surface elements CTRIA3, CTRIA6, CQUAD4 and CQUAD8 (each property of
-theirs becomes a surface), and sets of nodes.  Loads, constraints and solution control are
-ignored.
+Read are GRID in any coordinate system, the solids CTETRA, CHEXA and CPENTA (linear and quadratic),
+PSOLID, MAT1, the surface elements CTRIA3, CTRIA6, CQUAD4 and CQUAD8 (a surface per property), and
+sets of nodes; loads, constraints and solution control are ignored.
 
-Read by hand: meshio (5.3.5) takes points in a local coordinate system for global ones without a
-word, and reads no sets and names.
+meshio (5.3.5) takes points in a local coordinate system for global ones without a word, and reads
+no sets and names.
 """
 
 from collections.abc import Sequence
@@ -79,12 +78,7 @@ def read_nastran(
     MeshModel
         Solids are called ``psolid_1`` after their property, or as HyperMesh, ANSA or Femap named
         it in a comment; surfaces ``pshell_2`` after the property of their elements.  A node set
-        that holds all nodes of some outer faces is a surface as well.
-
-    Raises
-    ------
-    InputError
-        With file and line, if the file is cut off or holds what is not supported.
+        that holds all nodes of some outer faces is a surface too.
     """
     path = Path(path)
     unit_length = require_unit(path, unit_length)
@@ -235,7 +229,7 @@ def _solids_of(
     order: tuple[int, ...],
     given: dict[int, str],
 ) -> list[tuple[int, FileElements]]:
-    """Elements of one card with their property numbers."""
+    """Elements of one card with property numbers."""
     corners, most = FAMILIES[linear].nodes, FAMILIES[quadratic].nodes
     parts = []
     for rows, cells in bulk.tables(name, 2 + most):
@@ -285,7 +279,7 @@ def _shells(bulk: BulkData, name: str, family: str, given: dict[int, str]) -> li
 
 
 def _materials(bulk: BulkData, given: dict[int, str]) -> dict[int, FileMaterial]:
-    """Isotropic materials; two of E, G and nu are enough."""
+    """Isotropic materials, by two of E, G and nu."""
     materials = {}
     for card in bulk.cards("MAT1"):
         label = card.integer(1, "number of the material")

@@ -1,4 +1,4 @@
-"""Sets of nodes with their names, and coordinate systems, of bulk data."""
+"""Named sets of nodes, and coordinate systems, of bulk data."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -20,16 +20,8 @@ _DEGREES = ("ASET", "BSET", "CSET", "QSET", "OMIT")
 def node_sets(bulk: BulkData, numbers: NDArray[np.int64]) -> dict[str, NDArray[np.int64]]:
     """Sets of nodes: SET of the case control, SET1, SET3 of grids, ASET and the like, USET.
 
-    Parameters
-    ----------
-    numbers
-        All node numbers.
-
-    Returns
-    -------
-    dict of int arrays
-        Called ``set_5``, ``aset``, or after USET; members that are no nodes are left out (a SET
-        of the case control may be one of elements), and sets without nodes as well.
+    Called ``set_5``, ``aset``, or after USET; members that are no nodes are left out (a SET of the
+    case control may be one of elements), and sets without nodes.
     """
     ordered = np.sort(numbers)
     given = names_in_comments(bulk).get("SET", {})
@@ -71,7 +63,7 @@ def _ranges(card: Card, fields: list[str]) -> Ranges:
 
 
 def _read(words: list[str]) -> Ranges:
-    """Ranges of ``1 THRU 10 EXCEPT 4 5 20``; raise ValueError for anything else."""
+    """Ranges of ``1 THRU 10 EXCEPT 4 5 20``; ValueError for others."""
     ranges: Ranges = []
     i = 0
     while i < len(words):
@@ -111,7 +103,7 @@ _SET = re.compile(r"\s*SET\s+(\d{1,9})\s*=\s*(.*)", re.IGNORECASE)
 
 
 def _of_case_control(head: tuple[str, ...]) -> Iterator[tuple[int, Ranges]]:
-    """Sets of integers; those of real numbers and of names are ignored."""
+    """Sets of integers."""
     lines = iter(head)
     for line in lines:
         match = _SET.match(line)
@@ -151,7 +143,7 @@ _KINDS = {
 
 
 def names_in_comments(bulk: BulkData) -> dict[str, dict[int, str]]:
-    """Names that HyperMesh, ANSA and Femap write into comments, by kind and number."""
+    """Names in comments of HyperMesh, ANSA and Femap, by kind and number."""
     names: dict[str, dict[int, str]] = {}
     for comment in bulk.comments:
         if comment[1:3].upper() not in ("HM", "AN", " F"):
@@ -179,13 +171,9 @@ class _Definition:
 class Frames:
     r"""All coordinate systems of a file.
 
-    A system is given by three points: A its origin, B on its z axis, C in its x-z plane.  Angles
-    are in degrees; the spherical angle :math:`\theta` is measured from the z axis.
-
-    Parameters
-    ----------
-    node : function
-        Gives the place of a node by its number, in basic coordinates.
+    Given by three points: A the origin, B on the z axis, C in the x-z plane. Angles are in
+    degrees; the spherical angle :math:`\theta` is from the z axis. ``node`` gives the basic
+    coordinates of a node.
     """
 
     def __init__(self, bulk: BulkData, node: Callable[[int, int], NDArray[np.float64]]) -> None:
@@ -212,7 +200,7 @@ class Frames:
     def basic(
         self, label: int, x: NDArray[np.float64], place: str, depth: int = 0
     ) -> NDArray[np.float64]:
-        """Turn coordinates, shape (n, 3), of one system into basic ones."""
+        """Coordinates (n, 3) of one system as basic ones."""
         if label == 0:
             return x
         if label not in self._known or depth > _DEEPEST:

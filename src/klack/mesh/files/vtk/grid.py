@@ -1,4 +1,4 @@
-"""Grids of points and cells from VTK files, legacy and XML."""
+"""Grids from VTK files, legacy and XML."""
 
 import base64
 import binascii
@@ -30,12 +30,12 @@ class VtkGrid:
     ----------
     points (n_points, 3)
     connectivity (n,)
-        Points of all cells, one cell after the other, counted from 0.
+        Points of all cells, from 0.
     offsets (n_cells + 1,)
-        Where the points of every cell begin.
+        Where those of each cell begin.
     types (n_cells,)
-    point_data, cell_data : mappings of name to array
-        Those of one integer per point or cell.
+    point_data, cell_data
+        Arrays of one integer each.
     """
 
     points: NDArray[np.float64]
@@ -84,13 +84,7 @@ _WORD_AHEAD = re.compile(rb"^[ \t]*[A-Za-z_]", re.MULTILINE)
 
 
 def read_legacy(path: Path) -> VtkGrid:
-    """Read an unstructured grid.
-
-    Raises
-    ------
-    InputError
-        With file and keyword, for other datasets and counts that do not fit.
-    """
+    """Read an unstructured grid."""
     data = read_bytes(path, "a VTK file")
     head = _HEAD.match(data, 0, 2000)
     if not head:
@@ -146,7 +140,7 @@ class _Reader:
         )
 
     def _words(self) -> list[str]:
-        """Words of the next line that is not empty."""
+        """Words of the next non-empty line."""
         while self._at < len(self._data):
             if words := self._line()[:1000].decode("utf-8", "replace").split():
                 return words
@@ -196,7 +190,7 @@ class _Reader:
         return values
 
     def _cells_of(self, words: list[str]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Connectivity and offsets, from the old form (count, points, ...) or the new one."""
+        """Connectivity and offsets, of the old form (count, points, ...) or the new."""
         start = self._at
         second = self._words()
         if second and second[0].upper() == "OFFSETS":
@@ -221,7 +215,7 @@ class _Reader:
             pass
 
     def _attribute(self, words: list[str], kind: str, count: int) -> None:
-        """Read one array of data; keep it if it has one integer per item."""
+        """Read an array; keep one of one integer per item."""
         name = words[0].upper()
         label = unquote(words[1]) if len(words) > 1 else ""
         match name:
@@ -272,7 +266,7 @@ class _Reader:
 
 
 def _sizes(flat: NDArray[np.int64], count: int) -> NDArray[np.int64] | None:
-    """Number of points of every cell; None if they do not fill the list."""
+    """Points per cell; None if they do not fill the list."""
     if count and len(flat) and len(flat) % count == 0:
         rows = flat.reshape(count, -1)
         if (rows[:, 0] == rows.shape[1] - 1).all():  # all alike
@@ -300,13 +294,7 @@ _LARGEST = 8_000_000_000  # bytes of one array
 
 
 def read_xml(path: Path) -> VtkGrid:
-    """Read an unstructured grid of one piece.
-
-    Raises
-    ------
-    InputError
-        With file and array, for other grids, several pieces, and sizes that do not fit.
-    """
+    """Read an unstructured grid of one piece."""
     data = read_bytes(path, "a VTK file")
     if b"<!DOCTYPE" in data[:10_000] or b"<!ENTITY" in data[:10_000]:
         refuse(str(path), "an XML file with own entities", "a VTK file")
@@ -422,7 +410,7 @@ class _XmlReader:
         return np.frombuffer(raw, dtype=kind)
 
     def _bytes(self, where: str, source: "_Source", size: int) -> bytes:
-        """Content of a binary array that must have a known size."""
+        """Content of a binary array of known size."""
         h = self._header.itemsize
         if not self._compressor:
             raw = source.take(0, h + size)
@@ -461,7 +449,7 @@ class _XmlReader:
 
 
 class _Source:
-    """Bytes of an array, as such or in base64."""
+    """Bytes of an array, plain or base64."""
 
     def __init__(self, where: str, data: bytes, start: int, raw: bool) -> None:
         self._where, self._data, self._start, self._raw = where, data, start, raw
@@ -471,11 +459,11 @@ class _Source:
         return len(self._data) - self._start
 
     def take(self, first: int, size: int) -> bytes:
-        """Bytes of the first part, from its start."""
+        """Bytes of the first part."""
         return self._cut(self._start + first, size)
 
     def take_behind(self, head: int, size: int) -> bytes:
-        """Bytes of the second part, behind a head that is encoded by itself."""
+        """Bytes of the second part, behind a head encoded by itself."""
         return self._cut(self._start + (head if self._raw else 4 * -(-head // 3)), size)
 
     def _cut(self, start: int, size: int) -> bytes:

@@ -1,12 +1,11 @@
 """Meshes from VTK files: legacy (.vtk) and XML (.vtu) unstructured grids.
 
 VTK has no names for parts.  An integer array of the cells tells the solids (``solid``,
-``material``, ...) or surfaces apart, and arrays of 0 and 1 are sets.  A plane grid in z = 0 is an
-axisymmetric body: x is r, y is z.
+``material``, ...) or surfaces apart; arrays of 0 and 1 are sets.  A plane grid in z = 0 is
+axisymmetric: x is r, y is z.
 
-Read by hand: the reader of VTK (9.7, 560 MB installed) ends the process on a legacy file in which a
-line is missing; meshio (5.3.5) does not know the integers of type ``long`` that VTK writes into
-legacy files, and leaves out pixels and voxels.
+The reader of VTK (9.7, 560 MB installed) ends the process on a legacy file that lacks a line;
+meshio (5.3.5) does not know VTK's integers of type ``long``, and leaves out pixels and voxels.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -79,15 +78,10 @@ def read_vtk(
     Returns
     -------
     MeshModel
-        Solids are called ``material_2`` after array and value, or as the file if there is no such
+        Solids are called ``material_2`` after array and value, or as the file without such an
         array; surfaces ``surface_5``, after an array ``surface`` or that of the solids.  An array
         of 0 and 1 is a node set, and a surface if it marks surface cells or holds all nodes of
         some outer faces.
-
-    Raises
-    ------
-    InputError
-        For cells of other kinds, several pieces, and files that are cut off.
     """
     path = Path(path)
     unit_length = require_unit(path, unit_length)
@@ -161,7 +155,7 @@ def _left_out(grid: VtkGrid) -> dict[str, int]:
 
 
 def _dimension(path: Path, grid: VtkGrid, *, solids_only: bool) -> int:
-    """3 for solids, 2 for a plane grid in z = 0; raise for cells that cannot be used."""
+    """3 for solids, 2 for a plane grid in z = 0; rejects other cells."""
     for kind in np.unique(grid.types).tolist():
         if solids_only and kind in _MAY_BE_LEFT_OUT:
             continue
@@ -206,7 +200,7 @@ def _cells(grid: VtkGrid) -> Iterator[FileElements]:
 
 
 def _chosen(data: Mapping[str, Ints], words: Sequence[str]) -> str:
-    """Name of the array that distinguishes parts, or ""."""
+    """Array that distinguishes parts, or ""."""
     plain: dict[str, str] = {}
     for name in data:
         word = "".join(letter for letter in name.lower() if letter.isalpha())
@@ -216,7 +210,7 @@ def _chosen(data: Mapping[str, Ints], words: Sequence[str]) -> str:
 
 
 def _is_flag(name: str, values: Ints) -> bool:
-    """True for an array of 0 and 1 that is no ghost mark of VTK."""
+    """True for an array of 0 and 1 other than VTK's ghost marks."""
     if name.startswith("vtk") or not len(values):
         return False
     return bool(values.min() == 0 and values.max() == 1)
@@ -225,7 +219,7 @@ def _is_flag(name: str, values: Ints) -> bool:
 def _by_value(
     parts: list[FileElements], grid: VtkGrid, array: str, label: str, single: str
 ) -> Iterator[FileElements]:
-    """Cells by the value of an array; one part called ``single`` without an array."""
+    """Cells by the value of an array; one part ``single`` without."""
     if not array:
         for part in parts:
             yield _named(part, single, np.ones(len(part.numbers), dtype=bool))
