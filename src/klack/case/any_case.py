@@ -1,4 +1,4 @@
-"""Cases of both kinds: which one a file holds, read and as a tree."""
+"""Cases of both kinds, read and as a tree."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -32,7 +32,7 @@ AnyCase = Case | ValveCase
 
 
 def case_kind(data: Any) -> type[Case] | type[ValveCase]:
-    """Kind of the case that the parsed text of a file describes: a valve has a network."""
+    """Kind of a case: a valve has a network."""
     return ValveCase if "network" in data else Case
 
 
@@ -43,28 +43,21 @@ OwnComponents = Iterable[type[Component]]
 def load_valve_case(path: str | Path, components: OwnComponents = ()) -> ValveCase:
     """Read and check the case file of a whole valve; see :func:`klack.case.reader.load_case`.
 
-    Apart from :mod:`klack.case.reader`, because the components of a network take a while to import.
-
-    A case file runs no code.  Components of the user's own are classes that the caller hands over;
-    the file names them ``package.module:Class``.
-
-    Parameters
-    ----------
-    components : iterable of type
-        Components of the user's own that the case may name, as ``package.module:Class``.
+    A case file runs no code: ``components`` of the user's own are classes that the caller hands
+    over, named ``package.module:Class`` in the file.
     """
     path = Path(path)
     return read_valve_case(text_of(path), path, components)
 
 
 def load_any_case(path: str | Path, components: OwnComponents = ()) -> AnyCase:
-    """Read and check a case file of either kind: with a section ``network`` it is a valve."""
+    """Read and check a case file of either kind."""
     path = Path(path)
     return read_any_case(text_of(path), path, components)
 
 
 def read_valve_case(text: str, path: Path, components: OwnComponents = ()) -> ValveCase:
-    """Check the text of a case of a whole valve that lies (or will lie) at ``path``."""
+    """Check the text of a valve case that lies (or will lie) at ``path``."""
     return _parsed(text, path, components).case()
 
 
@@ -74,7 +67,7 @@ def read_any_case(text: str, path: Path, components: OwnComponents = ()) -> AnyC
 
 
 def valve_case_schema() -> dict[str, Any]:
-    """JSON schema of a case of a whole valve, with all components."""
+    """JSON schema of a valve case, with all components."""
     return schema_of(ValveCase)
 
 
@@ -84,9 +77,9 @@ class CaseTree:
 
     Parameters
     ----------
-    components : mapping of str to type
-        Of the user's own, by the words that the case may name them with.  A worker process knows
-        a class of a script under another module, so that the word is kept.
+    components
+        Of the user's own, by the words that the case names them with.  A worker process knows a
+        class of a script under another module.
     """
 
     path: Path
@@ -96,13 +89,7 @@ class CaseTree:
     components: Mapping[str, type[Component]] = field(default_factory=dict)
 
     def case(self, values: Mapping[Key, object] | None = None) -> ValveCase:
-        """Check the case of a whole valve with other values at some keys that it has.
-
-        Raises
-        ------
-        InputError
-            With file, line and key, as when the case is read; for a case of an impact.
-        """
+        """Check the case of a whole valve with other values at some existing keys."""
         data = self.data
         for key, value in (values or {}).items():
             data = exchanged(data, key, value)
@@ -110,19 +97,13 @@ class CaseTree:
         return validated(ValveCase, self.text, self.path, data, self.lines, self.components)
 
     def any_case(self) -> AnyCase:
-        """Check the case, an impact or a whole valve.
-
-        Raises
-        ------
-        InputError
-            With file, line and key, as when the case is read.
-        """
+        """Check the case, an impact or a whole valve."""
         kind = case_kind(self.data)
         return validated(kind, self.text, self.path, self.data, self.lines, self.components)
 
 
 def read_case_tree(path: Path, components: OwnComponents = ()) -> CaseTree:
-    """Read the file of a case; ``components`` are those of the user's own that it may name."""
+    """Read the file of a case; ``components`` as of :func:`load_valve_case`."""
     return tree_of(text_of(path), path, components)
 
 
@@ -142,7 +123,7 @@ def _parsed(text: str, path: Path, components: OwnComponents) -> CaseTree:
 
 
 def exchanged(data: Any, key: Key, value: object) -> Any:
-    """Copy of the data with another value; everything off the path is shared."""
+    """Copy with another value; everything off the path is shared."""
     if not key:
         return value
     head, rest = key[0], key[1:]

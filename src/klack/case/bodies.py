@@ -1,4 +1,4 @@
-"""Materials, bodies and their reduction: the parts that every kind of case shares."""
+"""Materials, bodies and their reduction, shared by every kind of case."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from math import isclose
@@ -91,10 +91,7 @@ class Hardness(Section):
 
     @property
     def yield_stress(self) -> float:
-        """Estimate of the yield stress [Pa].
-
-        See :func:`klack.materials.hardening.yield_of_hardness`.
-        """
+        """Yield stress [Pa] by :func:`klack.materials.hardening.yield_of_hardness`."""
         vickers = self.HV
         if vickers is None:
             assert self.HRC is not None
@@ -174,7 +171,7 @@ class CaseMaterial(NamedSection):
 
     @property
     def doubtful_yield(self) -> tuple[float, str] | None:
-        """Lowest yield stress [Pa] behind an estimate, and what it rests on; None for a given one.
+        """Lowest yield stress [Pa] behind an estimate, and its basis; None for a given one.
 
         A hardness gives an estimate (:data:`klack.materials.hardening.HARDNESS_SPREAD`); a number
         of the library is that of another bar.
@@ -337,7 +334,7 @@ class CaseBody(Section):
 
     @property
     def has_surfaces(self) -> bool:
-        """False for a reduced model and for nodes alone: contact is then at a port only."""
+        """False for a reduced model and for nodes alone: contact is then at a port."""
         return self.reduced is None and self.geometry.nodes is None
 
 
@@ -430,7 +427,7 @@ class Reduction(Section):
         return self.modes.get(body, ModeChoice(count=40))
 
     def shifts_of(self, body: str, correction: str) -> tuple[float, ...] | None:
-        """Shifts [(rad/s)^2] of the attachment modes of a body; None for residual ones or none."""
+        """Shifts [(rad/s)^2] of attachment modes; None for residual or none."""
         if correction != "attachment" or body not in self.shifts:
             return None
         from klack.bodies.reduction.attachment import (
@@ -484,7 +481,7 @@ class CaseFile(Section):
 
     @property
     def path(self) -> Path | None:
-        """File that the case was read from; None for one made in Python."""
+        """Its file; None for one made in Python."""
         return self._path
 
     @property
@@ -499,19 +496,19 @@ class CaseFile(Section):
 
     @property
     def expanded(self) -> ExpandedCase | None:
-        """Its plain data with expressions evaluated and parts in place; None in Python."""
+        """Plain data, expressions evaluated and parts in place; None in Python."""
         return self._expanded
 
     def behind(self, key: Key) -> tuple[Key, ...]:
-        """Keys whose values follow from a parameter or an argument; of any other key, itself."""
+        """As :meth:`ExpandedCase.behind`."""
         return self._expanded.behind(key) if self._expanded is not None else (key,)
 
     def plausible_numbers(self) -> Iterator[Number]:
-        """Numbers of this kind of case whose size tells of a wrong unit."""
+        """Numbers whose size tells of a wrong unit."""
         return iter(())
 
     def require_possible(self) -> None:
-        """Raise :class:`InputError` for numbers that cannot be, unless the case confirms them."""
+        """Reject numbers that cannot be, unless the case confirms them."""
         if self.unusual:
             return
         for number in self.plausible_numbers():
@@ -539,7 +536,7 @@ class CaseFile(Section):
 
     @property
     def input_notes(self) -> tuple[str, ...]:
-        """What is doubtful about its numbers, and which of its parameters have no effect."""
+        """Doubtful numbers, and parameters without effect."""
         unused = self._expanded.unused_parameters() if self._expanded is not None else ()
         return self.doubts + tuple(
             f"parameters.{name}: nothing in this case follows from it. "
@@ -549,26 +546,23 @@ class CaseFile(Section):
 
     @property
     def own_components(self) -> Mapping[str, str]:
-        """Components that are not part of klack, with a digest of their code: here none."""
+        """Components that are not part of klack, with a digest of their code."""
         return {}
 
     @property
     def component_files(self) -> Mapping[str, Path]:
-        """Files of components with a model inside: here none."""
+        """Files of components with a model inside."""
         return {}
 
     @property
     def name(self) -> str:
-        """Short name: of the file, or of its folder if the file is just called ``case.yaml``."""
+        """Short name: file, or folder if the file is ``case.yaml``."""
         if self._path is None:
             return "case"
         return self._path.resolve().parent.name if self._path.stem == "case" else self._path.stem
 
     def materials_of(self, body: str, solids: Iterable[str]) -> dict[str, Material]:
-        """Material of each solid of a body, as the finite elements need it.
-
-        Raises :class:`InputError` for a solid that the case gives no material.
-        """
+        """Material of each solid of a body; rejects one without."""
         chosen = self.bodies[body].material
         if chosen is None:
             raise InputError(

@@ -1,4 +1,4 @@
-"""The text of a case file: YAML 1.2 in, plain data and the line of each key out."""
+"""Text of a case file: YAML 1.2 to plain data with line numbers."""
 
 import re
 from copy import deepcopy
@@ -34,9 +34,8 @@ class UnboundedTree(ComposerError):
     """A tree of too many values or levels, or one that holds itself; with its place.
 
     A hundred bytes of aliases can stand for more values than a machine holds, a mapping can hold
-    itself, five thousand brackets keep the parser busy for a while, and so do a million digits.
-    The composer of ruamel.yaml sees every node once, so that is where they are counted: each alias
-    with all that it stands for.
+    itself, five thousand brackets or a million digits keep the parser busy. The composer of
+    ruamel.yaml sees every node once and counts them, each alias with all that it stands for.
     """
 
     def __init__(self, problem: str, mark: Any) -> None:
@@ -44,7 +43,7 @@ class UnboundedTree(ComposerError):
 
 
 def bounded_yaml() -> YAML:
-    """Reader of YAML 1.2 that refuses endless trees; see :class:`UnboundedTree`."""
+    """Reader of YAML 1.2 without endless trees; see :class:`UnboundedTree`."""
     yaml = YAML(typ="rt")
     yaml.Composer = _BoundedComposer
     return yaml
@@ -101,13 +100,13 @@ _NO_TEXT = re.compile("[\\0\\ud800-\\udfff]")  # an escape such as "\\ud800" is 
 
 @dataclass(slots=True)
 class Lines:
-    """Line of each key and each value of a file, by key path (lines count from 1)."""
+    """Line, from 1, of each key and value by key path."""
 
     keys: dict[Key, int] = field(default_factory=dict)
     values: dict[Key, int] = field(default_factory=dict)
 
     def find(self, path: Key, *, on_key: bool) -> int:
-        """Line of a value or key; of the nearest section around it if it does not exist."""
+        """Line of a value or key, or of the nearest section around it."""
         while path:
             for table in (self.keys, self.values) if on_key else (self.values, self.keys):
                 if path in table:
@@ -141,7 +140,7 @@ def text_of(path: Path) -> str:
 
 
 def parse(text: str, path: Path) -> tuple[Any, Lines]:
-    """Plain data of a YAML text, and the position of each key and value."""
+    """Plain data, and lines of keys and values."""
     if len(text) > LARGEST_CASE:  # of a program; files are not read so far
         raise _too_large(path)
     data, lines = _parsed(text, path)
@@ -272,7 +271,7 @@ def _duplicate(error: DuplicateKeyError, text: str, path: Path) -> InputError:
 
 
 def _first_line(node: Any, name: str, mapping: Any) -> int | None:
-    """Line of the first key of this name in the mapping that begins at a mark."""
+    """Line of the first key of this name in the mapping at a mark."""
     if isinstance(node, ScalarNode) or mapping is None:
         return None
     if node.start_mark.index == mapping.index and isinstance(node, MappingNode):
@@ -308,10 +307,10 @@ _YAML_WORDS = {
     ),
     "found unexpected end of stream": ("a quote that is not closed", "close it."),
 }
-"""Begin of a problem of the parser; what it means, and what to do."""
+"""Begin of a parser problem; meaning, and advice."""
 
 _SEEN_LATE = ("could not find expected ':'", "expected ',' or", "found unexpected end of stream")
-"""Problems that lie where the text begins that the parser was reading."""
+"""Problems at the begin of the text that was being read."""
 
 
 _NO_DASH = re.compile(r"\s*(-[^\s-]|[\u2010-\u2015*\u2022]\s)")
@@ -319,7 +318,7 @@ _NO_COLON = re.compile(r"\s*[A-Za-z_][^:#]*(:\S[^:]*)?")
 
 
 def _mistyped(lines: list[str], line: int, column: int) -> tuple[int, str, str] | None:
-    """Line, meaning and advice where the signs about a place tell what was mistyped there."""
+    """Line, meaning and advice where signs around a place tell a mistyping."""
     here = lines[line] if line < len(lines) else ""
     before = next((k for k in range(line - 1, -1, -1) if lines[k].strip()), None)
     for k in (line, before):

@@ -32,10 +32,10 @@ _ON_SURFACES = ("guide", "opposite", "shots", "noise", "measurement")
 
 
 def check_port(key: Key, surface: SurfaceName, body: CaseBody) -> None:
-    """Check that a body without surfaces has a port or node set of that name.
+    """A body without surfaces must have a port or node set of that name.
 
-    Such bodies meet at one port each.  What needs faces (point by point contact, placement, guide,
-    sound) is refused here, before anything is read.
+    Such bodies meet at one port each. What needs faces (contact points, placement, guide, sound)
+    is rejected before anything is read.
     """
     if body.reduced is not None:
         known, what = list(body.reduced.ports), "port"
@@ -53,7 +53,7 @@ def check_port(key: Key, surface: SurfaceName, body: CaseBody) -> None:
 
 
 def require_surfaces(case: CaseFile, name: str) -> None:
-    """Refuse a body without surfaces in a whole valve, whose stops solve their static contact."""
+    """Reject a body without surfaces in a valve, whose stops solve static contact."""
     body = case.bodies[name]
     if not body.has_surfaces:
         kind = "reduced" if body.reduced is not None else "geometry"
@@ -68,7 +68,7 @@ def require_surfaces(case: CaseFile, name: str) -> None:
 
 
 def check_given(case: ImpactSections) -> None:
-    """Raise :class:`CaseProblem` for what needs the surfaces that a body does not have."""
+    """Reject what needs surfaces that a body does not have."""
     name = next(name for name, body in case.bodies.items() if not body.has_surfaces)
     what = "a reduced model" if case.bodies[name].reduced is not None else "nodes alone"
     for section in _ON_SURFACES:
@@ -163,7 +163,7 @@ def _check_law(case: ImpactSections, name: str, what: str) -> None:
 
 
 def check_consistency(case: ImpactSections) -> None:
-    """Raise :class:`CaseProblem` for the first contradiction between sections."""
+    """Reject the first contradiction between sections (:class:`CaseProblem`)."""
     _check_bodies(case)
     for i, surface in enumerate(case.contact.between):
         check_surface(case, ("contact", "between", i), surface)
@@ -210,7 +210,7 @@ def check_consistency(case: ImpactSections) -> None:
 def require_known(
     key: Key, name: str, known: Iterable[str], what: str, *, on_key: bool = False
 ) -> None:
-    """Raise :class:`CaseProblem` unless ``name`` is among the known ones; propose the nearest."""
+    """Reject a ``name`` that is not known; propose the nearest."""
     known = list(known)
     if name not in known:
         raise CaseProblem(
@@ -223,7 +223,7 @@ def require_known(
 
 
 def check_shifts(case: CaseFile, reduction: Reduction) -> None:
-    """Check that the shifts of attachment modes are those of bodies with elements."""
+    """Shifts of attachment modes need bodies with elements."""
     for name in reduction.shifts:
         key: Key = ("reduction", "shifts", name)
         require_known(key, name, case.bodies, "body", on_key=True)
@@ -249,7 +249,7 @@ def _check_bodies(case: ImpactSections) -> None:
 
 
 def check_surface(case: CaseFile, key: Key, surface: SurfaceName) -> None:
-    """Check that a body has the surface named by ``key``, as far as the drawing shows."""
+    """A body must have the surface named by ``key``, as far as the drawing shows."""
     require_known(key, surface.body, case.bodies, "body")
     body = case.bodies[surface.body]
     if not body.has_surfaces:
@@ -288,7 +288,7 @@ def _check_roles(case: ImpactSections) -> None:
 
 
 def check_body(case: CaseFile, name: str) -> None:
-    """Check the materials of a body and the surfaces that its supports and mesh name."""
+    """Check materials of a body and surfaces of its supports and mesh."""
     _check_materials(case, name)
     _check_surfaces(case, name)
 
@@ -375,7 +375,7 @@ def _check_opposite(case: ImpactSections) -> None:
 
 
 def _check_roughness(case: ImpactSections) -> None:
-    """Refuse what a layer of asperities is not computed with."""
+    """Reject what excludes a layer of asperities."""
     contact = case.contact
     if contact.roughness is None:
         return
@@ -398,7 +398,7 @@ def _check_roughness(case: ImpactSections) -> None:
 
 
 def _check_solid_only(case: ImpactSections) -> None:
-    """Refuse what breaks the symmetry of axisymmetric bodies."""
+    """Reject what breaks axisymmetry."""
     if case.dimension == 3:
         return
     waves = case.contact.waviness
@@ -421,7 +421,7 @@ def _check_solid_only(case: ImpactSections) -> None:
 
 
 def _check_off_axis(case: ImpactSections) -> None:
-    """Refuse what axisymmetric bodies do not have off their axis; worn faces are refused anyway."""
+    """Reject what axisymmetric bodies cannot have off-axis."""
     if case.contact.angles is not None and case.dimension == 3:
         raise CaseProblem(
             ("contact", "angles"),
@@ -574,7 +574,7 @@ def _check_shots(case: ImpactSections) -> None:
 
 
 def _check_drawn_friction(case: ImpactSections) -> None:
-    """Check that the static coefficient of the faces can follow the drawn kinetic one."""
+    """The static coefficient must be able to follow the drawn kinetic one."""
     faces = case.contact.faces
     drawn = case.shots.contact_friction if case.shots is not None else None
     if drawn is None or faces.is_constant:
@@ -601,14 +601,14 @@ def _check_drawn_friction(case: ImpactSections) -> None:
 
 
 def _moving(case: ImpactSections | ValveSections) -> str:
-    """Body that makes sense without a support: the one that hits, or the needle."""
+    """Body that may lack a support: the one that hits, or the needle."""
     if isinstance(case, ImpactSections):
         return case.contact.moving.body
     return str(getattr(case.network.components[find_roles(case).needle], "body", ""))
 
 
 def check_noise(case: ImpactSections | ValveSections) -> None:
-    """Raise :class:`CaseProblem` if the noise section names what the case does not have."""
+    """Reject names in the noise section that the case does not have."""
     noise = case.noise
     if noise is None:
         return

@@ -1,4 +1,4 @@
-"""A number that is not the same every time: a fixed value or a distribution of it."""
+"""A number that varies: a fixed value or a distribution."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -35,8 +35,8 @@ class Distribution:
     rayleigh   :math:`x/s^2 \exp(-x^2/2s^2)`         scale s, -
     =========  ====================================  ===================
 
-    Mean and standard deviation of a normal distribution are those before it is cut off.  The
-    length of a plane vector whose two components are normal with deviation *s* follows Rayleigh.
+    Mean and standard deviation are those before the cut. The length of a plane vector with two
+    normal components of deviation *s* follows Rayleigh.
     """
 
     kind: Literal["fixed", "uniform", "normal", "rayleigh"]
@@ -46,8 +46,8 @@ class Distribution:
     def quantile(self, share: float) -> float:
         """Value that is not exceeded with the probability ``share``, 0 <= share < 1.
 
-        Of a share drawn uniformly it is one draw of this distribution (inversion; Devroye 1986,
-        chapter II.2): each draw takes exactly one random number, whatever the distribution.
+        Of a uniform share it is one draw (inversion; Devroye 1986, chapter II.2), which takes
+        exactly one random number.
         """
         if self.kind == "uniform":
             return self.first + share * (self.second - self.first)
@@ -76,7 +76,7 @@ class Distribution:
 
     @property
     def largest(self) -> float:
-        """Value that one draw in 1e12 exceeds; the end of a distribution that has one."""
+        """Value that one draw in 1e12 exceeds, or the end."""
         return self.quantile(1.0 - _RARE) if self.kind != "uniform" else self.second
 
     @property
@@ -86,14 +86,14 @@ class Distribution:
 
     @property
     def written(self) -> float | dict[str, float | tuple[float, float]]:
-        """What a case file has for it [SI]: a number, or one key with its numbers."""
+        """Form in a case file [SI]: a number, or one key with its numbers."""
         if self.kind == "fixed":
             return self.first
         both = (self.first, self.second)
         return {self.kind: both if _NUMBERS[self.kind] == 2 else self.first}
 
     def text(self, unit: str) -> str:
-        """Describe it as people do: ``uniform between 1 um and 3 um``."""
+        """In words: ``uniform between 1 um and 3 um``."""
         first, second = format_si(self.first, unit), format_si(self.second, unit)
         return {
             "fixed": first,
@@ -113,7 +113,7 @@ _MEANING = {
 
 
 def _read(value: Any, info: ValidationInfo, *, kind: Kind) -> Distribution:
-    """Read a plain value, or a mapping of one known kind to its numbers."""
+    """A plain value, or one kind with its numbers."""
     if isinstance(value, Distribution):
         return value
     if not isinstance(value, Mapping):
@@ -163,7 +163,7 @@ def _wrong_count(name: str, numbers: Any) -> CaseProblem:
 
 
 def _size(value: Any, info: ValidationInfo, kind: Kind, key: tuple[str | int, ...]) -> float:
-    """Read one number of 0 or more; numbers given in Python (no context) are SI."""
+    """One number of 0 or more; numbers given in Python (no context) are SI."""
     plain = isinstance(value, int | float) and not isinstance(value, bool)
     try:
         number = float(value) if info.context is None and plain else parse_quantity(value, kind)
@@ -180,7 +180,7 @@ def _size(value: Any, info: ValidationInfo, kind: Kind, key: tuple[str | int, ..
 
 
 def _typed(kind: Kind) -> tuple[PlainValidator, WithJsonSchema]:
-    """Metadata of a field that takes a value of this kind, or a distribution of it."""
+    """Metadata of a field of this kind, or a distribution of it."""
     value = {"type": ["string", "number"], "examples": [kind.example], "$comment": kind.name}
     pair = {"type": "array", "items": value, "minItems": 2, "maxItems": 2}
     choices: list[dict[str, Any]] = [value]

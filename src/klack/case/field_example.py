@@ -1,4 +1,4 @@
-"""A fitting example for each key: a pressure of a supply is not 210 GPa."""
+"""A fitting example for each key: a supply pressure is not 210 GPa."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -22,15 +22,9 @@ _QUANTITY = re.compile(r"\d+\.?\d*(?:e-?\d+)? ?(?:%|[A-Za-z]+(?:[*/][A-Za-z]+)*(
 
 
 def fitting_example(case: type[Section], data: Any, key: Key, kind: Kind) -> str:
-    """Quantity that this key could hold: an example of the field, its default, or a typical value.
+    """Quantity for a key: an example of the field, its default, or a typical value of the kind.
 
-    Parameters
-    ----------
-    case : type of Section
-    data
-        The parsed file, which need not be a valid case.
-    kind
-        Whose example is taken where the field tells nothing.
+    ``data`` need not be a valid case.
     """
     field = _field_at(case, data, key)
     if field is None:
@@ -43,7 +37,7 @@ def fitting_example(case: type[Section], data: Any, key: Key, kind: Kind) -> str
 
 
 def _quantities_in(text: str, kind: Kind) -> Iterator[str]:
-    """Values of a kind that a description mentions: "steel 210 GPa"."""
+    """Values in a description: "steel 210 GPa"."""
     for match in _QUANTITY.finditer(text):
         try:
             parse_quantity(match[0], kind)
@@ -53,7 +47,7 @@ def _quantities_in(text: str, kind: Kind) -> Iterator[str]:
 
 
 def _field_at(case: type[Section], data: Any, key: Key) -> FieldInfo | None:
-    """Field that a key of a file fills; None where the schema has no such place."""
+    """Field of a key; None where the schema has no such place."""
     places: list[Any] = [case]
     field: FieldInfo | None = None
     for part in key:
@@ -77,7 +71,7 @@ def _field_at(case: type[Section], data: Any, key: Key) -> FieldInfo | None:
 
 
 def _types_in(annotation: Any) -> Iterator[Any]:
-    """Members of a union, without what only annotates them."""
+    """Members of a union, unannotated."""
     if getattr(annotation, "__metadata__", None) or get_origin(annotation) in (Union, UnionType):
         for argument in get_args(annotation):
             yield from _types_in(argument)

@@ -1,4 +1,4 @@
-"""The first mistake in a case, in words: where, what came, what was expected, what to try."""
+"""First mistake in a case: where, what came, what was expected, what to try."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, get_args, get_origin
@@ -16,7 +16,7 @@ __all__ = ["first_error"]
 
 
 def first_error(case: type[Section], error: ValidationError, found: ExpandedCase) -> InputError:
-    """Convert the first error of pydantic, and count the others."""
+    """Convert the first error of pydantic, count the others."""
     details = error.errors(include_url=False)
     first, more = details[0], len(details) - 1
     problem = _problem(first, found.data, case)
@@ -39,7 +39,7 @@ def first_error(case: type[Section], error: ValidationError, found: ExpandedCase
 
 
 def _elsewhere(data: Any, name: str, path: Key) -> Key:
-    """Path of the first key of this name in a case; empty without one."""
+    """Path of the first key of this name, or empty."""
     if not isinstance(data, dict):
         return ()
     if name in data:
@@ -48,7 +48,7 @@ def _elsewhere(data: Any, name: str, path: Key) -> Key:
 
 
 def _with_its_place(case: type[BaseModel], key: Key, hint: str) -> str:
-    """Advice for an unknown key that is known elsewhere; components have keys of their own."""
+    """Advice for an unknown key that is known elsewhere."""
     if "did you mean" in hint or key[:2] == ("network", "components"):
         return hint
     homes = _homes(case, str(key[-1]))
@@ -61,7 +61,7 @@ _MOST_PLACES = 3  # that a message names
 
 
 def _homes(section: type[BaseModel], name: str, path: str = "") -> list[str]:
-    """Places of a key in all sections of a case, ``bodies.NAME.mesh.size``; shortest first."""
+    """Places of a key in all sections, ``bodies.NAME.mesh.size``; shortest first."""
     found, below = [], []
     for field, info in section.model_fields.items():
         key = f"{path}{info.alias or field}"
@@ -77,7 +77,7 @@ _DEEPEST = 5  # levels in which a misplaced key is looked for
 
 
 def _sections(kind: Any, many: bool = False) -> Iterator[tuple[type[BaseModel], bool]]:
-    """Sections in a type, and whether they stand under names of the user's own."""
+    """Sections in a type, and whether their names are the user's."""
     if isinstance(kind, type) and issubclass(kind, BaseModel):
         yield kind, many
     mapping = isinstance(get_origin(kind), type) and issubclass(get_origin(kind), Mapping)
@@ -86,7 +86,7 @@ def _sections(kind: Any, many: bool = False) -> Iterator[tuple[type[BaseModel], 
 
 
 def _existing(data: Any, location: Sequence[str | int]) -> Key:
-    """Drop from a location of pydantic the parts that are not in the file (tags of unions)."""
+    """Location of pydantic without parts that are not in the file (tags of unions)."""
     key: list[str | int] = []
     for part in location:
         if isinstance(data, dict) and part in data:
@@ -125,7 +125,7 @@ def _problem(details: ErrorDetails, data: Any, case: type[Section]) -> CaseProbl
 
 
 def _discriminator(context: dict[str, Any]) -> str:
-    """Key that says which of several forms a section has."""
+    """Key that decides between forms of a section."""
     return str(context["discriminator"]).strip("'")
 
 
@@ -163,7 +163,7 @@ _MEANT = {
     **dict.fromkeys(("3d", "3-d", "three-dimensional", "volume"), ("solid", "swept")),
     **dict.fromkeys(("2d", "2-d", "plane", "rotational"), ("axisymmetric",)),
 }
-"""Words of other programs, and those of klack."""
+"""Words of other programs, and klack's."""
 _WITHOUT_UNIT = "write the number alone; coordinates have the 'unit' that stands beside them."
 
 
@@ -176,7 +176,7 @@ def _is_number(text: str) -> bool:
 
 
 def _words(kind: str, context: dict[str, Any], value: Any) -> tuple[str, str]:
-    """Expected value and advice for the built-in errors of pydantic."""
+    """Expected value and advice for built-in errors of pydantic."""
     if kind == "string_pattern_mismatch" and "_-]" not in context["pattern"]:
         return _PLAIN_NAME
     if kind == "float_type" and isinstance(value, str) and not _is_number(value):

@@ -1,4 +1,4 @@
-"""Parameters that ``klack calibrate`` fits, found in their case and checked."""
+"""Parameters of ``klack calibrate``, found in their case and checked."""
 
 from dataclasses import dataclass
 
@@ -14,13 +14,7 @@ __all__ = ["FreeParameter", "free_parameters"]
 
 @dataclass(frozen=True, slots=True)
 class FreeParameter:
-    """A parameter of the fit, resolved in a case; all numbers in SI.
-
-    Parameters
-    ----------
-    places
-        Keys of the case that get its value.
-    """
+    """Fitted parameter in SI, with the keys that get its value."""
 
     name: str
     places: tuple[Quantity, ...]
@@ -45,17 +39,14 @@ class FreeParameter:
 
     @property
     def of_sensor(self) -> bool:
-        """True if only the sensor shows it, so that the motion does not depend on it."""
+        """True if only the sensor shows it, not the motion."""
         return all(key[0] == "measurement" for key in self.keys)
 
 
 def free_parameters(case: ValveSections) -> tuple[FreeParameter, ...]:
-    """Parameters of the section ``calibration``, found in the case and checked.
+    """Parameters of the section ``calibration``, found in the case.
 
-    Raises
-    ------
-    CaseProblem
-        For paths that lead nowhere or need new meshes, and for bounds that cannot be used.
+    Rejects paths that lead nowhere or need new meshes, and unusable bounds (:class:`CaseProblem`).
     """
     section = case.calibration
     if section is None:
@@ -127,9 +118,9 @@ def _resolved(case: ValveSections, name: str, item: CalibrationParameter) -> Fre
 
 
 def _require_cheap(key: Key, text: str, *, direct: bool) -> None:
-    """Only what leaves meshes, modes and contact laws as they are can be fitted.
+    """Only what leaves meshes, modes and contact laws can be fitted.
 
-    What the sensor shows is fitted apart from the motion, by its own keys (``direct``) alone.
+    Sensor parameters are fitted apart from the motion, by their own keys (``direct``).
     """
     allowed = (
         key[:1] == ("network",)

@@ -81,7 +81,7 @@ class Outline(Section):
         return self
 
     def points(self) -> Iterator[tuple[Key, Point]]:
-        """Every point with the keys that lead to it."""
+        """Points with their keys."""
         yield ("start",), self.start
         for i, edge in enumerate(self.edges):
             for name in ("line", "arc", "centre"):
@@ -90,7 +90,7 @@ class Outline(Section):
                     yield ("edges", i, name), point
 
     def profile(self, unit: float) -> Profile:
-        """Build the meridian; ``unit`` is the length of one drawing unit [m]."""
+        """Meridian; ``unit`` is one drawing unit [m]."""
 
         def metres(point: Point) -> tuple[float, float]:
             # 15 digits: 0.3 mm must be the same number here as 0.0003 m elsewhere
@@ -109,7 +109,7 @@ class Outline(Section):
 
 @lru_cache(maxsize=100)
 def _drawn(start: Point, edges: tuple[Line | Arc, ...]) -> Profile:
-    """Profile of an outline; a case asks for it at every surface that it names."""
+    """Profile, kept: a case asks for it at every surface name."""
     return Profile(start, edges)
 
 
@@ -151,7 +151,7 @@ class ProfileGeometry(Section):
 
     @property
     def surfaces(self) -> tuple[str, ...]:
-        """Names of the surfaces, in the order of drawing."""
+        """Surfaces in the order of drawing."""
         names = [name for profile in self.profiles().values() for name in profile.names]
         return tuple(dict.fromkeys(names))
 
@@ -181,7 +181,7 @@ class MeshFile(Section):
 
     @property
     def solids_only(self) -> bool:
-        """Whether elements of other kinds are left out."""
+        """Whether other elements are left out."""
         return self.elements == "solids-only"
 
 
@@ -261,12 +261,12 @@ class Geometry(Section):
 
     @classmethod
     def absent(cls) -> Self:
-        """Return the geometry of a body that has none: a reduced model."""
+        """Geometry of a reduced model, which has none."""
         return cls.model_construct()
 
     @property
     def is_absent(self) -> bool:
-        """True where nothing is known of the shape."""
+        """True where no shape is known."""
         return all(part is None for part in (self.profile, self.step, self.mesh, self.nodes))
 
     @property

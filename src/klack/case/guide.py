@@ -77,7 +77,7 @@ class CaseGuide(Section):
         return self
 
     def largest_eccentricity(self, height: float) -> float:
-        """How far off its bore the axis of a rigid shaft can be at a height [m]."""
+        """Farthest of a rigid shaft off its bore at a height [m]."""
         share = (height - self.heights[0]) / (self.heights[-1] - self.heights[0])
         return self.clearance * (abs(1.0 - share) + abs(share))
 
@@ -104,7 +104,7 @@ class Placement(Section):
 
     @property
     def is_centred(self) -> bool:
-        """True if the body stands on the axis, upright."""
+        """True if on the axis and upright."""
         return self.eccentricity == 0.0 and self.tilt == 0.0
 
 

@@ -1,7 +1,7 @@
 """Sections of a case of an impact, key by key as in the YAML file, in SI.
 
-Each checks itself.  :class:`ImpactSections` holds them all; what contradicts each other is found by
-:mod:`klack.case.consistency`, and :class:`klack.case.schema.Case` is what passed.
+Each checks itself; :mod:`klack.case.consistency` finds contradictions, and
+:class:`klack.case.schema.Case` is what passed.
 """
 
 from collections.abc import Iterator, Mapping
@@ -80,7 +80,7 @@ class CaseOpposite(Section):
     )
 
     def faces(self, contact: Friction) -> Friction:
-        """Friction between the faces, where the contact below has the one given."""
+        """Friction of the faces; default: that of the contact below."""
         return contact if self.friction is None else Friction.coulomb(self.friction)
 
     @property
@@ -197,7 +197,7 @@ class FaceRoughness(Section):
         return f"asperities of {format_si(self.rms, 'm', 3)} rms"
 
     def _with_round_summits(self) -> Self:
-        """Refuse summits as high as they are round: spheres that touch at their tips are flat."""
+        """Reject summits as high as round: spheres touching at their tips are flat."""
         assert self.rms is not None
         assert self.asperity_radius is not None
         most = STEEPEST * self.asperity_radius
@@ -214,7 +214,7 @@ class FaceRoughness(Section):
 
 _MOST_STEPS = {"reduced_step": 20_000_000, "interface_step": 20_000_000, "full_step": 200_000}
 _MOST_WORN = 0.05
-"""Of the radius: set that is too large for small changes of the faces."""
+"""Set over radius that is too large for small changes of the faces."""
 
 _LARGEST_TILT = radians(5.0)
 _STEP_OF_LEVEL = {"interface_step": "interface", "full_step": "full"}
@@ -397,7 +397,7 @@ class CaseContact(Section):
 
     @property
     def worn_faces(self) -> WornFaces | None:
-        """Profile of worn faces; None for faces as made."""
+        """Worn profile; None as made."""
         return None if self.worn is None else self.worn.faces
 
     @property
@@ -408,12 +408,12 @@ class CaseContact(Section):
 
     @property
     def has_form(self) -> bool:
-        """Whether the faces differ from the drawing by crown, waviness or tilt."""
+        """Whether crown, waviness or tilt change the drawing."""
         return self.crown > 0.0 or self.waviness is not None or self.tilt > 0.0
 
     @property
     def moving(self) -> SurfaceName:
-        """Surface of the upper body, which moves in -z."""
+        """Surface of the upper, moving body."""
         return self.between[0]
 
     @property
@@ -443,7 +443,7 @@ class Motion(Section):
 
     @property
     def closing_force(self) -> float:
-        """Force that presses the bodies together at first touch [N]."""
+        """Force on the bodies at first touch [N]."""
         return self.force + (self.spring.preload if self.spring else 0.0)
 
 
@@ -586,10 +586,10 @@ class ImpactSections(CaseFile):
         return self.model_copy(update={"contact": self.contact.model_copy(update=smooth)})
 
     def without_outputs(self) -> Self:
-        """The same without sensors, for models whose outputs are displacements of ports."""
+        """The same without sensors."""
         return self.model_copy(update={"outputs": ()})
 
     @property
     def has_surfaces(self) -> bool:
-        """False where a body is a reduced model or nodes alone; see :class:`CaseBody`."""
+        """False where a body has none; see :class:`CaseBody`."""
         return all(body.has_surfaces for body in self.bodies.values())

@@ -1,4 +1,4 @@
-"""Places in a case by their path, as people write it: ``network.components.spring.preload``."""
+"""Places in a case by path: ``network.components.spring.preload``."""
 
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -19,27 +19,13 @@ __all__ = ["Quantity", "kind_at", "kind_in", "node_at", "quantity_at", "split_pa
 
 
 class Quantity:
-    """A number with a unit in a checked case, found by its path.
-
-    Parameters
-    ----------
-    kind
-        Of quantity; its unit is that of all values here.
-    value
-        In the case as it is.
-    """
+    """Number with a unit in a checked case, by its path."""
 
     def __init__(self, key: Key, kind: Kind, value: float, field: FieldInfo) -> None:
         self.key, self.kind, self.value, self._field = key, kind, value, field
 
     def parse(self, text: object) -> float:
-        """SI value of the text given for this key, within the limits of the schema.
-
-        Raises
-        ------
-        InputError
-            For another kind of quantity, a missing unit, a value out of its limits.
-        """
+        """SI value of a text for this key, within the limits of the schema."""
         if isinstance(self.key[-1], int):  # an entry: the limits of the list are those of the case
             return parse_quantity(text, self.kind, str(self))
         info = self._field
@@ -64,7 +50,7 @@ class Quantity:
             ) from None
 
     def written(self, value: float) -> str | float:
-        """Write a value [SI] as a case file has it, with its unit and all digits."""
+        """Value [SI] as in a case file, with unit and all digits."""
         return float(value) if self.kind.bare else f"{float(value)!r} {self.kind.unit}"
 
     def __str__(self) -> str:
@@ -72,7 +58,7 @@ class Quantity:
 
 
 def split_path(text: str) -> Key:
-    """Turn ``a.b.0.c`` into ``("a", "b", 0, "c")``; whole numbers count list entries from 0."""
+    """``a.b.0.c`` as ``("a", "b", 0, "c")``; list entries count from 0."""
     parts = text.split(".")
     if not all(part.strip() == part and part for part in parts):
         raise CaseProblem(
@@ -85,14 +71,9 @@ def split_path(text: str) -> Key:
 
 
 def node_at(case: Section, key: Key) -> tuple[Any, FieldInfo | None]:
-    """Find the value at a key of a checked case, and the field that describes it.
+    """Value at a key of a checked case, and its field.
 
-    A distribution is what the case file has there: one number, or ``{"uniform": (low, high)}``.
-
-    Raises
-    ------
-    CaseProblem
-        If a part of the path does not exist.
+    A distribution is one number, or ``{"uniform": (low, high)}``.
     """
     node: Any = case
     field: FieldInfo | None = None
@@ -121,7 +102,7 @@ def node_at(case: Section, key: Key) -> tuple[Any, FieldInfo | None]:
 
 
 def kind_at(node: Any, field: FieldInfo | None) -> Kind | None:
-    """Kind of quantity at a key; None for anything else."""
+    """Kind of quantity at a key, if any."""
     kind = None if field is None else kind_in(field.annotation, field.metadata)
     if kind is None and field is not None and isinstance(node, float):
         return RATIO  # a plain number
@@ -129,13 +110,7 @@ def kind_at(node: Any, field: FieldInfo | None) -> Kind | None:
 
 
 def quantity_at(case: Section, key: Key) -> Quantity:
-    """Find a number with a unit in a checked case.
-
-    Raises
-    ------
-    CaseProblem
-        If a part of the path does not exist, or no such number stands there.
-    """
+    """Number with a unit at a key of a checked case."""
     node, field = node_at(case, key)
     _require_of_case(case, key)
     kind = kind_at(node, field)
@@ -151,7 +126,7 @@ def quantity_at(case: Section, key: Key) -> Quantity:
 
 
 def _require_of_case(case: Section, key: Key) -> None:
-    """Refuse a key that comes from an included part, and a parameter that nothing follows from."""
+    """Reject a key of an included part, and a parameter without effect."""
     found: ExpandedCase | None = getattr(case, "expanded", None)
     if found is None:
         return
@@ -185,7 +160,7 @@ def _advice(key: Key, node: Any) -> str:
 
 
 def written_at(data: Any, key: Key) -> Any:
-    """Value in the parsed file at this path; None if there is none."""
+    """Value in the parsed file at this path, if any."""
     for part in key:
         if isinstance(data, Mapping) and part in data:
             data = data[part]
@@ -197,7 +172,7 @@ def written_at(data: Any, key: Key) -> Any:
 
 
 def _below(node: Any) -> tuple[list[str | int], dict[str | int, Any]]:
-    """Names of what is in a node, and what they lead to."""
+    """Names in a node, and what they lead to."""
     found: dict[str | int, Any] = {}
     if isinstance(node, Section):
         found = {
@@ -212,7 +187,7 @@ def _below(node: Any) -> tuple[list[str | int], dict[str | int, Any]]:
 
 
 def kind_in(annotation: Any, metadata: Sequence[Any]) -> Kind | None:
-    """Kind of quantity that a type takes, wherever it is nested."""
+    """Kind of quantity of a type, however nested."""
     for item in metadata:
         reads = isinstance(item, BeforeValidator | PlainValidator)
         if reads and isinstance(item.func, partial):

@@ -23,10 +23,10 @@ ROUGH_LEVELS: tuple[Level, ...] = (
     "interface",
     "full",
 )
-"""Levels that take faces with a layer of asperities."""
+"""Levels that take rough faces."""
 
 OFF_AXIS_LEVELS: tuple[Level, ...] = ("lumped", "interface")
-"""Levels of axisymmetric bodies that meet off their axis."""
+"""Levels of axisymmetric bodies off-axis."""
 
 
 Variant = Literal["wet", "dry", "wet-lumped", "dry-lumped"]

@@ -1,4 +1,4 @@
-"""Included parts as components, connections and bodies of the case, under names of their own."""
+"""Included parts as components, connections and bodies of the case."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -30,7 +30,7 @@ _LINKED = ("study", "linked")
 
 
 def has_expression(data: Any, key: Key = ()) -> bool:
-    """Whether plain data hold a value that begins with ``=``."""
+    """Whether a value begins with ``=``."""
     if isinstance(data, dict):
         return any(
             has_expression(value, (*key, name))
@@ -50,16 +50,11 @@ def filled(data: Any, key: Key, scope: Scope, origin: Origin, found: dict[Key, F
     key
         In the expanded case.
     scope
-        Names that expressions may use.
+        Names for expressions.
     origin
         Of the data.
     found
-        Takes the expressions by their keys in the expanded case.
-
-    Raises
-    ------
-    InputError
-        With file, line, key and the place in the expression.
+        Takes the expressions by key.
     """
     if isinstance(data, Mapping):
         return {
@@ -80,12 +75,12 @@ def filled(data: Any, key: Key, scope: Scope, origin: Origin, found: dict[Key, F
 
 
 def _is_literal(key: Key) -> bool:
-    """Whether texts there are left as they are: words, and expressions of a study's parameters."""
+    """Whether texts stay: words, and expressions of a study's parameters."""
     return (len(key) == 1 and key[0] in _LITERAL) or key == _LINKED
 
 
 COUNTER = "number"
-"""Name by which arguments know which copy they are for, counted from 1."""
+"""Name of the copy number in arguments, from 1."""
 
 
 def copy_names(item: CaseInclude) -> tuple[str, ...]:
@@ -96,21 +91,9 @@ def copy_names(item: CaseInclude) -> tuple[str, ...]:
 
 
 def argument_values(item: CaseInclude, number: int, scope: Scope, origin: Origin) -> Scope:
-    """Values for the parameters of one copy.
+    """Values for the parameters of copy ``number``, from 1.
 
-    Parameters
-    ----------
-    number
-        Of the copy, from 1.
-    scope
-        Of the file that includes the part.
-    origin
-        Of the include.
-
-    Raises
-    ------
-    InputError
-        With file, line and key.
+    ``scope`` is that of the including file, ``origin`` that of the include.
     """
     if item.count is not None:
         if COUNTER in scope:
@@ -134,7 +117,7 @@ def argument_values(item: CaseInclude, number: int, scope: Scope, origin: Origin
 
 
 def shown_include(item: CaseInclude, scope: Scope, origin: Origin) -> dict[str, Any]:
-    """Include with the values of its arguments: those of the first copy, and lists of all."""
+    """Include with the arguments of the first copy, and lists of all."""
     copies = [argument_values(item, n + 1, scope, origin) for n in range(len(copy_names(item)))]
     values = {
         name: tuple(copy[name] for copy in copies) if isinstance(text, list) else copies[0][name]
@@ -162,7 +145,7 @@ _SECTIONS = ("materials", "bodies", "stops")
 
 
 class Checked(Protocol):
-    """Checks plain data against a section, with errors at their place in a file."""
+    """Checks plain data against a section, errors at their place."""
 
     def __call__(self, kind: type[Section], data: Any, origin: Origin, /) -> Any:
         """Return the section."""
@@ -170,7 +153,7 @@ class Checked(Protocol):
 
 @dataclass(slots=True, eq=False)
 class _Node:
-    """A connection of a part, which an outer connection to one of its ports joins."""
+    """Connection of a part, to be joined by an outer one to one of its ports."""
 
     ports: list[str]
     origin: Origin
@@ -178,7 +161,7 @@ class _Node:
 
 
 _Ports = Mapping[str, Mapping[str, _Node]]
-"""Nodes of included parts by the name of the copy and that of the port."""
+"""Nodes of parts by copy and port."""
 
 
 @dataclass(slots=True, eq=False)
@@ -188,13 +171,13 @@ class Merging:
     Parameters
     ----------
     data
-        Plain data, without expressions; takes the sections of the parts.
+        Without expressions; takes the sections of the parts.
     texts
-        Files of the parts by their names.
+        Files of the parts by name.
     folder
         Of the case.
     origins, expressions
-        By key of the expanded case; take what comes from the parts.
+        By key of the expanded case; take those of the parts.
     """
 
     data: dict[str, Any]
@@ -207,13 +190,7 @@ class Merging:
     _copies: int = 0
 
     def merge(self, includes: Sequence[CaseInclude], scope: Scope, origin: Origin) -> None:
-        """Put all parts into the case.
-
-        Raises
-        ------
-        InputError
-            With file, line and key.
-        """
+        """Put all parts into the case."""
         network = dict(self.data["network"])
         network["components"] = dict(network.get("components") or {})
         own = list(network.get("connections") or [])
@@ -244,7 +221,7 @@ class Merging:
         folder: str,
         above: tuple[str, ...],
     ) -> dict[str, dict[str, _Node]]:
-        """Put parts into the case; return their ports."""
+        """Put parts in; return their ports."""
         found: dict[str, dict[str, _Node]] = {}
         for i, item in enumerate(includes):
             here = origin.below("include", i)
@@ -287,7 +264,7 @@ class Merging:
     def _put(
         self, part: PartFile, scope: Scope, origin: Origin, name: str, above: tuple[str, ...]
     ) -> dict[str, _Node]:
-        """Put one copy of a part into the case; return its ports."""
+        """Put one copy in; return its ports."""
         prefix = f"{origin.copy}_"
         folder = str(PurePosixPath(name).parent).removeprefix(".")
         for section in _SECTIONS:
@@ -320,7 +297,7 @@ class Merging:
         origin: Origin,
         folder: str,
     ) -> None:
-        """Put one component, body, material or stop into the case."""
+        """Put in one component, body, material or stop."""
         target = self.data
         for word in section[:-1]:
             target = target[str(word)]
@@ -341,7 +318,7 @@ class Merging:
         prefix: str,
         origin: Origin,
     ) -> list[str]:
-        """Ports of a connection inside a part, by their names in the case."""
+        """Ports of an inner connection, by names of the case."""
         found: list[str] = []
         for place, text in enumerate(texts):
             head, _, port = text.partition(".")
@@ -364,7 +341,7 @@ class Merging:
         nodes: Sequence[_Node],
         origin: Origin,
     ) -> _Node:
-        """Node behind a port of a part: a connection that has it, or the port alone."""
+        """Node behind a port of a part: its connection, or the port alone."""
         head, _, port = text.partition(".")
         _require_known(head, known, origin.where())
         ports = known[head]
@@ -376,7 +353,7 @@ class Merging:
         return next((node for node in nodes if whole in node.ports), _Node([whole], origin))
 
     def _resolved(self, texts: Any, ports: _Ports, origin: Origin) -> Any:
-        """Connection of the case, with the ports of parts in place of their short names."""
+        """Connection with the ports of parts for their short names."""
         if not isinstance(texts, list) or not all(isinstance(text, str) for text in texts):
             return texts  # refused where the case is checked
         found: list[str] = []
@@ -391,7 +368,7 @@ class Merging:
 
 
 def _copies_of(head: str, ports: _Ports) -> list[str]:
-    """Copies that a name means: one, or with a star all of a count."""
+    """Copies that a name means: one, or with a star all."""
     if not head.endswith("*"):
         return [head] if head in ports else []
     stem = head[:-1]
@@ -399,7 +376,7 @@ def _copies_of(head: str, ports: _Ports) -> list[str]:
 
 
 def _joined(ports: Mapping[str, _Node], copy: str, port: str, where: str) -> list[str]:
-    """Ports of the node behind a port of a part, which is joined to another node."""
+    """Ports of the node behind a port of a part, joined to another."""
     if port not in ports:
         raise _no_port(copy, port, ports, where)
     node = ports[port]
@@ -410,7 +387,7 @@ def _joined(ports: Mapping[str, _Node], copy: str, port: str, where: str) -> lis
 
 
 def _renamed(section: Key, value: Any, part: PartFile, prefix: str, folder: str) -> Any:
-    """Section of a part with the names that it has in the case."""
+    """Section of a part with its names in the case."""
     if not isinstance(value, dict):
         return value
     value = _moved(value, folder) if folder else value
@@ -437,7 +414,7 @@ def _surface(text: Any, bodies: Mapping[str, Any], prefix: str) -> Any:
 
 
 def _moved(value: Any, folder: str) -> Any:
-    """Names of files as they read from the folder of the case."""
+    """File names from the folder of the case."""
     if isinstance(value, dict):
         return {
             key: _from(folder, item)

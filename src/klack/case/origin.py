@@ -1,4 +1,4 @@
-"""Where the sections of an expanded case are written: in the case, or in the file of a part."""
+"""Where sections of an expanded case are written."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -15,14 +15,14 @@ _RANGES = ("study", "calibration")
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """Where a section of an expanded case is written.
+    """Where a section is written.
 
     Parameters
     ----------
     key
         In that file.
     copy
-        Name of the included part; empty for the case itself.
+        Included part; empty for the case itself.
     """
 
     path: Path
@@ -31,7 +31,7 @@ class Origin:
     copy: str = ""
 
     def where(self, rest: Key = (), *, on_key: bool = False) -> str:
-        """File, line and key of something in this section, as a message names them."""
+        """File, line and key of something in this section."""
         key = (*self.key, *rest)
         line = self.lines.find(key, on_key=on_key)
         name = f": {key_text(key)}" if key else ""
@@ -44,14 +44,12 @@ class Origin:
 
 @dataclass(frozen=True, slots=True)
 class Filled:
-    """What a file has in place of a value.
+    """What a file has in place of a value: an expression.
 
     Parameters
     ----------
-    text
-        Expression.
     sources
-        Parameters of the case, and arguments of its includes, that the value follows from.
+        Parameters of the case, and arguments of its includes, behind the value.
     """
 
     text: str
@@ -62,16 +60,13 @@ class Filled:
 class ExpandedCase:
     """Plain data of a case without expressions and parts.
 
+    Two of them never differ: checked cases with the same sections and text are equal, though one
+    was checked from parts made before.
+
     Parameters
     ----------
-    origins : mapping of key to Origin
-        Of the case itself, under the empty key, and of all that comes from parts.
-    expressions : mapping of key to Filled
-
-    Notes
-    -----
-    Two of them never differ: checked cases with the same sections and the same text are equal,
-    though one was checked from parts that were made before.
+    origins
+        Of the case (empty key), and of all that comes from parts.
     """
 
     data: Any = field(compare=False)
@@ -84,12 +79,12 @@ class ExpandedCase:
         return cls(data, {(): Origin(path, lines)})
 
     def origin(self, key: Key) -> Origin:
-        """Where a place of the expanded case is written."""
+        """Where a place is written."""
         length = next(n for n in range(len(key), -1, -1) if key[:n] in self.origins)
         return self.origins[key[:length]].below(*key[length:])
 
     def behind(self, key: Key) -> tuple[Key, ...]:
-        """Keys whose values follow from a parameter or an argument; of any other key, itself.
+        """Keys (parameters, arguments) behind the value of a key; else itself.
 
         Ranges of a study and bounds of a calibration decide nothing of what is computed.
         """
@@ -103,7 +98,7 @@ class ExpandedCase:
         )
 
     def unused_parameters(self) -> tuple[str, ...]:
-        """Parameters at the head of the case that no value of it follows from, nor any range."""
+        """Parameters of the case behind no value and no range."""
         used = {key for item in self.expressions.values() for key in item.sources}
         names = self.data.get("parameters") or {}
         return tuple(name for name in names if ("parameters", name) not in used)

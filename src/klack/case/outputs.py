@@ -85,7 +85,7 @@ class CaseOutput(Section):
         return self
 
     def vector(self, dimension: int) -> tuple[float, ...] | None:
-        """Direction in the columns of the mesh; None around the axis."""
+        """Direction in mesh columns; None around the axis."""
         if self.direction == "around":
             return None
         if isinstance(self.direction, str):
@@ -96,14 +96,14 @@ class CaseOutput(Section):
 def check_outputs(
     outputs: tuple[CaseOutput, ...], dimensions: Mapping[str, int], other: str
 ) -> None:
-    """Raise :class:`CaseProblem` for an output that the bodies of the case cannot have.
+    """Reject an output that the bodies of the case cannot have (:class:`CaseProblem`).
 
     Parameters
     ----------
-    dimensions : mapping of body name to int
-        2 for axisymmetric bodies, 3 for solids.
+    dimensions
+        Of each body: 2 for axisymmetric ones, 3 for solids.
     other
-        Section of the case whose forces a gauge does not see; empty if there is none.
+        Section whose forces a gauge does not see, or empty.
     """
     names: set[str] = set()
     for i, output in enumerate(outputs):

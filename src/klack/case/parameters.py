@@ -1,4 +1,4 @@
-"""Parameters of a case and expressions of them, evaluated before the case is checked."""
+"""Parameters and expressions, evaluated before a case is checked."""
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
@@ -32,26 +32,26 @@ Written = Annotated[
     Any,
     WithJsonSchema({"type": ["string", "number"], "examples": ["1.3 mm", "2 * d_seat", 4]}),
 ]
-"""A quantity with its unit, a number, or an expression of other parameters."""
+"""Quantity with unit, number, or expression of other parameters."""
 
 PARAMETERS = (
     "name: a quantity with its unit, a number, or an expression of other parameters; for values "
     "that begin with '=', such as '= pi/4 * d_seat^2'."
 )
-"""Description of the key, which stands in two sections."""
+"""Description of the key, for two sections."""
 
 
 @dataclass(frozen=True, slots=True)
 class ParameterValue:
-    """A value in a case with its dimension.
+    """Value in a case, with dimension.
 
     Parameters
     ----------
     value [SI]
     text
-        As the case has it: ``1.3 mm``, ``2 * d_seat``.
+        In the case: ``1.3 mm``, ``2 * d_seat``.
     sources
-        Parameters of the case, and arguments of its includes, that it follows from; its own.
+        Parameters of the case, and arguments of its includes, behind it, itself included.
     """
 
     value: float
@@ -61,12 +61,12 @@ class ParameterValue:
 
     @property
     def kind(self) -> Kind:
-        """Kind of quantity; one made for it where a case has no such key."""
+        """Kind of quantity, perhaps made for it."""
         return _kind_of(self.dimension)
 
     @property
     def field(self) -> FieldInfo:
-        """Field that takes other values of the same kind."""
+        """Field for other values of its kind."""
         info: FieldInfo = FieldInfo.from_annotation(Annotated[float, *typed(self.kind)])  # type: ignore[arg-type]
         return info
 
@@ -79,7 +79,7 @@ Scope = Mapping[str, ParameterValue]
 
 
 def is_expression(value: object) -> bool:
-    """Whether a value of a case is an expression: a text that begins with ``=``."""
+    """Whether a value is a text that begins with ``=``."""
     return isinstance(value, str) and value.lstrip().startswith("=")
 
 
@@ -94,18 +94,12 @@ def parameters_of_text(
 
     Parameters
     ----------
-    written : mapping of str to str or number
     given
-        Values that replace those of the text; of the same dimension where the text has one.
+        Replace those of the text; of the same dimension where the text has one.
     section
-        Key of the parameters of a case, whose values follow from themselves; empty for a part.
+        Key of the parameters of a case, which follow from themselves; empty for a part.
     where_given
-        File, line and name of a given value, for errors.
-
-    Raises
-    ------
-    InputError
-        For what is no expression, unknown names, circles, and parts that do not go together.
+        File, line and name of a given value.
     """
     given = given or {}
     expressions: dict[str, Expression] = {}
@@ -133,16 +127,16 @@ def parameters_of_text(
 
 
 def parameter_value(text: object, scope: Scope, where: str, key: Key = ()) -> ParameterValue:
-    """Value of one quantity, number or expression of the names of a scope.
+    """Value of one quantity, number or expression.
 
-    With a key, that of an argument in the case, it follows from itself.
+    With a key, that of an argument, it follows from itself.
     """
     found = _value(_read(text, scope, where), scope, str(text))
     return replace(found, sources=found.sources | {key}) if key else found
 
 
 def _read(text: object, known: Collection[str], where: str) -> Expression:
-    """Expression in a value that may stand for a parameter."""
+    """Expression in a value for a parameter."""
     if isinstance(text, bool) or not isinstance(text, str | int | float):
         raise InputError(
             where,
@@ -157,14 +151,14 @@ def _read(text: object, known: Collection[str], where: str) -> Expression:
 
 
 def _plain(text: str | float) -> str:
-    """Text of an expression without its sign, or of a number."""
+    """Expression without its sign, or number."""
     return text.lstrip().removeprefix("=") if isinstance(text, str) else repr(text)
 
 
 def _replaced(
     default: ParameterValue, given: ParameterValue, name: str, where: str
 ) -> ParameterValue:
-    """Given value in place of the one of the text."""
+    """Given value for that of the text."""
     if default.dimension.shared(given.dimension) is None:
         raise InputError(
             where,
@@ -176,14 +170,9 @@ def _replaced(
 
 
 def evaluated(text: str, scope: Scope, where: str) -> tuple[Computed | float | int, frozenset[Key]]:
-    """Value of an expression, and what it follows from.
+    """Value of an expression, and what is behind it.
 
-    A plain number where it has no unit, whole where it is whole.
-
-    Raises
-    ------
-    InputError
-        With file, line and key, the expression and the place in it.
+    A plain number without unit, whole where it is.
     """
     expression = _expression(_plain(text), where)
     expression.require_clear(scope)
@@ -202,7 +191,7 @@ def evaluated(text: str, scope: Scope, where: str) -> tuple[Computed | float | i
 
 
 def as_written(value: object) -> object:
-    """Text that a case could have in place of the value of an expression; all else as it is."""
+    """Text for the value of an expression; others as they are."""
     if not isinstance(value, Computed) or not isinstance(value.dimension, Dimension):
         return value
     kind = _kind_of(value.dimension)
@@ -211,7 +200,7 @@ def as_written(value: object) -> object:
 
 @lru_cache(maxsize=4000)
 def _expression(text: str, where: str) -> Expression:
-    """The last ones are kept: a case is checked again for every changed value."""
+    """The last ones are kept: a case is checked again for every change."""
     return Expression.parse(text, where)
 
 

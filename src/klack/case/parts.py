@@ -1,4 +1,4 @@
-"""Files of included parts: found below the folder of the case, and kept with its text."""
+"""Files of included parts, below the folder of the case and kept with its text."""
 
 import json
 from collections.abc import Mapping
@@ -37,7 +37,7 @@ _MOST_FILES = 100
 
 @dataclass(slots=True)
 class _Found:
-    """Texts of the parts by their names, as they are found."""
+    """Texts of parts by name, as found."""
 
     root: Path
     texts: dict[str, str]
@@ -46,21 +46,16 @@ class _Found:
 
 
 def self_contained(text: str, path: Path, data: Any, lines: Lines) -> tuple[str, Any, Lines]:
-    """Text of a case with those of the files that it includes, as plain data and lines.
+    """Text of a case with its included files, as plain data and lines.
 
-    A result keeps that text, so that a file which changes later changes no earlier result.  Texts
-    that the case holds already replace the files.
+    Kept by a result, so that later changes of a file change nothing. Texts that the case holds
+    replace the files. Rejects includes outside the folder of the case, of themselves, or nested
+    too deeply.
 
     Parameters
     ----------
     data
-        Parsed text; values at some keys may have been exchanged since.
-
-    Raises
-    ------
-    InputError
-        For an include that leads to no part below the folder of the case, that contains itself,
-        or that is nested too deeply.
+        Parsed text, perhaps with exchanged values.
     """
     kept = data.get("parts")
     kept = (
@@ -77,7 +72,7 @@ def self_contained(text: str, path: Path, data: Any, lines: Lines) -> tuple[str,
 
 
 def included_files(data: Any) -> list[tuple[Key, str]]:
-    """Names of included files in plain data, with their keys; what has no such form is left out."""
+    """Included files with their keys; other forms are ignored."""
     entries = data.get("include") if isinstance(data, Mapping) else None
     return [
         (("include", i, "file"), entry["file"])
@@ -87,17 +82,9 @@ def included_files(data: Any) -> list[tuple[Key, str]]:
 
 
 def part_name(folder: str, file: str, where: str) -> str:
-    """Name of an included file relative to the folder of the case, with slashes.
+    """Included file relative to the folder of the case, with slashes; rejects one outside.
 
-    Parameters
-    ----------
-    folder
-        Of the file that includes it, relative to that of the case.
-
-    Raises
-    ------
-    InputError
-        For a name that leads out of the folder of the case, or is none.
+    ``folder`` is that of the including file, relative to that of the case.
     """
     parts: list[str] = []
     bad = not file.strip() or "\\" in file or ":" in file or file.startswith(("/", "~"))
@@ -118,12 +105,9 @@ def part_name(folder: str, file: str, where: str) -> str:
 
 
 def with_parts(text: str, path: Path, texts: Mapping[str, str]) -> str:
-    """Text of a case with the section ``parts`` that holds included files.
+    """Text of a case with a section ``parts`` of included files.
 
-    Raises
-    ------
-    InputError
-        For a case whose layout takes no further section at its end.
+    Rejects layouts that take no section at their end.
     """
     data, _ = parse(text, path)
     if "parts" in data:
@@ -149,7 +133,7 @@ def with_parts(text: str, path: Path, texts: Mapping[str, str]) -> str:
 
 
 def _in_braces(text: str, texts: Mapping[str, str]) -> str:
-    """Text of a case in braces, with the included files as its last key."""
+    """Case in braces, with included files as last key."""
     root = YAML().compose(StringIO(text))
     end = root.end_mark.index - 1
     body, comma = text[:end].rstrip(), ", " if root.value else ""
@@ -158,14 +142,14 @@ def _in_braces(text: str, texts: Mapping[str, str]) -> str:
 
 
 def _without_parts(text: str, path: Path) -> str:
-    """Text up to the section ``parts``, which klack writes last."""
+    """Text up to ``parts``, which klack writes last."""
     _, lines = parse(text, path)
     line = lines.keys[("parts",)]
     return "".join(text.splitlines(keepends=True)[: line - 1])
 
 
 def _scalar(text: str) -> str:
-    """A text as a block of lines where YAML can write it so, else in quotes."""
+    """Text as a YAML block where possible, else quoted."""
     lines = text.split("\n")
     plain = text.endswith("\n") and not text.endswith("\n\n") and all(map(_is_plain, lines))
     if not plain:
@@ -182,7 +166,7 @@ def _where(path: Path, lines: Lines, key: Key) -> str:
 
 
 def _collect(found: _Found, data: Any, above: tuple[str, ...], folder: str, where: Any) -> None:
-    """Read all files that plain data include, and what these include."""
+    """Read all files that plain data and their includes include."""
     for key, file in included_files(data):
         name = part_name(folder, file, where(key))
         if name in above or len(above) > DEEPEST:
@@ -252,7 +236,7 @@ PARTS = (
     "Texts of the included files, where a result or another stored case holds them; they replace "
     "the files."
 )
-"""Descriptions of keys that stand in two sections."""
+"""Descriptions of keys of two sections."""
 
 _Values = Annotated[
     Any,

@@ -1,4 +1,4 @@
-"""Mistakes that show when a case is computed, at file, line and key as the checks of the case."""
+"""Mistakes found when a case is computed, at file, line and key."""
 
 import re
 from collections.abc import Callable
@@ -21,10 +21,10 @@ _KEY = re.compile(r"(?P<key>[\w-]+(?:\.[\w-]+|\[\d+\])*)(?P<rest>(?:: .*)?)", re
 def tells_place(
     compute: Callable[Concatenate[C, P], R],
 ) -> Callable[Concatenate[C, P], R]:
-    """Decorate what computes a case: an error that names a key of it gets the place in the file.
+    """Decorate what computes a case: errors that name a key get the place in the file.
 
-    Connections of a variant (dry, lumped) are others than those of the file, which are checked
-    when it is read: of them only the section is named.
+    Connections of a variant (dry, lumped) differ from those of the file, which are checked when
+    read: only the section is named.
     """
 
     @wraps(compute)
@@ -43,7 +43,7 @@ def tells_place(
 
 
 def _place(case: CaseFile, error: InputError) -> str | None:
-    """File, line and key; None where the error names none, or the case comes from no file."""
+    """File, line and key, if the error names one and the case has a file."""
     found = _KEY.fullmatch(error.where)
     if case.expanded is None or found is None:
         return None

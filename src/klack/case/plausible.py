@@ -1,8 +1,8 @@
-"""Numbers that a valve can have: doubts beside unusual ones, errors at those that cannot be.
+"""Numbers that a valve can have: doubt about unusual ones, errors at impossible ones.
 
-The usual sign of a wrong unit is a number a thousand times off.  Sizes and masses of bodies are
-judged where their shapes are known, before they are meshed (:mod:`klack.assembling.given_shapes`),
-materials by :attr:`klack.materials.material.Material.question`.
+A wrong unit makes a number a thousand times off. Sizes and masses of bodies:
+:mod:`klack.assembling.given_shapes`; materials:
+:attr:`klack.materials.material.Material.question`.
 """
 
 from dataclasses import dataclass
@@ -18,18 +18,14 @@ __all__ = ["GO_ON", "MOVING_MASS", "PART_MASS", "SIZE", "SPEED", "Number", "Rang
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Range:
-    """Range of one kind of number.
+    """Range of one kind of number, in doubt outside ``usual``, an error outside ``possible``.
 
     Parameters
     ----------
     unit
         SI, without prefix.
-    usual
-        Outside: in doubt.
-    possible
-        Outside: an error.
     reason
-        Why, as one clause.
+        One clause.
     """
 
     unit: str
@@ -51,7 +47,7 @@ class Range:
         return " to ".join(self.shown(value) for value in self.usual)
 
     def shown(self, value: float) -> str:
-        """A number with its unit, masses below 1 kg in grams."""
+        """Number with unit, masses below 1 kg in grams."""
         if self.unit == "kg" and value < 1.0:
             return f"{1e3 * value:.3g} g"
         return format_si(value, self.unit)
@@ -64,7 +60,7 @@ SPEED = Range(
     reason="flat faces of steel that meet are loaded with 20 MPa for each m/s, and at 100 m/s "
     "hardened steel yields throughout; needles hit with 0.02 to 5 m/s",
 )
-"""Of an impact [m/s].  Below 2 mm/s a stroke of 0.1 mm takes 50 ms: no valve switches so slowly."""
+"""Of an impact [m/s]. At 2 mm/s a stroke of 0.1 mm takes 50 ms: no valve is so slow."""
 
 MOVING_MASS = Range(
     unit="kg",
@@ -73,7 +69,7 @@ MOVING_MASS = Range(
     reason="needles of injectors weigh 10 mg and more, armatures of large solenoid valves up to "
     "0.5 kg",
 )
-"""Of the body that moves [kg]; what cannot be is told by its size and its material."""
+"""Of the moving body [kg]; size and material tell what cannot be."""
 
 PART_MASS = Range(
     unit="kg",
@@ -96,7 +92,7 @@ GO_ON = "check its unit; 'unusual: true' at the head of the case computes it all
 
 
 class Number(NamedTuple):
-    """A number of a case, its key, and what it may be."""
+    """Number of a case, its key and range."""
 
     key: Key
     value: float
@@ -104,7 +100,7 @@ class Number(NamedTuple):
 
     @property
     def doubt(self) -> str | None:
-        """What makes it doubtful, in words; None for a usual number."""
+        """Doubt in words; None for a usual number."""
         if self.range.is_usual(self.value):
             return None
         return (
@@ -113,7 +109,7 @@ class Number(NamedTuple):
         )
 
     def require_possible(self, where: str) -> None:
-        """Raise :class:`InputError` for a number that cannot be; ``where`` is its place."""
+        """Reject an impossible number."""
         if self.range.is_possible(self.value):
             return
         least, most = (self.range.shown(limit) for limit in self.range.possible)

@@ -1,4 +1,4 @@
-"""Points of a parameter space: a case with other values at some of its keys."""
+"""Points of a parameter space: a case with other values at some keys."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -31,21 +31,21 @@ __all__ = [
 PointValue = str | int | float
 CaseKind = TypeVar("CaseKind", Case, ValveCase)
 GivenPoints = Sequence[Mapping[str, PointValue]] | Mapping[str, Sequence[PointValue]]
-"""A mapping of key to value for each point, or a list of values for each key."""
+"""Key to value for each point, or a list of values per key."""
 
 _WHERE = "points"
 
 
 @dataclass(frozen=True, slots=True)
 class PointKey:
-    """A key of the case that points exchange.
+    """A key that points exchange.
 
     Parameters
     ----------
     name
-        As given, ``"network.components.spring.preload"``.
+        As ``"network.components.spring.preload"``.
     kind
-        Of its quantity; None for a key without unit, such as a name.
+        None without unit, such as a name.
     """
 
     name: str
@@ -54,13 +54,13 @@ class PointKey:
 
     @property
     def unit(self) -> str:
-        """SI unit of its values; ``"1"`` for a pure number, empty for texts."""
+        """SI unit; ``"1"`` for a number, empty for texts."""
         if self.kind is None:
             return ""
         return "1" if self.kind.bare else self.kind.unit
 
     def value(self, written: PointValue) -> PointValue:
-        """SI value of a quantity, anything else as it is written."""
+        """SI value of a quantity, else as written."""
         if self.kind is None:
             return written
         return parse_quantity(written, self.kind, f"{_WHERE}: {self.name}")
@@ -68,14 +68,12 @@ class PointKey:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Points:
-    """Points whose keys and units have been checked.
+    """Points with checked keys and units.
 
     Parameters
     ----------
-    keys
-        All that occur.
-    written : tuple of mapping of str to value
-        What each point exchanges by the name of the key, as a case file would have it.
+    written
+        What each point exchanges by key name, as in a case file.
     """
 
     keys: tuple[PointKey, ...]
@@ -85,7 +83,7 @@ class Points:
         return len(self.written)
 
     def changes(self, i: int) -> dict[Key, PointValue]:
-        """What stands in the case instead, for one point."""
+        """Exchanged values of one point."""
         row = self.written[i]
         return {key.place: row[key.name] for key in self.keys if key.name in row}
 
@@ -93,21 +91,15 @@ class Points:
 def points_of(case: AnyCase, tree: CaseTree, given: GivenPoints) -> Points:
     """Check the keys of points and the units of their values.
 
-    Whether the case allows a value is a matter of the point: see :func:`checked_parts`.
+    Whether the case allows a value: :func:`checked_parts`. Rejects unknown keys, other kinds,
+    missing units, and lists of different lengths.
 
     Parameters
     ----------
     case
-        As it is, without any of the points.
+        Without the points.
     tree
-        The same as it was written.
-    given : sequence of mappings, or mapping of sequences
-
-    Raises
-    ------
-    InputError
-        For a key that the case does not have, a value of another kind or without its unit, and
-        lists of different lengths; with the nearest name.
+        The same as written.
     """
     rows = list(_rows(given))
     names = dict.fromkeys(name for row in rows for name in row)
@@ -124,11 +116,10 @@ def points_of(case: AnyCase, tree: CaseTree, given: GivenPoints) -> Points:
 
 
 def checked_parts(tree: CaseTree, case: ValveCase, places: Iterable[Key]) -> CaseTree:
-    """Replace every part of the data that no point touches by what was made of it.
+    """Replace every part of the data that no point touches by its checked object.
 
-    Sections and components that are there already are not read again when a point is checked, only
-    that all of them fit together.  Components of the user's own are made anew for every point: they
-    may remember something.
+    Sections and components are then not read again, only that all fit together.  Components of the
+    user's own are made anew for every point: they may remember something.
 
     Parameters
     ----------
@@ -164,18 +155,10 @@ def case_at(
 
     Parameters
     ----------
-    kind
-        ValveCase, or Case of an impact.
     tree
         As written.
     parts
-        The same from :func:`checked_parts`.
-    changes : mapping of Key to value
-
-    Raises
-    ------
-    InputError
-        With file, line and key, as when the case is read.
+        Of :func:`checked_parts`.
     """
     data = with_changes(parts.data, changes)
     try:
@@ -204,7 +187,7 @@ def _components(tree: CaseTree, case: ValveCase, touched: set[Key]) -> dict[str,
 
 
 def with_changes(data: Any, changes: Mapping[Key, PointValue]) -> Any:
-    """Copy of the plain data of a case with other values at some keys."""
+    """Copy of plain data with other values at some keys."""
     for place, value in changes.items():
         data = merged(data, place, value)
     return data
@@ -271,7 +254,7 @@ def _key(case: AnyCase, tree: CaseTree, name: object) -> PointKey:
 
 
 def _require_apart(keys: Iterable[PointKey]) -> None:
-    """Refuse one key twice or below another one: which counts would depend on their order."""
+    """Reject a key twice or below another: their order would count."""
     places: dict[Key, str] = {}
     for key in keys:
         if key.place in places:

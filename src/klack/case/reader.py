@@ -1,6 +1,6 @@
-"""Read a case file: YAML 1.2 in, a checked case or one clear error out.
+"""Read the case file of an impact: YAML 1.2 in, a checked case or one clear error out.
 
-The case of a whole valve, with a section ``network``, is read by :mod:`klack.case.any_case`.
+That of a whole valve: :mod:`klack.case.any_case`.
 """
 
 from collections.abc import Mapping
@@ -43,18 +43,12 @@ _HEAD = ("parameters", "include", "parts")
 def expanded(data: Any, lines: Lines, path: Path) -> ExpandedCase:
     """Evaluate the expressions of a case and put its parts in place.
 
-    Everything below sees plain values, components and connections: a part of the network gives the
-    same rows as the same components written out.
+    A part of the network gives the same rows as its components written out.
 
     Parameters
     ----------
     data
-        With the texts of all included files in its section ``parts``.
-
-    Raises
-    ------
-    InputError
-        With file, line and key.
+        With all included files in its section ``parts``.
     """
     written = ExpandedCase.plain(data, lines, path)
     if not any(name in data for name in _HEAD) and not has_expression(data):
@@ -94,7 +88,7 @@ def _checked(kind: type[Section], data: Any, origin: Origin) -> Any:
 
 
 def _takes_parts(data: Any) -> bool:
-    """Whether parts can be put into a case; the check of the case refuses what cannot."""
+    """Whether parts can be put into a case."""
     network = data.get("network")
     if not isinstance(network, dict):
         return False
@@ -110,20 +104,8 @@ _Kind = TypeVar("_Kind", bound=Section)
 def load_case(path: str | Path) -> Case:
     """Read and check the case file of an impact.
 
-    Parameters
-    ----------
-    path
-        YAML file.  Files that it names are looked for relative to its own folder.
-
-    Returns
-    -------
-    Case
-        In SI, with :attr:`Case.path` set.
-
-    Raises
-    ------
-    InputError
-        With file, line, key, what came, what was expected and what to try.
+    Files that it names are relative to its folder. The error names file, line, key, what came,
+    what was expected and what to try.
     """
     path = Path(path)
     return read_case(text_of(path), path)
@@ -150,7 +132,7 @@ def validated(
     lines: "Lines",
     components: Mapping[str, type] | None = None,
 ) -> _Kind:
-    """Check parsed data against a kind of case; own components by their types."""
+    """Check parsed data; own components by their types."""
     found = ExpandedCase.plain(data, lines, path)
     if issubclass(kind, CaseFile):
         if "include" in kind.model_fields and data.get("include"):
@@ -173,7 +155,7 @@ def validated(
 
 
 def case_schema() -> dict[str, Any]:
-    """JSON schema of an impact case (draft 2020-12), for editors that check while one types."""
+    """JSON schema of an impact case (draft 2020-12), for editors."""
     return schema_of(Case)
 
 
@@ -186,7 +168,7 @@ def schema_of(kind: type[BaseModel]) -> dict[str, Any]:
 def shipped_cases() -> dict[str, Path]:
     """Names and files of the shipped cases: ``<name>/case.yaml``.
 
-    In an installed package they lie in ``klack/cases``, in a checkout in ``cases`` at its root.
+    In ``klack/cases`` of a package, ``cases`` of a checkout.
     """
     package = Path(__file__).resolve().parents[1]
     for folder in (package / "cases", package.parents[1] / "cases"):
@@ -196,7 +178,7 @@ def shipped_cases() -> dict[str, Path]:
 
 
 def find_case(text: str | Path) -> Path:
-    """Find a case by its path, by a folder that holds ``case.yaml``, or by its shipped name."""
+    """Case by path, by folder of ``case.yaml``, or by shipped name."""
     path = Path(text)
     if path.is_file():
         return path

@@ -1,4 +1,4 @@
-"""The text of a case with some values changed, and everything else as its author wrote it."""
+"""Text of a case with some values changed, the rest as written."""
 
 import json
 import os
@@ -29,14 +29,9 @@ _NUMBER_AND_UNIT = re.compile(
 
 
 def rewritten(tree: CaseTree, values: Mapping[Key, str], header: str = "") -> str:
-    """Text of a case with other values at some keys; comments, order and spacing stay.
+    """Text of a case with other values at existing keys; comments, order and spacing stay.
 
-    Parameters
-    ----------
-    values : mapping of key to str
-        What is written there instead.
-    header
-        Comment lines in front of the text.
+    ``header`` are comment lines in front.
     """
     root = YAML().compose(StringIO(tree.text))
     pieces = []
@@ -54,7 +49,7 @@ def rewritten(tree: CaseTree, values: Mapping[Key, str], header: str = "") -> st
 
 
 def _require_same(tree: CaseTree, values: Mapping[Key, str], text: str) -> None:
-    """Require that only the given values have changed; an anchor could change others."""
+    """Only the given values may change; an anchor could change others."""
     try:
         data, _ = parse(text, tree.path)
         for key in values:
@@ -71,7 +66,7 @@ def _require_same(tree: CaseTree, values: Mapping[Key, str], text: str) -> None:
 
 
 def written_quantity(tree: CaseTree, place: Quantity, value: float, digits: int = 7) -> str:
-    """Write a value [SI] in the unit in which its key is written now: ``13.56214 N``."""
+    """Value [SI] in the present unit of its key: ``13.56214 N``."""
     now = written_at(tree.data, place.key)
     match = _NUMBER_AND_UNIT.fullmatch(now) if isinstance(now, str) else None
     rest = (match["rest"] or "") if match else ""
@@ -86,7 +81,7 @@ def written_quantity(tree: CaseTree, place: Quantity, value: float, digits: int 
 
 
 def moved_files(tree: CaseTree, folder: Path) -> dict[Key, str]:
-    """Relative names of files in a case, as they read from another folder."""
+    """File names as they read from another folder."""
     found: dict[Key, str] = {}
     _collect(tree.data, (), found)
     old, new = tree.path.resolve().parent, folder.resolve()
@@ -137,19 +132,9 @@ def _node(node: Node, key: Key) -> ScalarNode:
 
 
 def with_values(tree: CaseTree, values: Mapping[Key, str], header: str = "") -> str:
-    """Text of a case with values replaced, or added where missing.
+    """Text of a case with values replaced or added; as :func:`rewritten`.
 
-    Parameters
-    ----------
-    values : mapping of key to str
-        What is written there.
-    header
-        Comment lines in front of the text.
-
-    Raises
-    ------
-    InputError
-        If more than these values would change: an anchor carries them elsewhere.
+    Rejects where an anchor would carry values elsewhere.
     """
     known = {key: text for key, text in values.items() if written_at(tree.data, key) is not None}
     text = rewritten(tree, known, header) if known or header else tree.text
@@ -163,10 +148,7 @@ def with_values(tree: CaseTree, values: Mapping[Key, str], header: str = "") -> 
 def merged(data: Any, key: Key, value: object, above: Key = ()) -> Any:
     """Copy of plain data with a value at a key; missing mappings are created.
 
-    Raises
-    ------
-    CaseProblem
-        Where a single value stands for a mapping, such as the name of a fluid.
+    Rejects a key below a single value, such as the name of a fluid.
     """
     if not key:
         return value
@@ -186,7 +168,7 @@ def merged(data: Any, key: Key, value: object, above: Key = ()) -> Any:
 
 
 def plain_data(data: Any) -> Any:
-    """Copy without comments and positions: mappings, lists and plain values."""
+    """Copy without comments and positions."""
     if isinstance(data, Mapping):
         return {str(key): plain_data(value) for key, value in data.items()}
     return [plain_data(item) for item in data] if isinstance(data, list) else data

@@ -1,7 +1,4 @@
-"""A case: two bodies, their contact, and what shall be computed.
-
-Its sections are the YAML file, key by key, in SI: :mod:`klack.case.impact_sections`.
-"""
+"""A case: two bodies, their contact, and what shall be computed."""
 
 from collections.abc import Iterable
 from typing import Self
@@ -27,7 +24,7 @@ class Case(ImpactSections):
         return self
 
     def require_levels(self, levels: Iterable[str]) -> tuple[Level, ...]:
-        """Check that this case can run the levels; return them without repetition."""
+        """Check that this case can run the levels; each once."""
         wanted = tuple(dict.fromkeys(levels))
         for level in wanted:
             if level != "full":
@@ -60,7 +57,7 @@ class Case(ImpactSections):
         return tuple(level for level in LEVELS if level in wanted)
 
     def require_on_axis(self, what: str) -> None:
-        """Raise for axisymmetric bodies off-axis, which have the interface level alone."""
+        """Reject off-axis axisymmetric bodies: interface level alone."""
         if self.leaves_axis:
             raise self._off_axis(what)
 
@@ -73,7 +70,7 @@ class Case(ImpactSections):
         )
 
     def require_ends(self, what: str) -> None:
-        """Raise for a non-reflecting end, which modes, exported models and decks leave out."""
+        """Reject a non-reflecting end, which modes, exports and decks leave out."""
         for name, body in self.bodies.items():
             if body.non_reflecting is not None:
                 raise InputError(

@@ -136,12 +136,12 @@ class StrokeShots(Section):
 
     @property
     def draws_position(self) -> bool:
-        """True if eccentricity and tilt have distributions of their own."""
+        """True if eccentricity and tilt have distributions."""
         return self.eccentricity is not None or self.tilt is not None
 
 
 def require_friction(drawn: Distribution | None) -> Distribution | None:
-    """Refuse a distribution of coefficients of friction that no faces have."""
+    """Reject coefficients that no faces have."""
     if drawn is not None and drawn.largest > MOST_FRICTION:
         raise CaseProblem(
             (),

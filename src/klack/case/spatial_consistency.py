@@ -1,4 +1,4 @@
-"""Checks of a valve whose needle moves in three dimensions: what it needs, and cannot have yet."""
+"""Checks of a valve whose needle moves in three dimensions."""
 
 from collections.abc import Iterator, Mapping
 from math import isfinite
@@ -15,7 +15,7 @@ __all__ = ["check_motion", "require_axial", "require_bodies"]
 
 
 def refuse_off_axis(case: ValveSections) -> None:
-    """Raise :class:`CaseProblem` where something acts across an axis that the needle keeps."""
+    """Reject forces across the axis of a needle that keeps it."""
     for key, _, _ in _parts(case):
         raise CaseProblem(
             key,
@@ -27,7 +27,7 @@ def refuse_off_axis(case: ValveSections) -> None:
 
 
 def check_off_axis(case: ValveSections, needle: str) -> None:
-    """Raise :class:`CaseProblem` for a force across the axis that cannot be computed."""
+    """Reject a force across the axis that cannot be computed."""
     for key, name, part in _parts(case):
         points = getattr(case.network.components[needle], "points", ())
         at = {f"{needle}.{point}" for point in points}
@@ -66,7 +66,7 @@ _FRICTION = ("guide-friction",)
 
 
 def check_motion(case: ValveSections, meetings: Mapping[str, Meeting], roles: ValveRoles) -> None:
-    """Raise :class:`CaseProblem` for the first thing that a motion in space cannot have."""
+    """Reject the first thing that a motion in space cannot have."""
     if case.motion == "axial":
         for key in ("guide", "placement"):
             if getattr(case, key) is not None:
@@ -124,7 +124,7 @@ def check_motion(case: ValveSections, meetings: Mapping[str, Meeting], roles: Va
 
 
 def _check_bodies(case: ValveSections) -> None:
-    """Bodies of one kind, half sections that klack assembles, and angles for these alone."""
+    """Bodies of one kind, half sections that klack assembles, angles for these alone."""
     flat = [name for name, body in case.bodies.items() if body.geometry.dimension == 2]
     solid = [name for name in case.bodies if name not in flat]
     if flat and solid:
@@ -259,7 +259,7 @@ def _check_placement(case: ValveSections) -> None:
 
 
 def require_bodies(case: ValveSections, variants: tuple[str, ...], where: str) -> None:
-    """Raise :class:`InputError` for variants that a motion in space does not have."""
+    """Reject variants that a motion in space does not have."""
     if case.motion == "axial":
         return
     for variant in variants:
@@ -273,7 +273,7 @@ def require_bodies(case: ValveSections, variants: tuple[str, ...], where: str) -
 
 
 def require_axial(case: ValveSections, command: str) -> None:
-    """Raise :class:`InputError` for what knows a motion along the axis only."""
+    """Reject a motion in space, for a ``command`` that knows the axis alone."""
     if case.motion != "axial":
         raise InputError(
             f"{case.path or 'case'}: motion",

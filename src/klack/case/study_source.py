@@ -1,4 +1,4 @@
-"""The study of a case, from the case itself or from a file of its own, with lines for messages."""
+"""Study of a case, in it or in a file of its own, with lines."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -23,7 +23,7 @@ class StudySource:
     Parameters
     ----------
     text
-        Of a file of its own; empty if the study stands in the case.
+        Of its own file, else empty.
     """
 
     study: CaseStudy
@@ -32,18 +32,12 @@ class StudySource:
     text: str = ""
 
     def where(self, key: Key, *, on_key: bool = False) -> str:
-        """File, line and key below ``study``, as messages name them."""
+        """File, line and key below ``study``."""
         whole = ("study", *key)
         return f"{self.path}:{self.lines.find(whole, on_key=on_key)}: {key_text(whole)}"
 
     def made(self, valves: int) -> "StudySource":
-        """The same study of so many valves made after the case.
-
-        Raises
-        ------
-        InputError
-            For less than one, and more than a million.
-        """
+        """Same study of 1 to 1e6 valves made after the case."""
         if isinstance(valves, bool) or not 1 <= valves <= _MOST_VALVES:
             raise InputError(
                 "--made",
@@ -57,13 +51,13 @@ class StudySource:
         return replace(self, study=self.study.model_copy(update={"design": design}))
 
     def refuse(self, key: Key, error: InputError) -> InputError:
-        """The same error, at the place where the study says so."""
+        """Error at its place in the study."""
         inner = error.key if isinstance(error, CaseProblem) else ()
         where = self.where((*key, *inner))
         return InputError(where, got=error.got, expected=error.expected, hint=error.hint)
 
     def read(self, key: Key, parse: Callable[[], float]) -> float:
-        """Value of a text in the study; its error names the place."""
+        """Value of a text; its error names the place."""
         try:
             return parse()
         except InputError as error:
@@ -71,13 +65,7 @@ class StudySource:
 
 
 def study_of(case: AnyCase, tree: CaseTree, file: Path | None = None) -> StudySource:
-    """Study in a file of its own, or in the section ``study`` of the case.
-
-    Raises
-    ------
-    InputError
-        For a file that is no study, and a case without one.
-    """
+    """Study in a file, or in the section ``study`` of the case."""
     if file is not None:
         text = text_of(file)
         data, lines = parse(text, file)
@@ -98,5 +86,5 @@ def study_of(case: AnyCase, tree: CaseTree, file: Path | None = None) -> StudySo
 
 
 def study_if_any(case: AnyCase, tree: CaseTree, file: Path | None = None) -> StudySource | None:
-    """:func:`study_of`; None for a case without one, and no file."""
+    """:func:`study_of`, or None."""
     return study_of(case, tree, file) if file is not None or case.study is not None else None

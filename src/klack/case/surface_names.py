@@ -1,7 +1,6 @@
-"""Names of surfaces in a case, checked against a CAD file or a mesh that was looked into.
+"""Surface names of a case, checked when its STEP file or mesh is read.
 
-Of a drawn body the reader of the case knows the surfaces.  Those of a STEP file or a mesh are known
-when the file is read; the key and the line in the case are told then as well.
+Those of a drawn body are known before.
 """
 
 from collections.abc import Collection, Iterator, Mapping
@@ -22,17 +21,7 @@ _Named = tuple[Key, str, str]
 
 
 def require_surface_names(case: CaseFile, known: Mapping[str, Collection[str]]) -> None:
-    """Check every name of a surface that a case gives, for the bodies that are known.
-
-    Parameters
-    ----------
-    known : mapping of body name to names of surfaces
-
-    Raises
-    ------
-    InputError
-        With file, line, key, and the name that is spelled most like it.
-    """
+    """Check every surface name of the bodies whose surfaces are known; proposes the nearest."""
     for key, body, surface in (*_of_bodies(case), *_of_contacts(case)):
         if body in known and surface not in known[body]:
             raise InputError(
@@ -87,7 +76,7 @@ def _of_valve(case: ValveCase) -> Iterator[_Named]:
 
 
 def place_of(case: CaseFile, key: Key, *, on_key: bool) -> str:
-    """File, line and key of a place in a case, for an error."""
+    """File, line and key in a case."""
     if case.expanded is not None:
         return case.expanded.origin(key).where(on_key=on_key)
     path = case.path or Path("case")

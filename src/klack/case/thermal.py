@@ -1,4 +1,4 @@
-"""The section ``thermal``: what a stroke warms, and what of a stroke follows temperatures."""
+"""Section ``thermal``: what a stroke warms, and what follows temperatures."""
 
 from collections.abc import Mapping
 from typing import Annotated
@@ -14,7 +14,7 @@ _REFERENCE = 293.15
 
 _WORD = r"[A-Za-z_][A-Za-z0-9_-]*"
 CoilName = Annotated[str, Strict(), StringConstraints(pattern=rf"^{_WORD}(\.{_WORD})?$")]
-"""Component of a coil, with the circuit where its magnet has several."""
+"""Component of a coil, and its circuit where several."""
 
 
 class SentHeat(Section):
@@ -71,7 +71,7 @@ class Growth(Section):
     )
 
     def change(self, temperature: Mapping[str, float]) -> float:
-        """Change of the gap [m] at temperatures of the nodes [K]."""
+        """Change of the gap [m] at node temperatures [K]."""
         return sum(
             item.length * item.expansion * (temperature[item.node] - self.reference)
             for item in self.lengths

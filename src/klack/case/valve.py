@@ -33,15 +33,12 @@ class ValveCase(ValveSections):
 
     @property
     def own_components(self) -> Mapping[str, str]:
-        """Components that are not part of klack, with a digest of their code.
-
-        See :func:`klack.network.catalogue.source_digests`.
-        """
+        """Components not of klack, see :func:`klack.network.catalogue.source_digests`."""
         return source_digests(self.network.components.values())
 
     @property
     def component_files(self) -> Mapping[str, Path]:
-        """Files of components with a model inside, such as FMUs, by the name of the component."""
+        """Files of components with a model inside, such as FMUs."""
         files = {
             name: getattr(part, "file", None) for name, part in self.network.components.items()
         }
@@ -49,7 +46,7 @@ class ValveCase(ValveSections):
 
     @property
     def rubs(self) -> bool:
-        """Whether the faces of a stop rub in space, or may in one of the shots."""
+        """Whether faces of a stop rub in space, or may in a shot."""
         drawn = self.shots is not None and self.shots.contact_friction is not None
         return drawn or any(stop.friction > 0.0 for stop in self.stops.values())
 
@@ -61,7 +58,7 @@ class ValveCase(ValveSections):
         return self.model_copy(update={"stops": smooth})
 
     def require_variants(self, variants: tuple[str, ...]) -> tuple[Variant, ...]:
-        """Check that this case can run the variants; return them without repetition."""
+        """Check that this case can run the variants; each once."""
         for variant in variants:
             if variant not in VARIANTS:
                 raise InputError(
@@ -81,12 +78,12 @@ class ValveCase(ValveSections):
         return tuple(v for v in VARIANTS if v in variants)
 
     def one_variant(self, name: str | None = None) -> Variant:
-        """Check that this case can run a variant; the first one of the case by default."""
+        """Checked variant; default: the first of the case."""
         return self.require_variants((name,) if name is not None else self.run.variants[:1])[0]
 
 
 def require_valve(data: Any, path: Path, lines: Lines) -> None:
-    """Refuse the parsed case of an impact where that of a whole valve is needed."""
+    """Reject the parsed case of an impact."""
     if "contact" in data and "network" not in data:
         raise InputError(
             f"{path}:{lines.find(('contact',), on_key=True)}: contact",

@@ -1,4 +1,4 @@
-"""Checks of a case of a whole valve that need more than one section."""
+"""Checks between the sections of a valve case."""
 
 from collections.abc import Iterator, Mapping
 
@@ -23,7 +23,7 @@ __all__ = ["check_thermal", "check_valve", "is_consistent"]
 
 
 def check_shots_of_valve(case: ValveSections) -> None:
-    """Raise :class:`CaseProblem` for shots that this valve cannot have."""
+    """Reject shots that this valve cannot have."""
     shots = case.shots
     if shots is None:
         return
@@ -75,7 +75,7 @@ def check_shots_of_valve(case: ValveSections) -> None:
 
 
 def check_valve(case: ValveSections) -> None:
-    """Raise :class:`CaseProblem` for the first contradiction between sections."""
+    """Reject the first contradiction between sections."""
     for name in case.bodies:
         require_surfaces(case, name)
         check_body(case, name)
@@ -139,7 +139,7 @@ def _check_ports(case: ValveSections, name: str) -> None:
 
 
 def _check_flexible_bodies(case: ValveSections) -> None:
-    """Every flexible body of the network is a body of the case, once, at points that it has."""
+    """Each flexible body is a body of the case, once, at existing points."""
     used: dict[str, str] = {}
     for name, part in case.network.components.items():
         if part.type != FLEXIBLE_BODY:
@@ -171,7 +171,7 @@ def _check_flexible_bodies(case: ValveSections) -> None:
 
 
 def _points(case: ValveSections, body: str) -> tuple[str, ...] | None:
-    """Names of the points of a body; None if only its mesh has them."""
+    """Points of a body; None if only its mesh has them."""
     profile = case.bodies[body].geometry.profile
     return None if profile is None else (*case.bodies[body].ports, *profile.surfaces)
 
@@ -221,7 +221,7 @@ def _check_stop(case: ValveSections, name: str, meetings: dict[str, Meeting]) ->
 
 
 def _check_laws(case: ValveSections) -> None:
-    """Check that a consistent law has surfaces, and a correction with a residual compliance."""
+    """A consistent law needs surfaces, and a correction with residual compliance."""
     for name, part in case.network.components.items():
         if part.type != END_STOP or not is_consistent(part):
             continue
@@ -242,7 +242,7 @@ def _check_laws(case: ValveSections) -> None:
 
 
 def _check_friction(case: ValveSections) -> None:
-    """Faces with friction have a law that can have it, and no other loss of the same impact."""
+    """Friction of faces needs a fitting law, and no other loss of the impact."""
     for name, stop in case.stops.items():
         if stop.friction == 0.0:
             continue
@@ -280,7 +280,7 @@ def _check_worn(case: ValveSections) -> None:
 
 
 def is_consistent(part: Component) -> bool:
-    """Whether an end stop waits for a law computed from the static contact."""
+    """Whether an end stop waits for a law from static contact."""
     return getattr(getattr(part, "law", None), "kind", "") == "consistent"
 
 
@@ -288,7 +288,7 @@ _NODES = (Role.HEAT_STORE, Role.TEMPERATURE)
 
 
 def check_thermal(case: ValveSections) -> None:
-    """Raise :class:`CaseProblem` if the section names what the network does not have."""
+    """Reject names that the network does not have."""
     thermal = case.thermal
     if thermal is None:
         return
@@ -346,14 +346,14 @@ def _role(part: Component) -> Role | None:
 
 
 def _wound(parts: Mapping[str, Component]) -> list[str]:
-    """Every coil: that of a magnet, and those in further circuits of it."""
+    """Coils of magnets and of their further circuits."""
     wound = [name for name in parts if "winding_temperature" in type(parts[name]).model_fields]
     others = [f"{name}.{more}" for name in wound for more in getattr(parts[name], "circuits", {})]
     return wound + others
 
 
 def _named_nodes(thermal: CaseThermal) -> Iterator[tuple[Key, str]]:
-    """Every node that the section names, with its key."""
+    """Nodes that the section names, with keys."""
     for i, sent in enumerate(thermal.heat):
         yield ("heat", i, "node"), sent.node
     for coil, node in thermal.windings.items():

@@ -12,12 +12,12 @@ from klack.network.ranges import StopBound, Travel
 __all__ = ["END_STOP", "FLEXIBLE_BODY", "Meeting", "ValveRoles", "find_meetings", "find_roles"]
 
 END_STOP, FLEXIBLE_BODY = "end-stop", "flexible-body"
-"""Types of the components that a case of a whole valve refers to."""
+"""Component types that a valve case refers to."""
 
 
 @dataclass(frozen=True, slots=True)
 class Meeting:
-    """Points that an end stop keeps apart, as (component, point); None is the ground."""
+    """Points (component, point) that an end stop keeps apart; None is the ground."""
 
     upper: tuple[str, str] | None
     lower: tuple[str, str] | None
@@ -30,10 +30,9 @@ class ValveRoles:
     Parameters
     ----------
     needle, point
-        Component that moves, and its point whose displacement is the lift.
+        Moving component, and its point of the lift.
     seat, opening_stop
-        End stops that end its way down and up, perhaps of another body that it pushes or rests on;
-        empty if there is none.
+        End stops down and up, perhaps of a body that it pushes or rests on, or empty.
     """
 
     needle: str
@@ -43,7 +42,7 @@ class ValveRoles:
 
 
 def find_meetings(network: Network) -> dict[str, Meeting]:
-    """Bodies on both sides of every end stop of a network."""
+    """Bodies on both sides of every end stop."""
     at: dict[tuple[str, str], tuple[str, str] | None] = {}
     for node in network.nodes:
         bodies = node.having(Role.MOTION)
@@ -58,17 +57,9 @@ def find_meetings(network: Network) -> dict[str, Meeting]:
 
 
 def find_roles(case: ValveSections, network: Network | None = None) -> ValveRoles:
-    """Find needle, seat and opening stop of a case.
+    """Needle, seat and opening stop; rejects an unclear needle where the case names no lift.
 
-    Parameters
-    ----------
-    network
-        That of the case where it has been joined already.
-
-    Raises
-    ------
-    CaseProblem
-        When the needle is not plain and the case does not name the lift.
+    ``network`` is that of the case, if joined already.
     """
     network = network or case.network.network()
     meetings = find_meetings(network)
@@ -94,7 +85,7 @@ def find_roles(case: ValveSections, network: Network | None = None) -> ValveRole
 
 
 def _travel(case: ValveSections, network: Network, meetings: Mapping[str, Meeting]) -> Travel:
-    """Travel of the free bodies between the end stops with a law."""
+    """Travel of the free bodies between end stops with a law."""
 
     def free(side: tuple[str, str] | None) -> str | None:
         return None if side is None or _held(case, side[0]) else side[0]
@@ -109,7 +100,7 @@ def _travel(case: ValveSections, network: Network, meetings: Mapping[str, Meetin
 
 
 def _needle(case: ValveSections, points: dict[str, tuple[str, ...]]) -> str:
-    """Component that moves: named by the lift, or the only one that nothing fixes."""
+    """Moving component: named by the lift, or the only one that nothing fixes."""
     lift = case.run.lift
     if lift is not None:
         known = [f"{name}.{port}" for name, ports in points.items() for port in ports]

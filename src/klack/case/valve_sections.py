@@ -1,7 +1,7 @@
 """Sections of a case of a whole valve, key by key as in the YAML file, in SI.
 
-:class:`ValveSections` holds them all; what contradicts each other is found by
-:mod:`klack.case.valve_consistency`, and :class:`klack.case.valve.ValveCase` is what passed.
+:mod:`klack.case.valve_consistency` finds contradictions; :class:`klack.case.valve.ValveCase` is
+what passed.
 """
 
 from collections.abc import Iterator, Mapping
@@ -217,7 +217,7 @@ class ValveSections(CaseFile):
     )
 
     def plausible_numbers(self) -> Iterator[Number]:
-        """Masses of rigid parts, the speeds that they begin with, and those at stops."""
+        """Masses of rigid parts, initial speeds, those at stops."""
         for name, part in self.network.components.items():
             if part.type == "rigid-mass":
                 key = ("network", "components", name)

@@ -1,1 +1,1 @@
-"""Arithmetic of quantities as text, with its dimensions; nothing of a text is ever run."""
+"""Arithmetic of quantities as text, with dimensions; nothing is ever run."""

@@ -1,4 +1,4 @@
-"""Dimensions of expressions and of units in them, with angles and cycles told apart."""
+"""Dimensions of expressions and units, with angles and cycles told apart."""
 
 import re
 from collections.abc import Iterable
@@ -42,19 +42,19 @@ _NONE, _ONE = Fraction(0), Fraction(1)
 class Dimension:
     """Powers of the base units of one value.
 
-    Dimension alone tells neither an angle from a ratio nor Hz from 1/s.  Therefore powers of rad
-    and of cycle are kept beside it, with all ways to read a value: pi is a number, pi rad or
-    pi rad per cycle, so that ``pi / 2 - angle`` is an angle and ``2 * pi * frequency`` is a rate,
-    while ``1 - angle`` is nothing and ``frequency`` alone is no rate.  A time is s or s per cycle:
-    its inverse is a rate or a frequency.  Where a unit other than these remains, angle and cycle
-    have no say: ``radius * angle`` is a length.
+    Base units tell neither an angle from a ratio nor Hz from 1/s. Powers of rad and of cycle are
+    therefore kept beside them, with all ways to read a value: pi is a number, pi rad or pi rad per
+    cycle, so that ``pi / 2 - angle`` is an angle and ``2 * pi * frequency`` a rate, while ``1 -
+    angle`` is nothing and ``frequency`` alone no rate. A time is s or s per cycle: its inverse is
+    a rate or a frequency. Where other units remain, angle and cycle do not count: ``radius *
+    angle`` is a length.
 
     Parameters
     ----------
-    powers : tuple of (str, Fraction)
-        Base units with their powers, ordered by name, none of them 0.
-    turns : frozenset of (Fraction, Fraction)
-        Powers of rad and of cycle; several if the value can be read in several ways.
+    powers
+        Base units with non-zero powers, ordered by name.
+    turns
+        Powers of rad and of cycle, one for each way to read the value.
     zero
         True for the number 0, which fits every unit.
     """
@@ -65,12 +65,12 @@ class Dimension:
 
     @property
     def plain(self) -> bool:
-        """Whether no base unit remains: numbers and angles."""
+        """Whether no base unit remains."""
         return not self.powers
 
     @property
     def number(self) -> bool:
-        """Whether this can be read as a number without unit."""
+        """Whether this can be a number without unit."""
         return self.plain and (_NONE, _NONE) in self.turns
 
     def times(self, other: "Dimension") -> "Dimension":
@@ -79,7 +79,7 @@ class Dimension:
         return Dimension(_sum(self.powers, other.powers), _nearest_to_none(turns))
 
     def over(self, other: "Dimension") -> "Dimension":
-        """Dimension of a quotient; one by pi that can be a number is a number."""
+        """Dimension of a quotient; a number by pi may be a number."""
         quotient = self.times(other.to_the(Fraction(-1)))
         return NUMBER if quotient.number and len(other.turns) > 1 else quotient
 
@@ -91,7 +91,7 @@ class Dimension:
         return Dimension(powers, frozenset((a * power, b * power) for a, b in self.turns))
 
     def shared(self, other: "Dimension") -> "Dimension | None":
-        """What two values have in common that are added or compared; None if nothing."""
+        """Common readings of two values that are added or compared, if any."""
         if self.zero:
             return other
         if other.zero:
@@ -104,16 +104,16 @@ class Dimension:
         return Dimension(self.powers, self.turns | other.turns)
 
     def fits(self, unit: str) -> bool:
-        """Whether a value of this dimension is a quantity with this SI unit; ``"-"``: none."""
+        """Whether it can have this SI unit; ``"-"``: none."""
         return self.shared(dimension_of(unit)) is not None
 
     @property
     def _turned(self) -> bool:
-        """Whether angle and cycle matter: numbers, angles, rates, frequencies."""
+        """Whether angle and cycle matter."""
         return self.powers in ((), _PER_SECOND)
 
     def __str__(self) -> str:
-        """Kind and unit as a message says them: ``a force [N]``, or base units: ``kg^2/s``."""
+        """As in messages: ``a force [N]``, or base units: ``kg^2/s``."""
         for kind in KINDS:
             if self == dimension_of(kind.unit):
                 return kind.name if kind.bare else f"{kind.name} [{kind.unit}]"
@@ -142,13 +142,7 @@ class Dimension:
 
 
 def dimension_of(unit: str) -> Dimension:
-    """Dimension of a value whose SI unit has this text; ``"-"`` is a number.
-
-    Raises
-    ------
-    InputError
-        If ``unit`` is unknown or no coherent SI unit.
-    """
+    """Dimension of a coherent SI unit; ``"-"`` is a number."""
     turns = {
         "rad": ((_ONE, _NONE),),
         "Hz": ((_NONE, _ONE),),
@@ -158,7 +152,7 @@ def dimension_of(unit: str) -> Dimension:
 
 
 def _nearest_to_none(turns: set[tuple[Fraction, Fraction]]) -> Turns:
-    """At most 16 ways to read a value: a product of fifty times pi has thousands."""
+    """At most 16 readings: a product of fifty times pi has thousands."""
     order = sorted(turns, key=lambda turn: (abs(turn[0]) + abs(turn[1]), turn))
     return frozenset(order[:16])
 
@@ -184,7 +178,7 @@ HALF_TURN = Dimension(turns=frozenset({(_NONE, _NONE), (_ONE, _NONE), (_NONE, -_
 
 
 CELSIUS = ("degC", "°C")
-"""Units with an offset: a temperature of its own, which cannot be added to another one."""
+"""Units with an offset: a temperature that cannot be added to another."""
 _TABLES = (RATIO, ANGLE, FREQUENCY, RATE, ROTATION)
 _TIME = (("s", Fraction(1)),)
 _FACTOR = re.compile(r"(?P<sign>[*/]?)(?P<word>[^\W\d_]+|[%°])(?:\^(?P<power>-?\d(?:\.\d)?))?")
@@ -194,9 +188,9 @@ UnitLiteral = tuple[float, Dimension]
 
 
 def unit_literal(number: float, unit: str) -> UnitLiteral | None:
-    """Value of a number with its unit; None for an unknown unit.
+    """Value of a number with its unit; None for an unknown one.
 
-    The same number as that of :func:`klack.units.parse_quantity`, to the bit.
+    As :func:`klack.units.parse_quantity`, to the bit.
 
     Examples
     --------
@@ -215,13 +209,13 @@ def unit_literal(number: float, unit: str) -> UnitLiteral | None:
 
 
 def unit_words(unit: str) -> tuple[str, ...]:
-    """Words of a unit: ``N`` and ``mm`` of ``N/mm^2``."""
+    """Words of a unit: ``N``, ``mm`` of ``N/mm^2``."""
     return tuple(match["word"] for match in _FACTOR.finditer(unit))
 
 
 @lru_cache(maxsize=1000)
 def _unit(unit: str) -> tuple[float, Dimension, bool] | None:
-    """Size of a unit in SI, its dimension, and whether its multiples are left unrounded."""
+    """Size in SI, dimension, and whether multiples are left unrounded."""
     plain = unit.replace("**", "^").replace("·", "*")
     for kind in _TABLES:
         if plain in kind.factors:
@@ -235,7 +229,7 @@ def _unit(unit: str) -> tuple[float, Dimension, bool] | None:
 
 
 def _dimension(unit: str) -> Dimension | None:
-    """Product of the dimensions of all words of a unit; None if one is unknown."""
+    """Product over the words of a unit; None if one is unknown."""
     result = NUMBER
     for match in _FACTOR.finditer(unit.replace("1/", "/")):
         own = _word(match["word"])
@@ -248,7 +242,7 @@ def _dimension(unit: str) -> Dimension | None:
 
 @lru_cache(maxsize=1000)
 def _word(word: str) -> Dimension | None:
-    """Dimension of one word, such as ``mm``; None if it is no unit that can be multiplied."""
+    """Dimension of a word such as ``mm``; None if it cannot be multiplied."""
     for kind in (ANGLE, FREQUENCY):
         if word in kind.factors:
             return dimension_of(kind.unit)

@@ -1,7 +1,4 @@
-"""Arithmetic of named parameters, as text: ``"2 * tip_radius"``.
-
-The text is parsed and never run: what is not on the list of allowed parts is an error.
-"""
+"""Arithmetic of named parameters, as text: ``"2 * tip_radius"``; parsed, never run."""
 
 import math
 import operator
@@ -55,22 +52,21 @@ _OF_ANGLE = ("sin", "cos", "tan")
 _TO_ANGLE = ("asin", "acos", "atan")
 
 RESERVED = frozenset({*FUNCTIONS, "pi"})
-"""Names with a meaning of their own, which no parameter can have."""
+"""Names that no parameter can have."""
 
 
 @dataclass(frozen=True, slots=True)
 class Expression:
     """An arithmetic expression of parameters; :meth:`parse` makes it.
 
-    Numbers, also with units (``0.3 mm``), names, ``+ - * / ^`` (``**`` is the same as ``^``),
-    parentheses, ``pi`` and the functions ``sqrt``, ``abs``, ``min``, ``max``, ``exp``, ``ln`` (also
-    ``log``), ``log10``, ``sin``, ``cos``, ``tan`` (of rad), ``asin``, ``acos``, ``atan``.  All
-    values are in SI.
+    Numbers, also with units (``0.3 mm``), names, ``+ - * / ^`` (or ``**``), parentheses, ``pi``
+    and the functions ``sqrt``, ``abs``, ``min``, ``max``, ``exp``, ``ln`` (``log``), ``log10``,
+    ``sin``, ``cos``, ``tan`` (of rad), ``asin``, ``acos``, ``atan``. All values are in SI.
 
     Parameters
     ----------
     names
-        Parameters in it, each once, in the order of the text.
+        Each once, in the order of the text.
     """
 
     text: str
@@ -80,17 +76,7 @@ class Expression:
 
     @classmethod
     def parse(cls, text: str, where: str = "expression") -> "Expression":
-        """Read an expression.
-
-        Parameters
-        ----------
-        text
-            At most 500 characters, 200 parts, 100 levels of nesting.
-
-        Raises
-        ------
-        InputError
-            For anything else than the allowed parts.
+        """Read an expression of at most 500 characters, 200 parts, 100 levels of nesting.
 
         Examples
         --------
@@ -115,21 +101,7 @@ class Expression:
         return cls(squeezed, tuple(names), where, root)
 
     def value(self, values: Mapping[str, float]) -> float:
-        """Compute the value.
-
-        Parameters
-        ----------
-        values [SI]
-
-        Returns
-        -------
-        float [SI]
-
-        Raises
-        ------
-        InputError
-            If a name has no value, or where the result or a part of it is not a finite real
-            number.
+        """Compute the value; rejects where it or a part of it is not a finite real number.
 
         Examples
         --------
@@ -150,23 +122,10 @@ class Expression:
             ) from None
 
     def unit(self, units: Mapping[str, str]) -> Dimension:
-        """Derive the dimension of the result from the units of its names.
+        """Derive the dimension from SI units of the names (``Kind.unit``; ``"-"`` for a number).
 
-        Parameters
-        ----------
-        units
-            SI unit of every name (``Kind.unit``; ``"-"`` for a number).
-
-        Returns
-        -------
-        Dimension
-            To be compared by :meth:`Dimension.fits` with the unit that is wanted.
-
-        Raises
-        ------
-        InputError
-            If a name has no unit; if quantities of different kinds are added or compared; if a
-            function gets what it cannot take.
+        Rejects sums and comparisons of different kinds, and functions of what they cannot take.
+        Compare the result by :meth:`Dimension.fits`.
 
         Examples
         --------
@@ -178,7 +137,7 @@ class Expression:
         return self.dimension({name: dimension_of(units[name]) for name in self.names})
 
     def dimension(self, known: Mapping[str, Dimension]) -> Dimension:
-        """Derive the dimension of the result from those of its names; see :meth:`unit`."""
+        """Derive the dimension from those of the names; see :meth:`unit`."""
         self._require_names(known)
         return _dimension(self._root, known, self)
 
@@ -188,7 +147,7 @@ class Expression:
                 raise _unknown(self, name, known)
 
     def require_clear(self, known: Collection[str]) -> None:
-        """Raise where a word behind a number can be a unit and one of the known names."""
+        """Reject a word behind a number that can be a unit and a known name."""
         for literal in nodes(self._root):
             for word in literal.words:
                 refuse_if(
@@ -205,23 +164,14 @@ class Expression:
 def ordered(expressions: Mapping[str, Expression], known: Collection[str]) -> tuple[str, ...]:
     """Order expressions so that each comes after those that it refers to.
 
+    Rejects unknown, double and reserved names, and circles.
+
     Parameters
     ----------
     expressions
-        Each under the name that others refer to it by.
+        By the names that others use.
     known
-        Names with a value of their own: the parameters.
-
-    Returns
-    -------
-    tuple of str
-        All keys of ``expressions``.
-
-    Raises
-    ------
-    InputError
-        For a name that is neither an expression nor known, a name that is both or has a meaning of
-        its own (``pi``), and expressions that refer to each other in a circle.
+        Names with values: the parameters.
 
     Examples
     --------
@@ -251,7 +201,7 @@ def ordered(expressions: Mapping[str, Expression], known: Collection[str]) -> tu
 
 
 class _NotANumberError(Exception):
-    """A part of an expression has no finite real value; the text says which."""
+    """A part has no finite real value; the text says which."""
 
 
 def _refuse(where: str, got: str, hint: str) -> NoReturn:
@@ -305,7 +255,7 @@ def _value(node: Node, values: Mapping[str, float]) -> float:
 
 
 def _dimension(node: Node, known: Mapping[str, Dimension], whole: Expression) -> Dimension:
-    """Dimension of a node, or the error that says what does not go together."""
+    """Dimension of a node, or the error of what does not go together."""
     if node.number is not None:
         if node.dimension is not None:
             return node.dimension

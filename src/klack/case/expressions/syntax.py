@@ -45,16 +45,14 @@ class Token:
     Parameters
     ----------
     kind
-        ``"number"``, ``"name"``, or the sign itself; empty at the end.
-    start, end
-        In the text of the expression.
+        ``"number"``, ``"name"``, or the sign; empty at the end.
     number [SI]
     dimension
         Of a number with a unit.
     words
         Of its unit.
     celsius
-        Whether it is a temperature in degrees Celsius.
+        A temperature in degrees Celsius.
     """
 
     kind: str
@@ -70,12 +68,7 @@ class Token:
 def tokens(text: str) -> Iterator[Token]:
     """Words of a text, and an empty one at its end.
 
-    A unit stands behind its number, at most one blank apart, and has no blanks inside: ``5 N/mm``.
-
-    Raises
-    ------
-    UnreadableError
-        For a character, a number or a unit that is none.
+    A unit is at most one blank behind its number, and has no blanks inside: ``5 N/mm``.
 
     Examples
     --------
@@ -105,7 +98,7 @@ def _token(text: str, at: int) -> Token:
 
 
 def _number(text: str, at: int, match: re.Match[str]) -> Token:
-    """Take a number, and the longest unit behind it."""
+    """A number with the longest unit behind it."""
     number, end = float(match[0]), match.end()
     if not math.isfinite(number):
         raise UnreadableError(f"the number '{match[0][:40]}'", at, "write a number below 1e308.")
@@ -144,7 +137,7 @@ _ADVICE = {
     "×": "write * for a product.",
     "−": "write the minus sign of the keyboard: -.",
 }
-"""Remedy for what people write instead, by its first character."""
+"""Remedy for usual mistakes, by first character."""
 
 
 FUNCTIONS = (
@@ -176,14 +169,14 @@ class Node:
     Parameters
     ----------
     place
-        Of its first character in the expression.
+        Of its first character.
     number [SI]
     dimension
         Of a number with a unit.
     words
         Of that unit.
     depth
-        Levels of operations below and with it.
+        Levels of operations, its own included.
     """
 
     text: str
@@ -204,12 +197,12 @@ def nodes(node: Node) -> Iterator[Node]:
 
 
 def syntax_tree(text: str) -> Node:
-    """Tree of an expression.
+    """Tree of an expression of at most 200 allowed parts.
 
     Raises
     ------
     UnreadableError
-        For anything else than the allowed parts, more than 200 of them, and deep nesting.
+        For anything else, and deep nesting.
     """
     return _Parser(text).whole()
 
@@ -352,7 +345,7 @@ class _Parser:
 
     @contextmanager
     def _level(self, start: int) -> Iterator[None]:
-        """One more level of parentheses, signs or powers, as long as it is read."""
+        """One more level of nesting while it is read."""
         self.level += 1
         if self.level > _BRACKETS:
             got = f"more than {_BRACKETS} levels of parentheses, signs and powers"
