@@ -1,4 +1,4 @@
-"""Bodies whose stiffness and mass another program has assembled, as a case names them."""
+"""Bodies whose stiffness and mass another program has assembled."""
 
 import warnings
 from dataclasses import dataclass
@@ -27,12 +27,12 @@ _TURNED = 1e-12
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class AssembledBody:
-    """A body made of given matrices, and what was found out about them.
+    """A body of given matrices, and what was found about them.
 
     Parameters
     ----------
     notes
-        Of the readers: which triangle was stored, where the rows are named, ...
+        Which triangle was stored, where the rows are named, ...
     """
 
     body: ElasticBody
@@ -40,7 +40,7 @@ class AssembledBody:
     notes: tuple[str, ...]
 
     def rows(self) -> tuple[tuple[str, str, str], ...]:
-        """Lines for a table: kind, name, value as text."""
+        """Table lines: kind, name, value as text."""
         lines = [("matrices", what, value) for what, value in self.report.rows]
         return (*lines, *(("matrices", "note", note) for note in self.notes))
 
@@ -51,7 +51,7 @@ def assembled_from_matrices(case: CaseFile, name: str, mesh: Mesh | None) -> Ela
     Warns
     -----
     AccuracyWarning
-        If the numbers of the files are rounded so much that it may be seen.
+        Of visible rounding in the files.
     """
     made = assembled_body(case, name, mesh)
     if made.report.strain > _ROUNDED:
@@ -73,12 +73,7 @@ def assembled_body(case: CaseFile, name: str, mesh: Mesh | None = None) -> Assem
     name
         Of a body with the key ``matrices``.
     mesh
-        Its mesh where the case has placed it, shifted or turned; as drawn without.
-
-    Raises
-    ------
-    InputError
-        For files that cannot be read, that belong to other nodes, or that no elastic body has.
+        As placed by the case; default: as drawn.
     """
     given = case.bodies[name]
     where = f"{case.path or 'case'}: bodies.{name}.matrices"
@@ -113,13 +108,7 @@ def assembled_body(case: CaseFile, name: str, mesh: Mesh | None = None) -> Assem
 
 
 def node_mesh(table: NodeTable, dimension: int, where: str) -> tuple[Mesh, NDArray[np.int64]]:
-    """Mesh of nodes alone, with the sets of a case, and the number of each node.
-
-    Raises
-    ------
-    InputError
-        For a set of nodes that the table does not have.
-    """
+    """Mesh of nodes alone with the sets of a case, and the number of each node."""
     numbers, points = read_node_table(table.file, table.unit, dimension)
     order = np.argsort(numbers)
     sets = {}
@@ -143,7 +132,7 @@ def node_mesh(table: NodeTable, dimension: int, where: str) -> tuple[Mesh, NDArr
 
 
 def _drawn(given: CaseBody, where: str) -> tuple[Mesh, NDArray[np.int64]]:
-    """Mesh in the place where its program has it, and the number of each node."""
+    """Mesh where its program has it, and the number of each node."""
     geometry = given.geometry
     if geometry.mesh is not None:
         mesh = geometry.mesh
@@ -175,7 +164,7 @@ def _turned(
     M: csr_array,
     absent: NDArray[np.int64],
 ) -> tuple[csr_array, csr_array]:
-    """Rotate the matrices with a body tilted by the case: u' = T u, K' = T K T^T."""
+    """Rotate matrices with a tilted body: u' = T u, K' = T K T^T."""
     if mesh.points.shape != drawn.points.shape:
         raise InputError(
             where,

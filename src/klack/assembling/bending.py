@@ -1,4 +1,4 @@
-"""Bending of the axisymmetric bodies of a case: the same half section in Fourier order 1."""
+"""Bending of axisymmetric bodies: the half section in Fourier order 1."""
 
 import warnings
 
@@ -14,13 +14,12 @@ __all__ = ["bending_body"]
 def bending_body(case: CaseFile, name: str, mesh: Mesh) -> FourierBody | None:
     """Body in order 1, held where the case holds it, all round.
 
-    None for a solid, whose modes bend anyway, and for a body from the matrices of another program,
-    which are those of its axial motion alone.
+    None for a solid, whose modes bend anyway, and for given matrices, which are of axial motion.
 
     Warns
     -----
     AccuracyWarning
-        For linear elements, which lock in bending.
+        Of linear elements, which lock in bending.
     """
     body = case.bodies[name]
     if mesh.dimension != 2 or body.matrices is not None:

@@ -71,20 +71,14 @@ _SAFE_SHARE = 0.5  # of the extent of a refinement; the rest is for the width of
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BodyPair:
-    """The two bodies of a case, placed for the start of the motion.
+    """The two bodies of a case, placed for the start of the motion: the moving one is the upper.
 
     Parameters
     ----------
-    upper, lower
-        The moving body and the one that it hits.
-    upper_surface, lower_surface
-        Where they meet.
     pose
-        Where the upper body stands, compared with its drawing.
-    gauges
-        On either body.
+        Of the upper body from its drawing.
     form
-        Of both faces, which their meshes do not have.
+        Of both faces, not in the meshes.
     layer
         Of both faces.
     """
@@ -100,7 +94,7 @@ class BodyPair:
 
     @property
     def shift(self) -> float:
-        """Translation of the upper body along z from where it was drawn [m]."""
+        """Translation of the upper body along z from its drawing [m]."""
         return float(self.pose.shift[2])
 
     @property
@@ -110,7 +104,7 @@ class BodyPair:
 
     @cached_property
     def solids(self) -> tuple[str, str]:
-        """Solids that the upper and the lower surface belong to."""
+        """Solids of the upper and lower surface."""
         return (
             solid_at(self.upper.mesh, self.upper_surface),
             solid_at(self.lower.mesh, self.lower_surface),
@@ -118,7 +112,7 @@ class BodyPair:
 
     @cached_property
     def faces(self) -> tuple[CurvedFaces, CurvedFaces]:
-        """Faces of the upper and of the lower surface, ready to be cut by lines."""
+        """Faces of both surfaces, ready to be cut by lines."""
         return (
             curved_faces(self.upper.mesh, self.upper_surface),
             curved_faces(self.lower.mesh, self.lower_surface),
@@ -126,7 +120,7 @@ class BodyPair:
 
     @cached_property
     def edges(self) -> tuple[SurfaceEdges, SurfaceEdges]:
-        """Edges of the upper and of the lower surface."""
+        """Edges of both surfaces."""
         return (
             surface_edges(self.upper.mesh, self.upper_surface),
             surface_edges(self.lower.mesh, self.lower_surface),
@@ -134,7 +128,7 @@ class BodyPair:
 
     @cached_property
     def sharp_edges(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Edges of the upper and of the lower surface that are corners towards the other one."""
+        """Edges of both surfaces that are corners towards the other."""
         upper, lower = self.edges
         return (
             upper.corners & turned_away(upper, self.lower.mesh, self.lower_surface),
@@ -144,18 +138,16 @@ class BodyPair:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PlacedMeshes:
-    """Meshes of both bodies of a case, placed for the start of the motion; nothing is assembled.
+    """Meshes of both bodies, placed for the start; nothing is assembled.
 
     Parameters
     ----------
-    upper_surface, lower_surface
-        Where they meet.
     pose
-        Where the upper body stands, compared with its drawing.
+        Of the upper body from its drawing.
     form
-        Of both faces, which their meshes do not have.
+        Of both faces, not in the meshes.
     touch
-        First touch of the bodies as drawn; None where no mesh is refined there.
+        As drawn; None where no mesh is refined there.
     """
 
     upper: Mesh
@@ -168,13 +160,7 @@ class PlacedMeshes:
 
 
 def place_meshes(case: Case, progress: Progress) -> PlacedMeshes:
-    """Mesh both bodies and place the upper one.
-
-    Raises
-    ------
-    InputError
-        For geometry or surfaces that cannot be used, and for bodies that penetrate as drawn.
-    """
+    """Mesh both bodies and place the upper one; rejects bodies that penetrate as drawn."""
     _require_surfaces(case)
     progress("mesh", 0.0)
     shapes = require_given_shapes(
@@ -219,14 +205,7 @@ def place_meshes(case: Case, progress: Progress) -> PlacedMeshes:
 
 
 def build_bodies(case: Case, progress: Progress) -> BodyPair:
-    """Mesh both bodies, place the upper one and assemble stiffness and mass.
-
-    Raises
-    ------
-    InputError
-        For geometry, surfaces or supports that cannot be used, and for bodies that penetrate as
-        drawn.
-    """
+    """Mesh and place as :func:`place_meshes`, and assemble stiffness and mass."""
     placed = place_meshes(case, progress)
     moving, stop = case.contact.moving, case.contact.stop
     upper, lower, pose = placed.upper, placed.lower, placed.pose
@@ -259,7 +238,7 @@ def _require_surfaces(case: Case) -> None:
 
 
 def _places_of_moving_body(case: Case, touch: Touch | None) -> Places:
-    """Where the moving body first touches either stop, as drawn."""
+    """First touches of the moving body with either stop, as drawn."""
     places = touch.upper if touch else ()
     if case.opposite is not None:
         stop, moving = case.opposite.stop, case.opposite.moving
@@ -273,7 +252,7 @@ def _places_of_moving_body(case: Case, touch: Touch | None) -> Places:
 def named_contact(
     case: CaseFile, key: Key, upper: SurfaceName, lower: SurfaceName
 ) -> Iterator[None]:
-    """Tell errors of two surfaces that do not meet with their place in the case, and bodies."""
+    """Give errors of surfaces that do not meet their place in the case."""
     try:
         yield
     except InputError as error:
@@ -290,7 +269,7 @@ def named_contact(
 def find_touch(
     bodies: Mapping[str, CaseBody], upper: SurfaceName, lower: SurfaceName
 ) -> Touch | None:
-    """Find where two surfaces first touch; None when neither body asks for a refinement there."""
+    """First touch of two surfaces; None where neither body is refined there."""
     pair = (bodies[upper.body], bodies[lower.body])
     extents = [body.mesh.contact.extent for body in pair if body.mesh and body.mesh.contact]
     if not extents:
@@ -312,12 +291,12 @@ def find_touch(
 
 
 def assemble_body(case: CaseFile, name: str, mesh: Mesh) -> ElasticBody:
-    """Stiffness and mass of a body of the case, assembled here or given, with its supports.
+    """Stiffness and mass of a body, assembled or given, with its supports.
 
     Warns
     -----
     AccuracyWarning
-        About materials that no solid has (:attr:`klack.materials.material.Material.question`).
+        Of materials that no solid has (:attr:`klack.materials.material.Material.question`).
     """
     body = case.bodies[name]
     if body.matrices is not None:
@@ -330,7 +309,7 @@ def assemble_body(case: CaseFile, name: str, mesh: Mesh) -> ElasticBody:
 
 
 def with_size(case: C, name: str, size: float) -> C:
-    """The same case with another general element size [m] of a body."""
+    """Same case with another general element size [m] of a body."""
     body = case.bodies[name]
     if body.mesh is None:
         return case
@@ -348,11 +327,11 @@ def mesh_body(
 
     Parameters
     ----------
-    places : tuple of (r, z) or (x, y, z) [m], optional
-        Where it is refined.  Without, a first mesh to look at: finer than asked for where its
-        elements would be poor.
+    places [m]
+        Of refinements.  Without, a first mesh to look at: finer than wanted where its elements
+        would be poor.
     places_at
-        The places that a case with another general size [m] would have.
+        Places of a case with another general size [m].
     """
     geometry = body.geometry
     if geometry.nodes is not None:
@@ -397,7 +376,7 @@ def _meshed(
     places: Places | None,
     places_at: Callable[[float], Places] | None,
 ) -> Mesh:
-    """Mesh a body in the sizes of its case; without places, a first mesh."""
+    """Mesh in the sizes of the case; without places, a first mesh."""
     if places is None:
         with suppress(PoorElementError):  # the message comes from below
             return coarsest_sound(_sizing(settings, ()), mesher)
@@ -414,7 +393,7 @@ def _meshed(
 def wanted_sizes(
     bodies: Mapping[str, CaseBody], places: Mapping[str, Places]
 ) -> dict[str, MeshSizing]:
-    """Element sizes of the bodies that klack meshes, refined at places (r, z) or (x, y, z)."""
+    """Element sizes of the bodies that klack meshes, refined at places."""
     return {
         name: _sizing(settings, own)
         for name, own in places.items()
@@ -456,7 +435,7 @@ def _sizing(settings: MeshSettings, places: Places) -> MeshSizing:
 def _shift(
     case: Case, upper: Mesh, surface: Surface, lower: Mesh, other: Surface, form: FaceForm | None
 ) -> float:
-    """Find the translation of the upper body along z [m] that gives the gap of the case."""
+    """Translation of the upper body along z [m] to the gap of the case."""
     if case.contact.gap is not None:
         return touching_shift(upper, surface, lower, other, form) + case.contact.gap
     distance = axial_distance(upper, surface, lower, other)
@@ -475,8 +454,8 @@ def _pose(
 ) -> tuple[Pose, FaceForm | None]:
     """Tilt the upper body, shift it sideways, and move it along z to the gap of the case.
 
-    The form of its face goes with it.  Axisymmetric bodies stay on the axis: off it, their gaps are
-    those of :mod:`klack.assembling.off_axis`.
+    With the form of its face. Axisymmetric bodies stay on the axis, see
+    :mod:`klack.assembling.off_axis`.
     """
     placement = case.motion.placement
     about, aside, lean = np.zeros(3), np.zeros(3), np.zeros(3)
@@ -498,7 +477,7 @@ def _towards(angle: float) -> np.ndarray:
 def _touch_height(
     upper: Mesh, surface: Surface, lower: Mesh, other: Surface, touch: Touch | None
 ) -> float:
-    """Height z [m] in the drawing of the upper body where it touches first when centred."""
+    """Height z [m] of first touch when centred, in the drawing of the upper body."""
     if touch is None or not touch.upper:
         width = min(
             float(np.max(np.ptp(mesh.points[of.nodes][:, :2], axis=0)))
@@ -518,7 +497,7 @@ def _check_refinement(
     pose: Pose,
     form: FaceForm | None,
 ) -> None:
-    """Warn when the placement carries the first touch away from where the meshes are fine."""
+    """Warn when the first touch leaves the fine meshes."""
     if case.motion.placement.is_centred or touch is None or not touch.upper:
         return
     if upper.dimension == 2:  # where they touch off-axis, the contact points on rings tell
@@ -547,14 +526,9 @@ def warn_far_touch(name: str, away: float, extent: float) -> None:
     Parameters
     ----------
     away [m]
-        From the place of the refinement.
+        From the refinement.
     extent [m]
         Of the refinement.
-
-    Warns
-    -----
-    AccuracyWarning
-        Where that is so.
     """
     if away > _SAFE_SHARE * extent:
         warnings.warn(

@@ -21,12 +21,12 @@ class BodySummary:
     Parameters
     ----------
     name, model, source, support, material
-        ``model`` is ``"3-D"`` or ``"axisymmetric"``; ``source`` says where the geometry came from.
+        ``model`` is ``"3-D"`` or ``"axisymmetric"``, ``source`` that of the geometry.
     mass [kg]
     frequencies [Hz]
-        Elastic eigenfrequencies that the reduction keeps, lowest first.
+        Elastic, kept, lowest first.
     compliance_share [-]
-        Share of the static compliance at the contact that the kept modes carry.
+        Share of the static compliance at the contact in the kept modes.
     """
 
     name: str
@@ -45,7 +45,7 @@ class BodySummary:
 def summarise_body(
     case: CaseFile, body: ElasticBody, reduced: ReducedBody, *, compliance_share: float
 ) -> BodySummary:
-    """Summary of a body; the share is that of the kept modes at its contact."""
+    """Summary of a body; the share is that of the kept modes."""
     given = case.bodies[body.name]
     geometry = given.geometry
     if geometry.mesh is not None:

@@ -1,9 +1,8 @@
-r"""Candidate points of a contact and their compliance, kept for impacts that reach as far.
+"""Candidate points of a contact and their compliance, kept for impacts that reach as far.
 
-How far the candidates have to reach depends on speed and force; the compliance of the bodies at
-each of them does not.  So the reach goes up in grades, :math:`2^{k/4}` micrometres, and the
-compliance is condensed grade by grade: what was found for a far reach holds every shorter one, to
-the last bit, and an impact that reaches no further takes it from there.
+The reach depends on speed and force; the compliance at the points does not. So the reach rises in
+grades, :math:`2^{k/4}` micrometres, and the compliance is condensed grade by grade: that of a far
+reach holds every shorter one, to the last bit.
 """
 
 from collections.abc import Sequence
@@ -22,21 +21,21 @@ from klack.contact.worn_faces import WornFaces, opened_by
 __all__ = ["Candidates", "CondensedSpace", "grade_of", "reach_of"]
 
 _STEPS = 4
-"""Grades for twice the reach: the mean of them is 9 % farther than needed."""
+"""Grades for twice the reach: on average 9 % farther than needed."""
 
 _UNIT = 1e-6  # [m]
 
 _FIRST_POINTS = 48
-"""The first estimate of the compliance loads the points that touch first."""
+"""Points touching first that the first estimate loads."""
 
 _FIRST_GROUP = 64
-"""Fewest points of the first group, which are solved for at once."""
+"""Fewest points of the first group, solved for at once."""
 
 Array = NDArray[np.float64]
 
 
 def grade_of(reach: float) -> int:
-    """First grade that reaches as far as ``reach`` [m]."""
+    """First grade that reaches ``reach`` [m]."""
     return ceil(_STEPS * log2(reach / _UNIT))
 
 
@@ -53,12 +52,7 @@ def reach_of(grade: int) -> float:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CondensedSpace:
-    """Contact points, and the static compliance of each body there.
-
-    Parameters
-    ----------
-    upper, lower (nc, nc) [m/N]
-    """
+    """Contact points, and the static compliance of each body there, (nc, nc) [m/N]."""
 
     space: ContactSpace
     upper: Array
@@ -72,7 +66,7 @@ class CondensedSpace:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Kept:
-    """Compliances of the farthest reach of one slave side so far."""
+    """Compliances of the farthest reach of one slave side."""
 
     grade: int
     nodes: NDArray[np.int64]
@@ -81,13 +75,7 @@ class _Kept:
 
 
 class Candidates:
-    """Candidate points of two surfaces.
-
-    Parameters
-    ----------
-    pair
-        Only meshes, surfaces and their form matter; they need not touch.
-    """
+    """Candidate points of two surfaces, which need not touch."""
 
     def __init__(self, pair: BodyPair, upper: Flexibility, lower: Flexibility) -> None:
         self.pair, self._upper, self._lower = pair, upper, lower
@@ -99,10 +87,9 @@ class Candidates:
     def first(
         self, reach: float | None, worn: WornFaces | None = None
     ) -> tuple[ContactSpace, float]:
-        """Candidates up to a reach, or as many as are cheap, and the compliance of the nearest.
+        """Candidates up to a reach, or as many as are cheap, and a compliance [m/N].
 
-        The compliance [m/N] is the axial one of both bodies under pressure on the points that
-        touch first.
+        It is the axial one of both bodies under pressure on the points that touch first.
         """
         if worn is not None:
             space = opened_by(self.first(reach)[0], worn)
@@ -139,7 +126,7 @@ class Candidates:
         return found
 
     def _first_grade(self) -> int:
-        """Grade from which on the points are in groups: the same for every reach."""
+        """Grade from which points are in groups, for every reach."""
         if self._least is None:
             entry = np.sort(self.first(None)[0].entry)
             least = float(entry[min(_FIRST_GROUP, len(entry)) - 1])
@@ -171,7 +158,7 @@ class Candidates:
 
 
 def _groups(space: ContactSpace, first: int, last: int) -> Sequence[NDArray[np.int64]]:
-    """Points by the grade at which they become candidates, those up to the first one together."""
+    """Points by grade, those up to the first one together."""
     entry = np.maximum(space.entry, 1e-6 * _UNIT)
     grade = np.ceil(_STEPS * np.log2(entry / _UNIT)).astype(int).clip(first, max(first, last))
     groups = [np.flatnonzero(grade == one) for one in range(first, max(first, last) + 1)]

@@ -1,4 +1,4 @@
-"""Form and roughness of the faces of a case on its meshes: do they fit there, of what are they."""
+"""Form and roughness of the faces of a case on its meshes."""
 
 from math import nan
 
@@ -22,18 +22,10 @@ _PER_WAVE = 4.0
 def form_of_faces(
     case: Case, upper: Mesh, surface: Surface, lower: Mesh, other: Surface
 ) -> FaceForm | None:
-    """Form of both faces, centred on the smaller one; None where the case gives none.
+    """Form of both faces, centred on the smaller one, if any.
 
-    Parameters
-    ----------
-    upper, surface, lower, other
-        Meshes and named surfaces that meet, the upper one where it is at the start but for its
-        height.
-
-    Raises
-    ------
-    InputError
-        For a crown that is deep against its face, and for waves that the elements do not resolve.
+    Rejects a crown that is deep against its face, and waves that the elements do not resolve.  The
+    upper mesh is where it starts but for its height.
     """
     contact = case.contact
     if not contact.has_form:
@@ -58,13 +50,7 @@ def form_of_faces(
 def layer_of_faces(
     case: Case, upper: Mesh, surface: Surface, lower: Mesh, other: Surface
 ) -> AsperityLayer | None:
-    """Layer of asperities between both faces; None where the case gives none.
-
-    Raises
-    ------
-    InputError
-        For summits on a body whose material is only in matrices.
-    """
+    """Layer of asperities between both faces, if any; rejects summits on a body of matrices."""
     rough = case.contact.roughness
     if rough is None:
         return None
@@ -96,7 +82,7 @@ def layer_of_faces(
 
 
 def _extent(points: NDArray[np.float64]) -> tuple[tuple[float, float], float]:
-    """Middle of a face (x, y) and the distance of its outermost point [m]."""
+    """Middle of a face (x, y), distance of its outermost point [m]."""
     if points.shape[1] == 2:
         return (0.0, 0.0), float(points[:, 0].max())
     middle = (points[:, :2].min(axis=0) + points[:, :2].max(axis=0)) / 2.0

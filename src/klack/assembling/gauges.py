@@ -18,17 +18,12 @@ Floats = NDArray[np.float64]
 
 
 def place_gauges(case: Case, bodies: Mapping[str, tuple[Mesh, Pose | None]]) -> tuple[Gauge, ...]:
-    """Place the outputs of a case on the bodies where these stand.
+    """Place the outputs of a case on its bodies.
 
     Parameters
     ----------
-    bodies : mapping of body name to (Mesh, Pose or None)
-        Mesh in its place, and how it came there from its drawing; None where it was not moved.
-
-    Raises
-    ------
-    InputError
-        For a gauge outside of its body, with the distance and the nearest point of the body.
+    bodies
+        Mesh in its place, and how it came there from its drawing, or None.
     """
     gauges = []
     for output in case.outputs:
@@ -71,14 +66,14 @@ def _line(case: Case, output: CaseOutput, mesh: Mesh, pose: Pose | None) -> Line
 
 
 def placed_point(at: Floats, pose: Pose | None) -> Floats:
-    """Where a point of the drawing is, shape (2,) or (3,) [m]; the same without a pose."""
+    """Place of a point of the drawing, shape (2,) or (3,) [m]."""
     if pose is None:
         return at
     return at + pose.shift[2] * np.array([0.0, 1.0]) if len(at) == 2 else pose.of(at)
 
 
 def _words(output: CaseOutput) -> str:
-    """For example ``along z over 3 mm at (10, -1260) mm``."""
+    """As ``along z over 3 mm at (10, -1260) mm``."""
     along = "around" if output.direction == AROUND else f"along {_direction(output)}"
     over = f" over {1e3 * output.length:.6g} mm" if output.length else ""
     return f"{along}{over} at ({', '.join(f'{1e3 * x:.6g}' for x in output.at)}) mm"

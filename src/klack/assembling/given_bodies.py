@@ -1,4 +1,4 @@
-"""Bodies that another program has assembled or reduced, as the case names them."""
+"""Bodies that another program has assembled or reduced."""
 
 import warnings
 from collections.abc import Sequence
@@ -32,18 +32,9 @@ _SAME_UNIT = 1e-3
 
 
 def reduced_from_file(case: CaseFile, name: str) -> ReducedBody:
-    """Read the reduced model of a body and convert it, its ports named as in the case.
+    """Reduced model of a body with the key ``reduced``, its ports named as in the case.
 
-    Parameters
-    ----------
-    name
-        Of a body with the key ``reduced``.
-
-    Raises
-    ------
-    InputError
-        For a file that cannot be read, ports that it does not have, and models that are unstable,
-        not reciprocal or not passive.
+    Rejects models that are unstable, not reciprocal or not passive.
     """
     model = case.bodies[name].reduced
     if model is None:
@@ -66,7 +57,7 @@ def reduced_from_file(case: CaseFile, name: str) -> ReducedBody:
 
 
 def _damped(case: CaseFile, body: ReducedBody, loss: Damping) -> ReducedBody:
-    """Add the damping of the case, unless the model has its own."""
+    """Add the damping of the case to a model without."""
     ratios = loss.ratios(body.omega)
     if not np.any(ratios) or np.array_equal(ratios, body.damping):
         return body
@@ -204,7 +195,7 @@ def _fitted(
     weights: NDArray[np.float64],
     compliance: float,
 ) -> NDArray[np.float64] | None:
-    """Residual compliance between the ports [m/N]; None if a response is not there."""
+    """Residual compliance between the ports [m/N]; None where a response is missing."""
     found = {}
     omega = np.where(held.frequency < RIGID_FREQUENCY, 0.0, 2.0 * np.pi * held.frequency)
     used = [int(i) for i in np.flatnonzero(np.any(weights, axis=1))]
@@ -251,7 +242,7 @@ def _check_units(model: ReducedModel, held: FileModalData) -> None:
 
 
 def _weights(model: ReducedModel, port: ModelPort, held: FileModalData) -> NDArray[np.float64]:
-    """Share of every column in a port: one column, or the mean of several nodes."""
+    """Share of every column in a port: one column, or several nodes."""
     picked = _columns(model, port.input, held)
     if port.output is not None and _columns(model, port.output, held) != picked:
         raise InputError(
@@ -288,7 +279,7 @@ def _columns(model: ReducedModel, place: int | str, held: FileModalData) -> list
 def _position(
     model: ReducedModel, port: ModelPort, side: str, names: Sequence[str], count: int
 ) -> int:
-    """Index of a force or displacement that a port names; a displacement defaults to the force."""
+    """Index of a port's force or displacement; by default that of the force."""
     if side == "input" or port.output is None:
         return _index(model, port.input, names, count, side)
     return _index(model, port.output, names, count, side)

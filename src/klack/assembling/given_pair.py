@@ -31,14 +31,12 @@ __all__ = ["GivenPair", "build_given_pair"]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class GivenPair:
-    """Both bodies reduced at their ports, the law between them, and their residual compliance.
+    """Both bodies reduced at their ports, with a law.
 
     Parameters
     ----------
-    law : LinearLaw or HertzLaw
-        Of the contact zone, as the case gives it.
     series_compliance [m/N]
-        What the modes of both bodies miss, in series with the law.
+        Residual compliance of both, in series with the law.
     """
 
     upper: ReducedBody
@@ -50,7 +48,7 @@ class GivenPair:
 
     @property
     def modal_compliance(self) -> float:
-        """Static compliance of both bodies in their modes [m/N]."""
+        """Static compliance of both in their modes [m/N]."""
         sides = zip((self.upper, self.lower), self.ports, strict=True)
         return sum(_at_port(body.modal_compliance, body, port) for body, port in sides)
 
@@ -69,13 +67,8 @@ class GivenPair:
 def build_given_pair(case: Case, progress: Progress, *, threads: int | None = None) -> GivenPair:
     """Read, assemble and reduce both bodies of a case without common surfaces.
 
-    A body that klack reduces keeps the modes that the case asks for; its port is a uniform axial
-    traction on the surface, or equal weights of the nodes of a set.
-
-    Raises
-    ------
-    InputError
-        For files that cannot be used, and a supported moving body.
+    Ports of a body that klack reduces: a uniform axial traction on a surface, or equal weights of
+    the nodes of a set. Rejects a supported moving body.
     """
     sides, missing = [], 0.0
     for i, surface in enumerate(case.contact.between):

@@ -1,8 +1,7 @@
-"""Shapes that a case names, looked into before anything is meshed: surfaces, size, mass, effort.
+"""Shapes that a case names, checked before meshing: surfaces, size, mass, effort.
 
-What a STEP file or a mesh does not have is told at once, and a length in the wrong unit is asked
-about here: a STEP file in metres is a needle of 19 m, which only the memory of the machine would
-notice.  The numerics themselves know no scale.
+A STEP file in the wrong unit is a needle of 19 m, which only the memory of the machine would
+notice: the numerics have no scale.
 """
 
 import json
@@ -39,7 +38,7 @@ _ALIKE = 0.1  # relative; how exactly a size is confirmed
 
 
 class GivenShape(NamedTuple):
-    """Names of the surfaces, longest side of the box around the shape [m], and volume [m^3]."""
+    """Surfaces, longest side of the box [m], and volume [m^3]."""
 
     surfaces: tuple[str, ...]
     extent: float
@@ -49,30 +48,19 @@ class GivenShape(NamedTuple):
 def require_given_shapes(
     case: CaseFile, read: Callable[[str], Mesh], progress: Progress = silent
 ) -> dict[str, GivenShape]:
-    """Check the surfaces that a case names in files, and the sizes and masses of its bodies.
+    """Check surfaces, sizes and masses of the bodies that a case names in files.
+
+    As :func:`require_usual_sizes`; ``progress`` is told doubts at once.
 
     Parameters
     ----------
     read
-        Reads the finished mesh, or the nodes, of a body by its name.
-    progress
-        Told what is in doubt, at once.
-
-    Returns
-    -------
-    dict of str to GivenShape
-        Of the bodies that have one.
-
-    Raises
-    ------
-    InputError
-        For a surface that a file does not have, with its key in the case; for a size that asks
-        for a confirmation, see :func:`require_usual_sizes`.
+        Finished mesh, or nodes, of a body by name.
 
     Warns
     -----
     AccuracyWarning
-        About unusual sizes and masses.
+        Of unusual sizes and masses.
     """
     shapes: dict[str, GivenShape] = {}
     for name, body in case.bodies.items():
@@ -90,7 +78,7 @@ def require_given_shapes(
 
 
 def _tell(doubt: str, progress: Progress) -> None:
-    """Say it now, before long work, and with the result."""
+    """Say it before long work, and with the result."""
     remark(progress, f"note: {doubt}")
     warnings.warn(doubt, AccuracyWarning, stacklevel=3)
 
@@ -109,7 +97,7 @@ def _size_doubts(case: CaseFile, shapes: Mapping[str, GivenShape]) -> Iterator[s
 
 
 def _mass_doubts(case: CaseFile, shapes: Mapping[str, GivenShape]) -> Iterator[str]:
-    """Of the body that moves, with the mean density of its solids."""
+    """Of the moving body, by the mean density of its solids."""
     name = case.contact.moving.body if isinstance(case, Case) else ""
     given = case.bodies[name].material if name in shapes else None
     if given is None:
@@ -130,20 +118,12 @@ def tell_effort(
     sizings: Mapping[str, MeshSizing],
     progress: Progress,
 ) -> None:
-    """Say before the meshing what a large mesh takes.
-
-    Parameters
-    ----------
-    shapes : mapping of body to GivenShape
-    sizings : mapping of body to MeshSizing
-        Of the bodies that klack meshes.
-    progress
-        Told at once.
+    """Say before meshing what a large mesh takes.
 
     Warns
     -----
     AccuracyWarning
-        With nodes, time and memory, where a run takes more than a quarter of an hour.
+        With nodes, time and memory, of a run longer than a quarter of an hour.
     """
     nodes = {
         name: _nodes(case.bodies[name], shapes[name], sizing) for name, sizing in sizings.items()
@@ -178,17 +158,13 @@ def _nodes(body: CaseBody, shape: GivenShape, sizing: MeshSizing) -> float:
 def require_usual_sizes(case: CaseFile, extents: Mapping[str, float]) -> None:
     """Require confirmation of sizes that suggest another unit of length.
 
+    The largest body is above 1 m or below 0.1 mm, or two of them differ 100-fold;
+    ``geometry.extent``, which must then be true, or ``unusual`` confirm it.
+
     Parameters
     ----------
     extents [m]
         Longest side of the box around each body.
-
-    Raises
-    ------
-    InputError
-        If the largest body is above 1 m or below 0.1 mm, or two of them differ 100-fold, and the
-        case does not confirm it, by ``geometry.extent`` or as a whole by ``unusual``; or if the
-        extent is not what the shape has.
     """
     for name, extent in extents.items():
         said = case.bodies[name].geometry.extent
@@ -251,14 +227,14 @@ def _extent_of(profiles: Mapping[str, Profile]) -> float:
 
 
 def _longest(points: np.ndarray, dimension: int) -> float:
-    """Longest side of a box around points; a half section is turned to its diameter."""
+    """Longest side of a box around points; a half section is turned."""
     if dimension == 2:
         return float(max(2.0 * np.max(np.abs(points[:, 0])), np.ptp(points[:, 1])))
     return float(np.max(np.ptp(points, axis=0)))
 
 
 def _step_shape(path: Path) -> GivenShape:
-    """Faces and size of a STEP file; what is in it counts, not its name or its date."""
+    """Faces and size of a STEP file, cached by content."""
     return remembered(
         result_cache() if path.is_file() else None,
         "shape",

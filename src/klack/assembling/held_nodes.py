@@ -18,28 +18,20 @@ def surface_nodes(mesh: Mesh, surface: str) -> NDArray[np.int64]:
 def sector_nodes(
     mesh: Mesh, surface: str, count: int, width_rad: float, first_rad: float = 0.0
 ) -> NDArray[np.int64]:
-    """Nodes of a surface within equal sectors around the z axis, for a body held at a few places.
+    """Sorted nodes of a surface in equal sectors around z, for a body held at a few places.
+
+    Rejects overlapping sectors, and those without a node; nodes on the axis are in none.
 
     Parameters
     ----------
     mesh
         Of dimension 3.
     count
-        Number of sectors, spread evenly over the circumference.
+        Of sectors, evenly spread.
     width_rad [rad]
-        Angle that each sector covers.
+        Of each.
     first_rad [rad]
-        Angle of the middle of the first sector, from the x axis towards y.
-
-    Returns
-    -------
-    int array
-        Sorted node numbers; nodes on the axis belong to no sector.
-
-    Raises
-    ------
-    InputError
-        For an axisymmetric mesh, sectors that overlap, or a sector without a node.
+        Middle of the first, from x towards y.
     """
     if mesh.dimension != 3:
         raise InputError(
@@ -83,13 +75,7 @@ def sector_nodes(
 
 
 def held_nodes(body: CaseBody, mesh: Mesh) -> NDArray[np.int64]:
-    """Sorted nodes of all supports: surfaces, sectors of surfaces, or sets of nodes alone.
-
-    Raises
-    ------
-    InputError
-        For a surface that the mesh does not have.
-    """
+    """Sorted nodes of all supports: surfaces, sectors, or sets of nodes."""
     held = [np.empty(0, dtype=np.int64)]
     for support in body.fixed or ():
         sectors = support.sectors

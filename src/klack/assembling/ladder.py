@@ -28,19 +28,19 @@ _HELD = 0.98
 
 
 def effective_mass(pair: BodyPair) -> float:
-    """Mass [kg] whose kinetic energy at the closing speed an impact can use."""
+    """Mass [kg] whose energy at the closing speed an impact can use."""
     masses = [body.mass for body in (pair.upper, pair.lower) if not body.is_fixed]
     return 1.0 / sum(1.0 / m for m in masses)
 
 
 def closing_force(case: Case) -> float:
-    """Outside force that presses the bodies together [N]."""
+    """Outside force on the bodies [N]."""
     spring = case.motion.spring
     return max(case.motion.force + (spring.preload if spring else 0.0), 0.0)
 
 
 def impact_energy(case: Case, pair: BodyPair) -> float:
-    """Bound of the energy at first touch [J]: kinetic energy and work of closing forces."""
+    """Bound of the energy at first touch [J], work of closing forces included."""
     kinetic = 0.5 * effective_mass(pair) * case.motion.speed**2
     gap, spring = case.contact.gap or 0.0, case.motion.spring
     stored = 0.5 * spring.stiffness * gap**2 if spring else 0.0
@@ -61,13 +61,11 @@ def static_ladder(
     Parameters
     ----------
     energy [J]
-        That the contact must be able to store.
+        To be stored by the contact.
     closing [N]
         Force that keeps working while the bodies approach.
     reach [m]
-        Largest gap of candidate points; found when None.
-    worn
-        None for faces as made.
+        Largest gap of candidates; default: found.
     """
     progress("static contact", 0.0)
     _, compliance = candidates.first(reach, worn)
@@ -94,7 +92,7 @@ def static_ladder(
 
 
 def wider_space(pair: BodyPair, space: ContactSpace) -> ContactSpace:
-    """Contact points of the same surfaces with twice the reach; it ends with whole surfaces."""
+    """Contact points with twice the reach, up to whole surfaces."""
     return contact_space(
         pair.upper.mesh,
         pair.upper_surface,
@@ -114,10 +112,9 @@ def _ladder(
     closing: float,
     force: float,
 ) -> StaticContact:
-    """Static contact up to a force above that of a quasi-static impact of this energy.
+    """Static contact beyond the force of a quasi-static impact of this energy.
 
-    The closing force keeps working while the bodies approach: the turning point is where the
-    stored energy has reached ``energy + closing * approach``.
+    The turning point is where the stored energy is ``energy + closing * approach``.
     """
     ladder = ContactLadder(space, C, layer)
     refused: ReachError | None = None

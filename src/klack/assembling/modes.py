@@ -35,7 +35,7 @@ __all__ = [
 
 
 PARTICIPATION_POOL = 100
-"""Modes of each body from which the level ``reduced-participation`` chooses."""
+"""Modes of each body for the level ``reduced-participation``."""
 
 _PARTICIPATING = (8, 20)  # of the upper and of the lower body
 
@@ -52,10 +52,9 @@ def selection_of(choice: ModeChoice) -> ModeSelection:
 def mode_pools(
     placed: PlacedBodies, *, at_least: int, rough: int = 0, progress: Progress
 ) -> Mapping[str, Modes]:
-    """Elastic modes of all bodies: as many as the case needs, and no fewer than ``at_least``.
+    """Elastic modes of all bodies: as many as the case needs, at least ``at_least``.
 
-    With ``rough`` they have so many for an estimate, as of
-    :func:`klack.bodies.elasticity.eigen.eigenmodes`.
+    ``rough`` as of :func:`klack.bodies.elasticity.eigen.eigenmodes`.
     """
     bodies = [placed.pair.upper, placed.pair.lower]
     flexibilities = [placed.flexibility_upper, placed.flexibility_lower]
@@ -89,7 +88,7 @@ def mode_pool(
     at_least: int = 1,
     rough: int = 0,
 ) -> Modes:
-    """Elastic modes of a body that a selection can choose from, ``rough`` as in mode_pools."""
+    """Elastic modes of a body for a selection; as :func:`mode_pools`."""
     count = at_least
     if isinstance(choice, ByCount):
         count = max(count, choice.count)
@@ -113,9 +112,8 @@ def kept_modes(
 
     Parameters
     ----------
-    pools : mapping of body name to Modes
-    ports : pair of Port, optional
-        Contact ports, for modes chosen by participation; near the highest force without.
+    ports
+        For modes chosen by participation; default: near the highest force.
     """
     if ports is None:
         loads = problem.static.load_patterns(0.7 * problem.static.max_force)
@@ -130,7 +128,7 @@ def kept_modes(
 
 
 def participating(pair_names: tuple[str, str]) -> dict[str, ModeSelection]:
-    """The 8 + 20 modes of 100 that carry most of the compliance at the contact."""
+    """The 8 + 20 modes of 100 with most compliance at the contact."""
     return {
         name: ByParticipation(count, PARTICIPATION_POOL)
         for name, count in zip(pair_names, _PARTICIPATING, strict=True)
@@ -148,14 +146,10 @@ _FRACTION = 0.6180339887498949  # of the golden section: no two nodes get nearly
 
 
 def shape_marks(shapes: Floats) -> Floats:
-    """Sum of each shape with fixed weights between -1 and 1, shape (m,).
+    """Sum of each shape (n_dof, m) with fixed weights between -1 and 1, shape (m,).
 
-    A mode may come out with the other sign, and a pair of equal frequencies turned, where it is
-    computed anew with other libraries; modal coordinates of before then belong to other shapes.
-
-    Parameters
-    ----------
-    shapes (n_dof, m)
+    Other libraries may turn the sign of a mode, or a pair of equal frequencies; former modal
+    coordinates then belong to other shapes.
     """
     weights = 2.0 * ((1.0 + np.arange(len(shapes))) * _FRACTION % 1.0) - 1.0
     return np.asarray(weights @ shapes)
@@ -171,5 +165,5 @@ def damping_of(damping: BodyDamping) -> Damping:
 
 
 def is_damped(case: Case, name: str) -> bool:
-    """Whether a case gives a body any damping."""
+    """Whether a body has damping."""
     return bool(damping_of(case.bodies[name].damping).ratios([1.0])[0] > 0.0)

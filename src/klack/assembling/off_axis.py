@@ -1,7 +1,6 @@
-"""Bodies of revolution that meet off their axis: contact points on rings, bodies in all orders.
+"""Bodies of revolution that meet off-axis: points on rings, bodies in all orders.
 
-The bodies of the case stay centred, in the meridian plane.  Its placement enters with the gaps,
-which are those of the surfaces where the moving body is.
+Bodies stay centred in the meridian plane; the placement enters with the gaps of the surfaces.
 """
 
 import warnings
@@ -60,7 +59,7 @@ def ring_contacts(
     """Contact points on rings with the moving body where the case places it.
 
     It is tilted about the point of its axis at the height of first touch, shifted aside, and moved
-    along z until the first weighted gap is that of the case.
+    along z to the gap of the case.  Rejects a contact around the axis.
 
     Parameters
     ----------
@@ -69,17 +68,7 @@ def ring_contacts(
     count
         Angles of every ring.
     reach [m]
-        Largest gap of a contact point, counted from the smallest one.
-
-    Returns
-    -------
-    list of RingContact
-        ``contact``, and ``opposite`` where the case has an upper stop.
-
-    Raises
-    ------
-    InputError
-        For a contact around the axis.
+        Largest gap of a contact point above the smallest.
     """
     pair, above, faces = problem.pair, problem.opposite, problem.case.contact.faces
     space, moved = _on_seat(problem, placement, count, reach)
@@ -122,7 +111,7 @@ def ring_contacts(
 def _on_seat(
     problem: ContactProblem, placement: Placement, count: int, reach: float
 ) -> tuple[RingSpace, Floats]:
-    """Contact points of the seat, and the placement of the moving body from where it is now."""
+    """Contact points of the seat, and placement of the moving body."""
     pair, sides = problem.pair, _sides(problem.pair)
     about = np.array([0.0, 0.0, touch_height(problem.space, of_upper=True)])
     more = _most_change(placement, problem.space)
@@ -141,7 +130,7 @@ def _on_seat(
 def _at_gap(
     gaps: RingGaps, section: ContactSpace, placement: Floats, wanted: float
 ) -> tuple[Floats, Floats]:
-    """Gaps, and placement of body a, moved along z until its first gap along z is ``wanted``."""
+    """Gaps and placement of body a, moved along z until its first gap is ``wanted``."""
     facing = section.axial > 1e-6
     for _ in range(_MOVES):  # points slide along the other surface
         gap = gaps(placement)
@@ -156,13 +145,13 @@ def _at_gap(
 
 
 def _most_change(placement: Placement, space: ContactSpace) -> float:
-    """What no gap changes by more than [m]: its point moves by less, there and along z."""
+    """Bound of the change of any gap [m]: its point moves by less."""
     widest = float(space.points[:, 0].max())
     return 2.0 * (placement.eccentricity + placement.tilt * widest)
 
 
 def _check_refinement(case: Case, section: ContactSpace, gap: Floats) -> None:
-    """Warn when the placement carries the first touch away from where the meshes are fine."""
+    """Warn when the first touch leaves the fine meshes."""
     facing = np.flatnonzero(section.axial > 1e-6)
     lift = gap[facing].min(axis=1) / section.axial[facing]
     centred = section.gap[facing] / section.axial[facing]
@@ -192,17 +181,12 @@ def _rigid_placement(pair: BodyPair, placement: Placement, about: Floats) -> Flo
 
 
 def turning_body(case: CaseFile, name: str, mesh: Mesh) -> Callable[[int], FourierBody]:
-    """Body of the case in any Fourier order, held where the case holds it, all round.
-
-    Raises
-    ------
-    InputError
-        For a body from the matrices of another program, which are those of its axial motion alone.
+    """Body in any Fourier order, held where the case holds it, all round; not of given matrices.
 
     Warns
     -----
     AccuracyWarning
-        For linear elements, which lock in bending.
+        Of linear elements, which lock in bending.
     """
     body = case.bodies[name]
     if body.matrices is not None:
@@ -229,15 +213,15 @@ def turned(
 ) -> RevolvedBody:
     """Body of a case that moves in all Fourier orders.
 
-    It keeps the axial modes and as many others, the lowest of the orders above 0; where the case
-    gives a highest frequency, all others up to it.
+    It keeps the axial modes and as many others, the lowest of the orders above 0, or all others up
+    to a highest frequency of the case.
 
     Parameters
     ----------
     body
         Half section.
     axial
-        That the centred case keeps.
+        Kept by the centred case.
     sections
         Of its shaft, in a guide.
     """
@@ -257,16 +241,14 @@ def turned(
 def off_axis_model(
     problem: ContactProblem, kept: Mapping[str, Modes], contacts: Sequence[RingContact]
 ) -> InterfaceModel:
-    """Interface model of the bodies of a case at points on rings.
-
-    Beside the axial modes each body keeps others of the orders above 0: see :func:`turned`.
+    """Interface model at points on rings; bodies as of :func:`turned`.
 
     Parameters
     ----------
-    kept : mapping of body name to Modes
-        Axial modes that the centred case keeps.
+    kept
+        Axial modes of the centred case.
     contacts
-        From :func:`ring_contacts`.
+        Of :func:`ring_contacts`.
     """
     case, pair, above = problem.case, problem.pair, problem.opposite
     bodies = [
@@ -284,7 +266,7 @@ _WIDER = 4.0
 
 
 def touch_height(space: ContactSpace, *, of_upper: bool = False) -> float:
-    """Height z [m] at which the centred bodies touch first; of the moving one where it is now."""
+    """Height z [m] of first touch, centred; of the moving body where it is now."""
     facing = space.axial > 1e-6
     lift = space.gap[facing] / space.axial[facing]
     first = lift <= lift.min() + _FIRST * space.reach
@@ -302,26 +284,24 @@ def off_axis_space(
     upper_moves: bool = True,
     angle: Vector | None = None,
 ) -> ContactSpace:
-    """Contact points that close in a centred impact or in one from the farthest placements.
+    """Contact points that close in a centred impact or from the farthest placements.
 
-    Of bodies of revolution these are hats of the half section, for whole rings: a needle may come
-    from any side.
+    Of bodies of revolution hats of the half section, for whole rings: a needle may come from any
+    side.
 
     Parameters
     ----------
     pair
         In first touch.
     space
-        Points of the centred contact.
-    farthest : sequence of array, shape (6,) [m], [rad]
-        Rigid placements of the moving body: translation of ``centre`` and rotation vector.
+        Of the centred contact.
+    farthest (6,) [m], [rad]
+        Placements: translation of ``centre`` and rotation vector.
     off_axis [m]
         Largest distance from the axis among them.
     centre (3,) [m]
-        Centre of mass of the moving body.
-    upper_moves
-        Whether that is the upper one.
-    angle (n,) [rad], or None
+        Of mass of the moving body.
+    angle (n,) [rad]
         Of the points of every ring; None for solids.
     """
     reach = space.reach
@@ -344,7 +324,7 @@ def off_axis_space(
 
 
 def _with_neighbours(wide: ContactSpace, keep: NDArray[np.bool_]) -> ContactSpace:
-    """These hats and one row more: on coarse elements a contact is hardly wider than a point."""
+    """These hats and one row more: on coarse elements a contact is hardly wider."""
     G = abs(wide.G_a if wide.slave == "a" else wide.G_b)
     return wide.restricted(G @ (G.T @ keep.astype(float)) > 0)
 
@@ -352,7 +332,7 @@ def _with_neighbours(wide: ContactSpace, keep: NDArray[np.bool_]) -> ContactSpac
 def _gaps_in_touch(
     gaps: Callable[[Vector], Vector], axial: Vector, placement: Vector, upper_moves: bool
 ) -> Vector:
-    """Gaps [m] after the moving body has been moved along z to its first touch."""
+    """Gaps [m] of the moving body moved along z to first touch."""
     facing = axial > 1e-6
     side = 1.0 if upper_moves else -1.0
     for _ in range(3):  # points slide along the other surface

@@ -1,7 +1,6 @@
-"""First touch of two bodies when the upper one moves down the axis, and its distance.
+"""First touch of two bodies along the axis, and its distance.
 
-Both surfaces are sampled as heights over the plane normal to the axis; the clearance along the
-axis is least where they touch.
+Both surfaces are sampled as heights; the clearance is least where they touch.
 """
 
 from collections.abc import Iterable
@@ -30,14 +29,14 @@ _FLAT = 1e-8
 
 @dataclass(frozen=True, slots=True)
 class Touch:
-    """Where two bodies first touch, as drawn: on the upper and on the lower body.
+    """First touch, as drawn, on both bodies.
 
     Parameters
     ----------
     upper, lower : tuple of (r, z) rings or (x, y, z) points [m]
-        Empty for a flat zone that touches all at once: there is no place to refine.
+        Empty for a flat zone that touches all at once.
     clearance [m]
-        Travel of the upper body until it touches; negative when they overlap.
+        Travel to first touch, negative for overlap.
     """
 
     upper: tuple[tuple[float, ...], ...]
@@ -48,20 +47,7 @@ class Touch:
 def first_touch_of_profiles(
     upper: Iterable[Profile], surface_a: str, lower: Iterable[Profile], surface_b: str
 ) -> Touch:
-    """Find the ring where ``surface_a`` of the upper body first meets ``surface_b`` of the lower.
-
-    Parameters
-    ----------
-    upper, lower : iterables of Profile
-        Meridians of the two bodies, as drawn.
-    surface_a, surface_b
-        Names of the edges that touch.
-
-    Raises
-    ------
-    InputError
-        When the two surfaces do not face each other along the axis.
-    """
+    """Ring where ``surface_a`` of the upper body first meets ``surface_b``."""
     curves_a = _curves_of(upper, surface_a)
     curves_b = _curves_of(lower, surface_b)
     r_a, r_b = _radial_range(curves_a), _radial_range(curves_b)
@@ -108,7 +94,7 @@ def _radial_range(curves: list[Curve]) -> tuple[float, float]:
 
 
 def _heights(curves: list[Curve], r: NDArray[np.float64], *, lowest: bool) -> NDArray[np.float64]:
-    """Lowest (or highest) height of the curves over each radius."""
+    """Lowest (highest) height of the curves over radii."""
     worst = np.inf if lowest else -np.inf
     z = np.full_like(r, worst)
     for curve in curves:
@@ -124,22 +110,15 @@ def _heights(curves: list[Curve], r: NDArray[np.float64], *, lowest: bool) -> ND
 def first_touch_of_meshes(
     upper: Mesh, surface_a: Surface, lower: Mesh, surface_b: Surface, *, tolerance: float
 ) -> Touch:
-    """Find the points where a coarse mesh of the upper body first meets one of the lower body.
+    """Points where coarse meshes of two solids first meet.
 
-    The surface of the upper body is sampled on its curved faces; of every sector around the axis
-    the lowest sample counts.
+    The upper surface is sampled on its curved faces; of every sector around the axis the lowest
+    sample counts.
 
     Parameters
     ----------
-    upper, lower
-        Solids.
     tolerance [m]
-        Sectors whose clearance exceeds the least one by more than this do not touch.
-
-    Raises
-    ------
-    InputError
-        When the two surfaces do not face each other along the axis.
+        Sectors whose clearance exceeds the least one by more do not touch.
     """
     samples = np.concatenate(
         [
@@ -177,12 +156,12 @@ Vector = NDArray[np.float64]
 def axis_through(
     guide: CaseGuide, height: float, low: Vector, high: Vector
 ) -> tuple[Vector, Vector]:
-    """Position at a height and slope of the axis through two points at the outer guide heights."""
+    """Position at a height and slope of the axis through points at the outer heights."""
     slope = (high - low) / (guide.heights[-1] - guide.heights[0])
     return low + slope * (height - guide.heights[0]), slope
 
 
 def in_disc(shares: Vector, radius: float) -> Vector:
-    """Point of a disc, all places alike, from two numbers between 0 and 1."""
+    """Point of a disc, uniform, from two numbers between 0 and 1."""
     distance, angle = radius * sqrt(shares[0]), 2.0 * pi * shares[1]
     return distance * np.array([cos(angle), sin(angle)])

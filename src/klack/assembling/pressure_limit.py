@@ -1,6 +1,6 @@
-r"""Pressure limit of the contact points of a case, from static loops of bodies of revolution.
+"""Pressure limit of contact points, from static loops of bodies of revolution.
 
-In a narrow ring every meridian plane yields for itself, by its own force per length.  So the limit
+In a narrow ring every meridian plane yields for itself. So the limit
 (:mod:`klack.contact.pressure_limit`) is fitted to the centred contact in the meridian plane, where
 plastic flow is computed, and taken for every point, wherever the needle lands.
 """
@@ -24,10 +24,10 @@ _ACROSS = 5.0
 """Elements over the half width of the contact in the meridian plane."""
 
 _EXTENT = 2.5
-"""Radius of its finest mesh, over the half width."""
+"""Radius of its finest mesh over the half width."""
 
 _LOADED_MORE = 1.05
-"""Of the mean force per length: what the mesh alone puts on the most loaded sector."""
+"""What the mesh alone adds to the most loaded sector, over the mean."""
 
 
 def pressure_limit(
@@ -44,15 +44,14 @@ def pressure_limit(
     problem
         With its factorisations.
     loops
-        Its static loops, of bodies in the meridian plane.
+        Static, in the meridian plane.
     more [-]
-        Force per length of the most loaded sector over the mean, up to which the limit is needed;
-        that of the static contact without.
+        Force per length of the most loaded sector over the mean; default: of the static contact.
 
     Warns
     -----
     AccuracyWarning
-        Where yield is left out though the materials have it.
+        Of yield that is left out.
     """
     if loops is not None:
         return loops.pressure_limit
@@ -81,16 +80,14 @@ def pressure_limit(
 
 
 def meridian_case(case: Case, half_width: float, more: float) -> Case | None:
-    """Case of the same bodies in the meridian plane, centred; None where they are not drawn so.
+    """Case of the same bodies in the meridian plane, centred; None where not drawn so.
 
     Parameters
     ----------
-    case
-        Of bodies of three dimensions.
     half_width [m]
-        Of their contact.
+        Of the contact.
     more [-]
-        Force per length of the most loaded sector over the mean: the limit must reach so far.
+        As of :func:`pressure_limit`.
     """
     bodies = {name: _in_the_plane(body, half_width) for name, body in case.bodies.items()}
     if any(body is None for body in bodies.values()):

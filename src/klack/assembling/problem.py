@@ -1,4 +1,4 @@
-"""Bodies of a case in their places, and the contact problem of one impact, for all levels."""
+"""Bodies of a case in their places, and the contact problem of an impact."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -42,16 +42,14 @@ __all__ = ["ContactProblem", "PlacedBodies", "build_problem", "contact_problem",
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class OppositeStop(Closing):
-    """A second end of the travel.
+    """Upper stop, placed at the gap of the case.
 
     Parameters
     ----------
-    body
-        The upper stop, placed at the gap of the case.
     surface, moving_surface
         Of the stop and of the moving body.
     space
-        Its contact points with the gaps of the start; body a is the stop.
+        With the gaps of the start; body a is the stop.
     """
 
     body: ElasticBody
@@ -74,18 +72,14 @@ def build_opposite(
     *,
     threads: int | None = None,
 ) -> OppositeStop | None:
-    """Mesh the upper stop, place it, and solve its static contact.
+    """Mesh the upper stop, if any, place it, and solve its static contact.
 
     Parameters
     ----------
     pair
-        The other two bodies, placed.
+        The other two, placed.
     moving
         Of the moving body.
-
-    Returns
-    -------
-    OppositeStop, or None when the case has none.
     """
     asked = case.opposite
     if asked is None:
@@ -129,7 +123,7 @@ def build_opposite(
 
 
 def _raised(body: ElasticBody, distance: float) -> ElasticBody:
-    """Return the same body a little higher; nothing but its place changes."""
+    """Same body, higher."""
     along = np.array([0.0] * (body.dimension - 1) + [distance])
     return replace(body, mesh=body.mesh.moved(along))
 
@@ -141,20 +135,17 @@ _USUAL_MODES = 50  # of a case that asks for a frequency
 class PlacedBodies(Closing):
     """Bodies of a case in their places, with their static solutions.
 
-    The same for every impact of these bodies, whatever its speed and force; an upper stop is not:
-    its contact points are those that the energy of an impact can reach.
+    The same for every impact of these bodies; an upper stop is not: its contact points are those
+    that the energy of an impact can reach.
 
     Parameters
     ----------
     case
-        With its gap, also where that is only drawn.
+        With its gap, given or drawn.
     flexibility_upper, flexibility_lower
-        Static solutions of both bodies; close them with :meth:`close` before a full-order run
-        to give their memory back.
+        :meth:`close` before a full-order run gives their memory back.
     candidates
-        Points where they can touch, with what is known of them.
-    opposite
-        Upper stop.
+        Points where they can touch.
     """
 
     case: Case
@@ -165,13 +156,13 @@ class PlacedBodies(Closing):
     opposite: OppositeStop | None = None
 
     def keep_no_more(self) -> None:
-        """Write no more static solutions to the cache: each of many impacts asks for others."""
+        """Cache no more static solutions: many impacts ask for others."""
         for flexibility in self._flexibilities:
             flexibility.cache = None
 
     @property
     def threads(self) -> int | None:
-        """Threads of BLAS: one, or all that there are."""
+        """Threads of BLAS: one, or all."""
         return threads_for(self.pair.unknowns)
 
     def close(self) -> None:
@@ -187,12 +178,12 @@ class PlacedBodies(Closing):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ContactProblem(PlacedBodies):
-    """Bodies, contact points and static contact of one impact.
+    """Bodies, points and static contact of one impact.
 
     Parameters
     ----------
     static
-        Ladder of static contact states beyond the highest force of the impact.
+        Ladder beyond the highest force of the impact.
     condensed
         Compliance of each body at these points.
     """
@@ -203,15 +194,12 @@ class ContactProblem(PlacedBodies):
 
     @cached_property
     def rubbing(self) -> RubbingContact | None:
-        """Static contact with the friction of the case; None without friction.
-
-        It takes the static solutions: first used before :meth:`close`.
+        """Static contact with the friction of the case, if any; first used before :meth:`close`.
 
         Warns
         -----
         AccuracyWarning
-            Where no such contact is found, and the law of the reduced level stays smooth: other
-            levels have no need of it.
+            Where none is found, and the law of the reduced level stays smooth.
         """
         friction = self.case.contact.faces.kinetic
         if friction == 0.0:
@@ -234,14 +222,14 @@ class ContactProblem(PlacedBodies):
         )
 
     def yielding(self, progress: Progress) -> YieldingLoops | None:
-        """Static loops of faces that yield, for a law; None where it stays elastic.
+        """Static loops of faces that yield; None where the law stays elastic.
 
-        They take the static solutions: asked for before :meth:`close`.
+        First used before :meth:`close`.
 
         Warns
         -----
         AccuracyWarning
-            Where yield is left out though the materials have it.
+            Of yield that is left out.
         """
         if self.case.contact.worn is not None:  # they do not yield any more
             return None
@@ -260,14 +248,9 @@ class ContactProblem(PlacedBodies):
         )
 
     def wider(self, space: ContactSpace, error: ReachError) -> ContactSpace:
-        """Contact points of the same surfaces with twice the reach.
+        """Contact points with twice the reach of ``space``.
 
-        Parameters
-        ----------
-        space
-            Those that did not reach far enough.
-        error
-            Raised again where the case gives the reach, or has an upper stop.
+        ``error`` is raised again where the case gives the reach, or has an upper stop.
         """
         if self.case.contact.reach is not None or self.opposite is not None:
             raise error
@@ -282,7 +265,7 @@ def build_problem(case: Case, progress: Progress, *, threads: int | None = None)
 def place_bodies(case: Case, progress: Progress, *, threads: int | None = None) -> PlacedBodies:
     """Mesh, place and factorise.
 
-    A case without ``contact.gap`` gets the one that is drawn, so that every level starts there.
+    A case without ``contact.gap`` gets the drawn one, where every level starts.
     """
     pair = build_bodies(case, progress)
     if case.contact.gap is None:
@@ -319,18 +302,16 @@ def place_bodies(case: Case, progress: Progress, *, threads: int | None = None) 
 
 
 def contact_problem(case: Case, bodies: PlacedBodies, progress: Progress) -> ContactProblem:
-    """Solve the static contact of an impact of bodies that are there.
+    """Solve the static contact of an impact of placed bodies.
 
-    The highest force is bounded without knowing the contact: an impact of relative speed v and
-    effective mass m stores at most m v^2 / 2 and the work of closing forces in the contact, and
-    the static curve gives the force and the approach at which that much is stored.  The candidate
-    points reach further than that.
+    An impact of relative speed v and effective mass m stores at most m v^2 / 2 and the work of
+    closing forces, and the static curve gives force and approach at that energy. The candidate
+    points reach further.
 
     Parameters
     ----------
     case
-        Of these bodies, in these places; its speed, forces and law may be others than theirs, not
-        where there is an upper stop.
+        Of these bodies and places; speed, forces and law may differ, not with an upper stop.
     """
     case = _with_gap(case, bodies.case.contact.gap)
     static, condensed = static_ladder(
@@ -355,7 +336,7 @@ def contact_problem(case: Case, bodies: PlacedBodies, progress: Progress) -> Con
 
 
 def _budget(case: Case, body: ElasticBody, progress: Progress) -> Budget:
-    """Memory that the modes of a body take while its factor is held, for the memory plan."""
+    """Memory of the modes of a body while its factor is held."""
     choice = case.reduction.choice(body.name)
     count = choice.count or choice.pool or _USUAL_MODES
     return Budget(
@@ -372,7 +353,7 @@ def _drawn_gap(pair: BodyPair) -> float:
 
 
 def _with_gap(case: Case, gap: float | None) -> Case:
-    """The gap of the bodies, where the case gives none."""
+    """The gap of the bodies, where the case has none."""
     if case.contact.gap is not None:
         return case
     contact = case.contact.model_copy(update={"gap": gap})

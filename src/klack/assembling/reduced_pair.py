@@ -74,18 +74,15 @@ class ReducedPair:
     Parameters
     ----------
     ports
-        Contact ports of the upper and of the lower body, resultant +1 N along z each.
+        Of the upper and the lower body, resultant +1 N along z each.
     local
-        The consistent law with its shares; None for another kind.
+        The consistent (elastic) law with its shares; None for another kind.
     pattern_force [N]
-        Force at which the pressure pattern of the port was taken.
-    static : StaticContact or RubbingContact
-        Of the full bodies, with the friction that ``law`` has.
+        Of the pressure pattern of the ports.
+    static
+        Of the full bodies, with the friction of ``law``.
     rubbing
-        The law with memory of faces with friction, made of ``local`` and static loops.
-
-    Faces that yield have a :class:`klack.contact.yielding_law.YieldingLaw`, beside the elastic one
-    in ``local``.
+        Law with memory, of ``local`` and static loops.
     """
 
     upper: ReducedBody
@@ -99,12 +96,12 @@ class ReducedPair:
 
     @property
     def yields(self) -> bool:
-        """Whether its law has the yield of the faces."""
+        """Whether its law has yield."""
         return isinstance(self.law, YieldingLaw)
 
 
 def classical_stiffness(problem: ContactProblem, peak_force: float) -> LocalStiffness:
-    """Constant stiffness of the contact zone alone, as the classical recipe takes it."""
+    """Stiffness of the contact zone alone, by the classical recipe."""
     law = problem.case.contact.local_law
     width = problem.static.half_width_at(min(peak_force, problem.static.max_force))
     size = law.size if isinstance(law, SubmodelLocalLaw) else _CLASSICAL_SIZE * width
@@ -118,13 +115,13 @@ def classical_stiffness(problem: ContactProblem, peak_force: float) -> LocalStif
 
 
 def recipe_stiffness(case: Case) -> float:
-    """Contact stiffness [N/m] of the classical recipe: that of the case, or the usual 1e9 N/m."""
+    """Contact stiffness [N/m] of the classical recipe: of the case, or 1e9 N/m."""
     law = case.contact.local_law
     return law.stiffness if isinstance(law, LinearLocalLaw) else _USUAL_STIFFNESS
 
 
 def first_stiffness(problem: ContactProblem) -> float:
-    """Secant of the static contact [N/m], good enough to find the order of the peak force."""
+    """Secant of the static contact [N/m], for the order of the peak force."""
     return problem.static.max_force / float(problem.static.approach[-1])
 
 
@@ -141,7 +138,7 @@ def own_pair(
     Warns
     -----
     AccuracyWarning
-        When fewer modes than asked for were kept, so that a compliance is left to the local law.
+        Of fewer kept modes than wanted, which leave a compliance to the local law.
     """
     reduction = problem.case.reduction
     names = (problem.pair.upper.name, problem.pair.lower.name)
@@ -194,18 +191,16 @@ def reduce_pair(
     recovery: bool = False,
     loops: YieldingLoops | None = None,
 ) -> ReducedPair:
-    """Reduce both bodies at the contact, with the port pattern taken at the peak force.
+    """Reduce both bodies at the contact, with the port pattern at the peak force.
 
     Parameters
     ----------
-    pools : mapping of body name to Modes
-    selection : mapping of body name to ModeSelection
     stiffness [N/m]
-        Of the local contact, for corrections that do not compute their own law.
+        Of the local contact, for corrections without a law of their own.
     recovery
         Keep the displacement of all named surfaces.
     loops
-        Of faces that yield, for the consistent law; None for elastic bodies.
+        Of faces that yield, for the consistent law.
     """
     static = _static(problem, correction)
     force = 0.7 * static.max_force
@@ -288,7 +283,7 @@ def _port_compliances(
 ) -> tuple[NDArray[np.float64] | None, NDArray[np.float64] | None]:
     """Static compliance of each body at its port [m/N]; None where the faces rub.
 
-    The port loads the contact points alone, to which the bodies are condensed already.
+    From the compliance at the contact points, which the port loads alone.
     """
     if not isinstance(static, StaticContact):
         return None, None
@@ -299,14 +294,9 @@ def _port_compliances(
 
 
 def friction_doubt(case: Case, *, has_memory: bool, correction: str = "none") -> str:
-    """Doubt about a model of a case that has not all of its friction; else empty.
+    """Doubt about a model without all friction of its case, or empty.
 
-    Parameters
-    ----------
-    has_memory
-        Its law closes and opens on two curves.
-    correction
-        Of its modes.
+    ``has_memory``: its law closes and opens on two curves; ``correction`` is that of its modes.
     """
     faces = case.contact.faces
     if faces.is_none:
@@ -334,7 +324,7 @@ def _rubs(case: Case, correction: str) -> bool:
 
 
 def _static(problem: ContactProblem, correction: Correction) -> StaticContact | RubbingContact:
-    """Static contact with the friction that the law will have."""
+    """Static contact with the friction of the law."""
     rubbing = problem.rubbing if _rubs(problem.case, correction) else None
     return problem.static if rubbing is None else rubbing
 
@@ -360,7 +350,7 @@ def _law(
 
 
 def hertz_coefficient(case: Case, law: HertzLocalLaw) -> float:
-    """4/3 E* sqrt(R) [N/m^1.5] with the given modulus, or the materials of the two bodies."""
+    """4/3 E* sqrt(R) [N/m^1.5], modulus given or of the two bodies."""
     if law.modulus is not None:
         return 4.0 / 3.0 * law.modulus * float(np.sqrt(law.radius))
     inverse = 0.0
@@ -385,14 +375,9 @@ def impact_system(
     ports: tuple[str, str] = (PORT, PORT),
     series_compliance: float = 0.0,
 ) -> ReducedSystem:
-    """Both bodies of a case, their contact, and the force and spring that act on the upper one.
+    """Both bodies, their contact at ports, and force and spring on the upper one.
 
-    Parameters
-    ----------
-    ports
-        Where they meet, on the upper and on the lower body.
-    series_compliance [m/N]
-        In series with the law.
+    ``series_compliance`` [m/N] is in series with the law.
     """
     contact = ContactPair(
         body_a=upper.name,
@@ -434,7 +419,7 @@ def starting_gap(case: Case) -> float:
 
 
 def static_curve(pair: ReducedPair) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Points (indentation [m], force [N]) of the local law, for a picture."""
+    """Points (indentation [m], force [N]) of the local law."""
     if pair.local is not None:
         return np.append(0.0, pair.local.force_indentation), np.append(0.0, pair.local.force)
     assert not isinstance(pair.law, YieldingLaw)

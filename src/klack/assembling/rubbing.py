@@ -1,8 +1,7 @@
-"""Friction between two faces for a reduced model: static loops of the full bodies, and their law.
+"""Friction of faces for a reduced model: static loops and their law.
 
-The same for the contact of an impact (``contact.friction``) and an end stop of a valve
-(``stops.NAME.friction``).  Where no law has the friction, a warning says so and the law stays
-smooth: other levels have no need of it.
+For ``contact.friction`` of an impact and ``stops.NAME.friction`` of a valve. Where no law has the
+friction, the law stays smooth, with a warning: other levels do not need it.
 """
 
 import warnings
@@ -36,16 +35,11 @@ def static_loops(
     Parameters
     ----------
     static
-        Of the same bodies without friction.
+        Without friction.
     friction [-]
         Above 0.
     key
-        Of the friction in the case, for words.
-
-    Warns
-    -----
-    AccuracyWarning
-        Where no such contact is found.
+        In the case, for messages.
     """
     faces = FaceFriction.on(
         Friction.coulomb(friction),
@@ -66,19 +60,19 @@ def static_loops(
 
 
 def fitted_loops(rubbing: RubbingContact, local: LocalLaw, *, key: str) -> RubbingFit | None:
-    """Law with memory; None where none has loops like these.
+    """Law with memory; None where none has such loops.
 
     Parameters
     ----------
     local
         Of ``rubbing.closing``.
     key
-        Of the friction in the case, for words.
+        In the case, for messages.
 
     Warns
     -----
     AccuracyWarning
-        Where there is none, and for a law whose loops are others than those of the bodies.
+        Where there is none, and of a law with other loops than the bodies.
     """
     try:
         fit = rubbing_fit(local, rubbing.loops)

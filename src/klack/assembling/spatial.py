@@ -1,4 +1,4 @@
-"""From a case of a whole valve to bodies that meet point by point, with a guide."""
+"""From a valve case to bodies that meet point by point, with a guide."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -62,17 +62,17 @@ _TOUCHING = 0.05  # share of the reach: points that touch first
 def tilting_film(
     stop: str, film: FilmShape, space: ContactSpace | RingSpace, reach: float
 ) -> TiltingFilm:
-    """Land of a film, and the lift and tilts of it in the gaps of contact points.
+    """Land of a film, and its lift and tilts in the gaps of contact points.
 
-    A conical land is unrolled: a flat ring of its mean radius and its width, whose height is normal
-    to the cone.
+    A conical land is unrolled to a flat ring of its mean radius and width, with heights normal to
+    the cone.
 
     Parameters
     ----------
     space
-        Contact points of the stop, centred, all round.
+        Of the stop, centred, all round.
     reach [m]
-        Their largest gap in touch.
+        Largest gap in touch.
     """
     slope, land, cubic = 1.0, None, 1.0
     if isinstance(film, RingFilm):
@@ -109,20 +109,18 @@ _IN_THE_WALL = 1e-3  # of the clearance: the axis of a meshed shaft is known as 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Meeting:
-    """One stop, its bodies as far apart as they start.
+    """One stop, its bodies apart as at the start.
 
     Parameters
     ----------
-    space
-        Contact points.
     reach [m]
-        Largest gap of those of the centred bodies in touch.
+        Largest gap of the centred bodies in touch.
     arm (3,) [m]
-        Their middle from the centre of mass of the needle.
-    gaps : RigidGaps or RingGaps
+        Middle of the points from the centre of mass of the needle.
+    gaps
         At any rigid placement.
     upper_moves
-        Whether the needle is the upper body.
+        The needle is the upper body.
     """
 
     name: str
@@ -142,16 +140,11 @@ def build_spatial(
     ports: Mapping[str, Sequence[Port]],
     contacts: Mapping[str, StopContact],
 ) -> SpatialValve:
-    """Bodies of a valve with all their freedoms, contact points of its stops, and its guide.
+    """Bodies of a valve with all freedoms, contact points of its stops, and its guide.
 
-    Modes are those that the network has.  Contact points are all that can close in any position
-    which the guide allows; without a guide, in that of the start.  Where one stop has friction, or
-    shots draw it, the points of all have tangential directions.
-
-    Raises
-    ------
-    InputError
-        For a guide that the needle does not fit in, or a placement outside of it.
+    Modes are those of the network. Contact points are all that can close in any position within
+    the guide, or of the start without. With friction of one stop, or in shots, all have tangential
+    directions. Rejects a guide that does not fit, or a placement outside of it.
     """
     parts = case.network.components
     needle = str(getattr(parts[roles.needle], "body", ""))
@@ -231,7 +224,7 @@ def valve_of_meetings(
     guide: Guide | None,
     placement: Vector,
 ) -> SpatialValve:
-    """Put the bodies of a valve together that meet there.
+    """Join the bodies of a valve that meet there.
 
     Parameters
     ----------
@@ -266,7 +259,7 @@ def valve_of_meetings(
 
 
 def check_heights(case: ValveCase, roles: ValveRoles, bodies: Mapping[str, ElasticBody]) -> None:
-    """Raise :class:`InputError` for a force across the axis beside the needle."""
+    """Reject a force across the axis beside the needle."""
     needle = str(getattr(case.network.components[roles.needle], "body", ""))
     low, high = (float(f(bodies[needle].mesh.points[:, -1])) for f in (np.min, np.max))
     for name, component in case.network.components.items():
@@ -286,7 +279,7 @@ def check_heights(case: ValveCase, roles: ValveRoles, bodies: Mapping[str, Elast
 def modes_in_network(
     case: ValveCase, name: str, pools: Mapping[str, Modes], ports: Mapping[str, Sequence[Port]]
 ) -> Modes:
-    """Elastic modes of a body that the network keeps, with their full shapes."""
+    """Elastic modes of a body in the network, with full shapes."""
     return kept_modes(
         selection_of(case.reduction.choice(name)),
         pools[name],
@@ -306,7 +299,7 @@ def about_axis(height: float, needle: ElasticBody) -> tuple[Vector, Vector]:
 
 
 def seat_height(contacts: Mapping[str, StopContact], needle: str) -> float:
-    """Height of first touch in the drawing of the needle: at its seat, else at its stop [m]."""
+    """Height of first touch in the drawing of the needle: seat, else stop [m]."""
     below = [contact for contact in contacts.values() if contact.pair.upper.name == needle]
     contact = (below or list(contacts.values()))[0]
     height = touch_height(contact.static.space)
@@ -314,13 +307,7 @@ def seat_height(contacts: Mapping[str, StopContact], needle: str) -> float:
 
 
 def placement_of(case: ValveCase, height: float) -> tuple[Vector, Vector]:
-    """Position of the axis at this height, and its slope.
-
-    Raises
-    ------
-    InputError
-        For a position that the guide has no room for.
-    """
+    """Position of the axis at this height, and its slope; must fit into the guide."""
     at, guide = case.placement, case.guide
     if at is None:
         return np.zeros(2), np.zeros(2)
@@ -346,7 +333,7 @@ def placement_of(case: ValveCase, height: float) -> tuple[Vector, Vector]:
 def farthest_positions(case: ValveCase, height: float) -> list[tuple[Vector, Vector]]:
     """Positions and slopes of the axis that contact points must suffice for, all round.
 
-    The first two are those in the direction of x; the others are the same, turned.
+    The first two are along x, the others turned.
     """
     guide = case.guide
     placement = aside, lean = placement_of(case, height)
@@ -374,7 +361,7 @@ def _meeting(
     gap: float,
     friction: Friction | None,
 ) -> tuple[Meeting, ContactSpace, NDArray[np.float64], FaceFriction | None]:
-    """A stop, its contact points, and the static compliance of both bodies there."""
+    """A stop, its contact points, and the compliance of both bodies there."""
     pair, static = contact.pair, contact.static
     upper_moves = pair.upper.name == needle
     centre = pair.upper.centre_of_mass if upper_moves else body.centre_of_mass

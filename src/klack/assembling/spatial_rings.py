@@ -1,7 +1,7 @@
-"""From a case of a valve of half sections to bodies that move in three dimensions.
+"""From a valve case of half sections to bodies in three dimensions.
 
-Each body moves in all Fourier orders (:mod:`klack.transient.revolved_model`); ports of the network
-push along the axis, so that only modes of order 0 have a share in them.
+Each moves in all Fourier orders (:mod:`klack.transient.revolved_model`); ports of the network push
+along the axis: only order 0 has a share in them.
 """
 
 import warnings
@@ -59,13 +59,7 @@ _JUDGED = 0.1  # of the peak force at the speed that the case gives for a stop
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RingValve:
-    """A valve of half sections in three dimensions.
-
-    Parameters
-    ----------
-    reduced
-        Its bodies with the modes of all orders, as the model has them.
-    """
+    """A valve of half sections in three dimensions; ``reduced`` with modes of all orders."""
 
     spatial: SpatialValve
     reduced: Mapping[str, ReducedBody]
@@ -80,29 +74,20 @@ def build_spatial_rings(
     contacts: Mapping[str, StopContact],
     reduced: Mapping[str, ReducedBody],
 ) -> RingValve:
-    """Bodies of a valve with all their freedoms, contact points on rings, and the guide.
+    """Bodies of a valve with all freedoms, contact points on rings, and the guide.
 
-    Beside the modes of order 0, which an axial stroke has, each body keeps others, see
-    :func:`klack.assembling.off_axis.turned`.  Rings are all that can close in any position which
-    the guide allows; without a guide, in that of the start.
+    As :func:`klack.assembling.spatial.build_spatial`; beside order 0, modes as of
+    :func:`klack.assembling.off_axis.turned`.  Rejects a contact around the axis.
 
     Parameters
     ----------
-    case, roles, bodies, pools, ports, contacts
-        As of :func:`klack.assembling.spatial.build_spatial`.
     reduced
-        In their motion along the axis.
-
-    Raises
-    ------
-    InputError
-        For a guide that the needle does not fit in, a placement outside of it, and a contact around
-        the axis.
+        In motion along the axis.
 
     Warns
     -----
     AccuracyWarning
-        For linear elements, and a body without an elastic mode across its axis.
+        Of linear elements, and a body without elastic mode across its axis.
     """
     needle = str(getattr(case.network.components[roles.needle], "body", ""))
     names = [needle, *(name for name in bodies if name != needle)]
@@ -257,14 +242,14 @@ def _tell_stiff(body: RevolvedPoints) -> None:
 
 
 def in_all_orders(body: ReducedBody, points: RevolvedPoints) -> ReducedBody:
-    """Reduced body with the modes of all orders, of which its ports push those of order 0.
+    """Reduced body with modes of all orders, whose ports push those of order 0.
 
     Parameters
     ----------
     body
-        In its motion along the axis.
+        In motion along the axis.
     points
-        The same body, with the same elastic modes of order 0.
+        The same, with the same modes of order 0.
     """
     own, rigid = points.body, points.body.rigid.shape[1]
     elastic = body.mode_count - body.rigid_count

@@ -1,8 +1,8 @@
-"""End stops of a valve: where two bodies meet, their static contact, and the law that is left.
+"""End stops of a valve: static contact of two bodies, and the law that is left.
 
-One stop is what one impact is: two surfaces, a ladder of static contact states, a pressure pattern
-that makes a port of each body, and a local law.  Several stops share their bodies, so each body is
-meshed and factorised once and carries one port for each of its stops.
+A stop is as an impact: two surfaces, a ladder of static contact states, a pressure pattern that
+makes a port of each body, and a local law. Bodies are meshed and factorised once, with a port for
+each of their stops.
 """
 
 from collections.abc import Mapping
@@ -62,21 +62,20 @@ _BULK_SHARE = 0.9
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StopContact:
-    """Static contact of one end stop, and the ports that it gives to its two bodies.
+    """Static contact of one end stop, and its ports.
 
     Parameters
     ----------
     pair
-        Both bodies as they touch; the meshes are moved copies, the matrices are shared.
+        Touching; meshes are moved copies, matrices shared.
     static
         Without friction.
     ports
-        Of the upper and of the lower body, resultant +1 N along z each, named like the surface.
+        Upper and lower, resultant +1 N along z each, named like the surface.
     pattern_force [N]
-        Force at which the pressure pattern of the ports was taken: the peak of an impact at the
-        speed of the case.
+        Of the pressure pattern: peak of an impact at the speed of the case.
     rubbing
-        The same with friction between the faces.
+        With friction.
     loops
         Of faces that yield.
     """
@@ -91,7 +90,7 @@ class StopContact:
 
     @property
     def closing(self) -> StaticContact:
-        """Static contact while it closes, with the friction of the faces."""
+        """Static contact while closing, with friction."""
         return self.static if self.rubbing is None else self.rubbing.closing
 
     @property
@@ -107,11 +106,11 @@ class StopFaces:
     Parameters
     ----------
     local
-        While the faces close, with its shares.
+        While closing, with its shares.
     law
-        All that the modes miss; with memory where faces have friction or yield.
+        All that the modes miss; with memory for friction or yield.
     faces
-        The same without the bulk, which a film presses on as well.
+        Without the bulk, on which a film presses as well.
     bulk [m/N]
         Series compliance behind ``faces``.
     """
@@ -132,13 +131,8 @@ def build_stop(
 ) -> StopContact:
     """Bring two surfaces together, solve their static contact and settle the port pattern.
 
-    The pattern is that at the peak force of one impact of the two bodies alone, at the speed that
-    the case gives for this stop.
-
-    Raises
-    ------
-    InputError
-        For surfaces that do not face each other, or a stop between two held bodies.
+    It is that at the peak force of one impact of both bodies at the speed of the stop. Rejects a
+    stop between two held bodies.
     """
     stop = case.stops[name]
     pair = _touching(name, stop, bodies)
@@ -210,12 +204,12 @@ def _loops(
 
 
 def stop_law(contact: StopContact, upper: ReducedBody, lower: ReducedBody) -> StopFaces:
-    """Law that carries what the modes of the two bodies miss at this stop.
+    """Law of what the modes of both bodies miss at this stop.
 
     Warns
     -----
     AccuracyWarning
-        Where a law has not all of the friction, or not the yield.
+        Of missing friction or yield.
     """
     modal = 0.0
     for body, port in zip((upper, lower), contact.ports, strict=True):
@@ -243,10 +237,10 @@ def bulk_compliance(local: LocalLaw, law: StopTable) -> float:
 
     .. math:: \delta_{loc}(P) = \delta_{faces}(P) + D P, \qquad D = 0.9 \min \delta_{loc}'(P)
 
-    A squeeze film lies between the faces, beside their contact, and presses on the same bulk.  The
-    bulk yields in proportion to the force, whatever presses; what is left grows with the contact
-    zone and stays monotone.  Faces with friction are stiffest where all of them hold, faces that
-    yield where they open, and *D* is 0.9 of their compliance there.
+    A squeeze film beside the contact presses on the same bulk, which yields in proportion to the
+    force; what is left grows with the contact zone and stays monotone. Faces with friction are
+    stiffest where all hold, faces that yield where they open; *D* is 0.9 of their compliance
+    there.
     """
     force, indentation = np.append(0.0, local.force), np.append(0.0, local.force_indentation)
     least = float(np.min(np.diff(indentation) / np.diff(force)))
@@ -256,10 +250,9 @@ def bulk_compliance(local: LocalLaw, law: StopTable) -> float:
 
 
 def without_bulk(local: LocalLaw, D: float) -> LocalLaw:
-    """Local law of the faces alone, as if the modes yielded by the bulk's *D* [m/N] as well.
+    """Local law of the faces alone, as if the modes included the bulk's *D* [m/N].
 
-    Both are linear and in series with the faces.  So the loops of faces with friction lose what
-    they lost: on the way round, a linear compliance gives back what it takes.
+    Both are linear and in series: loops of faces with friction keep their loss.
     """
     indentation = local.force_indentation - D * local.force
     return replace(
@@ -299,7 +292,7 @@ def _friction_key(stop: str) -> str:
 def _ports_at(
     force: float, pair: BodyPair, loaded: StaticContact | RubbingContact
 ) -> tuple[Port, Port]:
-    """Ports in the shape of the pressure, and of the friction, at a force."""
+    """Ports in the shape of pressure and friction at a force."""
     load_upper, load_lower = loaded.load_patterns(force)
     return Port(pair.upper_surface.name, load_upper), Port(pair.lower_surface.name, -load_lower)
 
@@ -311,7 +304,7 @@ def _peak_force(
     flexibilities: list[Flexibility],
     pools: Mapping[str, Modes],
 ) -> float:
-    """Peak force [N] of an impact of the two reduced bodies alone."""
+    """Peak force [N] of an impact of the two reduced bodies."""
     pair, static, ports = touching.pair, touching.static, touching.ports
     bodies = (pair.upper, pair.lower)
     upper, lower = (

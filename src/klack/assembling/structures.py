@@ -1,4 +1,4 @@
-"""Structures of the radiating bodies of a case, built while modes and statics are available."""
+"""Structures of radiating bodies, built while modes and statics are available."""
 
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -32,7 +32,7 @@ __all__ = [
 ]
 
 IMPACT_STOP = "contact"
-"""Name of the stop of ``klack impact``, whose force its histories hold."""
+"""Stop of ``klack impact``, whose force its histories hold."""
 
 
 def impact_structures(
@@ -41,18 +41,16 @@ def impact_structures(
     own: ReducedPair,
     near: Mapping[str, NearLoads] | None = None,
 ) -> tuple[Structure, ...]:
-    """Structures of the held bodies of one impact, with the modes of the level ``reduced``.
+    """Structures of the held bodies of an impact, with modes of the level ``reduced``.
 
     Parameters
     ----------
     problem
         With its factorisations.
-    pools : mapping of body name to Modes
     own
-        Its ports push here.
-    near : mapping of body name to NearLoads, optional
-        Of earlier impacts of these bodies: what is left to the modes away from the contact may
-        then come from their static solutions.
+        With its ports.
+    near
+        Of earlier impacts: the static rest away from the contact may come from their solutions.
     """
     case, pair = problem.case, problem.pair
     sides = (
@@ -90,13 +88,7 @@ def valve_structures(
     pools: Mapping[str, Modes],
     flexibilities: Mapping[str, Flexibility],
 ) -> tuple[Structure, ...]:
-    """Structures of the held bodies of a valve.
-
-    Parameters
-    ----------
-    bodies, ports, pools, flexibilities : mapping by name of the body
-    contacts : mapping of stop name to StopContact
-    """
+    """Structures of the held bodies of a valve; mappings by body, contacts by stop."""
     held = [name for name, body in bodies.items() if body.is_fixed]
     return tuple(
         _structure(
@@ -116,17 +108,14 @@ def radiating_surfaces(
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Surfaces of a held body that meet the air, and those whose faces never do.
 
+    Rejects wanted surfaces of a body that is not held.
+
     Parameters
     ----------
     held
-        Names of all held bodies.
-    contacts : names
-        Surfaces of the body that hit or hold something; they count only if they are asked for.
-
-    Raises
-    ------
-    InputError
-        If the case asks for a surface of a body that is not held.
+        All held bodies.
+    contacts
+        Surfaces that hit or hold something; they count only if wanted.
     """
     if noise is not None and noise.surfaces is not None:
         _check_held(noise.surfaces, held)

@@ -1,4 +1,4 @@
-"""Points of first touch of two bodies, in their order round their centre, for pictures."""
+"""Points of first touch, in order round their centre, for pictures."""
 
 from dataclasses import dataclass
 
@@ -28,14 +28,9 @@ class TouchingSide:
 
 
 def touch_ring(upper: TouchingSide, lower: TouchingSide) -> tuple[NDArray[np.float64], float]:
-    """Where two centred bodies touch first, on the lower one, and their distance.
+    """Ring (n, 3) [m] of first touch on the lower of two centred bodies, and their clearance [m].
 
-    Returns
-    -------
-    ring (n, 3) [m]
-        None for faces that touch all at once.
-    clearance : float [m]
-        Along the axis, between the bodies as drawn or as meshed.
+    None for faces that touch all at once; along the axis, as drawn or meshed.
     """
     touch = _touch(upper, lower)
     ring = np.array(touch.lower, dtype=float)
@@ -48,9 +43,9 @@ def touch_ring(upper: TouchingSide, lower: TouchingSide) -> tuple[NDArray[np.flo
 
 
 def goes_round(points: NDArray[np.float64]) -> bool:
-    """Whether points of first touch lie round a hole rather than in one spot or on some pads.
+    """Whether points of first touch lie round a hole, not in one spot or on some pads.
 
-    Wherever its centre is; of a plane across the axis.
+    Wherever its centre is, in a plane across the axis.
     """
     if len(points) < _LEAST:
         return False

@@ -1,4 +1,4 @@
-"""From a case of a whole valve to a network that can run: meshes, modes, stops, laws."""
+"""From a valve case to a network that can run: meshes, modes, stops, laws."""
 
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -64,17 +64,15 @@ class Valve:
     Parameters
     ----------
     reduced
-        With all their ports.
-    contacts
-        By end stop.
-    laws
-        Consistent laws, of the end stops that have one.
+        With all ports.
+    contacts, laws
+        By end stop; consistent laws.
     network
-        With the bodies and laws filled in: the variant ``wet``.
+        With bodies and laws filled in: the variant ``wet``.
     structures
         Held bodies as sources of sound.
     spatial
-        Bodies that meet point by point, of a motion in three dimensions.
+        Bodies that meet point by point, in three dimensions.
     """
 
     case: ValveCase
@@ -96,13 +94,8 @@ def build_valve(
     Parameters
     ----------
     threads
-        Of the solvers, which decide the last bits; all cores by default.  Bodies of few unknowns
-        take one in any case, which is faster: their bits are the same on any number of cores.
-
-    Raises
-    ------
-    InputError
-        For geometry, surfaces, supports or connections that cannot be used.
+        Of the solvers, which decide the last bits; default: all cores.  Bodies of few unknowns
+        always take one, which is faster.
     """
     bodies = build_valve_bodies(case, progress)
     if case.motion == "three-dimensional":
@@ -114,14 +107,7 @@ def build_valve(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ValveParts:
-    """What the reduced bodies of a valve are made of.
-
-    Parameters
-    ----------
-    flexibilities
-        To be closed.
-    ports : mapping of str to list of Port
-    """
+    """What the reduced bodies of a valve are made of; flexibilities are to be closed."""
 
     bodies: Mapping[str, ElasticBody]
     flexibilities: Mapping[str, Flexibility]
@@ -133,7 +119,7 @@ class ValveParts:
 def valve_parts(
     case: ValveCase, bodies: Mapping[str, ElasticBody], progress: Progress, threads: int | None
 ) -> ValveParts:
-    """Factorise bodies, compute their modes and the static contact of each stop; all cached."""
+    """Factorise bodies; modes and static contact of each stop; cached."""
     flexibilities: dict[str, Flexibility] = {}
     for i, (name, body) in enumerate(bodies.items()):
         progress("factorise", i / len(bodies))
@@ -208,7 +194,7 @@ def _built(
 
 
 def build_valve_bodies(case: ValveCase, progress: Progress) -> dict[str, ElasticBody]:
-    """Mesh every body, fine at the first touch of each of its stops, and assemble it."""
+    """Mesh every body, fine at first touches, and assemble it."""
     return {
         name: assemble_body(case, name, mesh)
         for name, mesh in mesh_valve_bodies(case, progress).items()
@@ -216,7 +202,7 @@ def build_valve_bodies(case: ValveCase, progress: Progress) -> dict[str, Elastic
 
 
 def mesh_valve_bodies(case: ValveCase, progress: Progress) -> dict[str, Mesh]:
-    """Mesh every body as drawn, fine at the first touch of each of its stops."""
+    """Mesh every body as drawn, fine at first touches."""
     progress("mesh", 0.0)
     shapes = require_given_shapes(
         case, lambda name: mesh_body(case.bodies[name], name, ()), progress
@@ -235,7 +221,7 @@ def mesh_valve_bodies(case: ValveCase, progress: Progress) -> dict[str, Mesh]:
 
 
 def _touched_places(case: ValveCase) -> dict[str, Places]:
-    """Where each body first touches another one at a stop, as drawn."""
+    """First touches of each body at its stops, as drawn."""
     places: dict[str, Places] = dict.fromkeys(case.bodies, ())
     for name, stop in case.stops.items():
         with named_contact(case, ("stops", name, "between"), stop.upper, stop.lower):
@@ -267,7 +253,7 @@ def _mode_pools(
 
 
 def _ports(case: ValveCase, body: ElasticBody, contacts: Mapping[str, StopContact]) -> list[Port]:
-    """Ports of a body: its contacts, then the other points that the network uses."""
+    """Ports of a body: contacts, then other points of the network."""
     ports = [
         port
         for contact in contacts.values()
@@ -283,7 +269,7 @@ def _ports(case: ValveCase, body: ElasticBody, contacts: Mapping[str, StopContac
 
 
 def _surface_port(case: ValveCase, body: str, mesh: Mesh, point: str) -> Port:
-    """Port of a point that is no contact; +z is up, whatever the side that is pressed."""
+    """Port of a point that is no contact; +z is up, whatever the pressed side."""
     given = case.bodies[body].ports.get(point)
     surface = given.surface if given is not None else point
     if given is None or given.load == "axial":

@@ -1,7 +1,7 @@
-"""Static loops of a contact whose bodies yield, in the meridian plane.
+"""Static loops of contacts that yield, in the meridian plane.
 
-The same for the contact of an impact and an end stop of a valve.  Where a law has no yield though
-the materials do, a warning says so and the law stays elastic.
+For an impact and an end stop of a valve. Where a law has no yield though the materials do, it
+stays elastic, with a warning.
 """
 
 import warnings
@@ -42,40 +42,36 @@ __all__ = ["law_loops", "law_with_yield", "loaded_body", "loops_with_yield", "te
 Floats = NDArray[np.float64]
 
 _GROWTH = 1.3
-"""Force from one fitted state to the next: closer ones fit the noise of the mesh."""
+"""Force from one fitted state to the next: closer ones fit mesh noise."""
 
 _FEWEST_POINTS = 5
-"""Points in contact from which on a state is fitted: the first ones are noise of the mesh."""
+"""Points in contact of the first fitted state: earlier ones are mesh noise."""
 
 _RISE = 0.4
-"""Of the limit over its first value, from which the search begins: 1.7 to 2.4 Y."""
+"""First guess of the limit over its first value: 1.7 to 2.4 Y."""
 
 _RISES = (-6.0, 3.0)
-"""Least and largest logarithm of the rise of one line over the first value."""
+"""Least and largest logarithm of the rise of a line over the first value."""
 
 _UNEVEN = 0.05
-"""Deviation that a line is worth which rises by a factor of e more than its neighbour: the limit
-rises evenly with the logarithm of the set, and what else it does is noise of the mesh."""
+"""Deviation of a line that rises by a factor of e more than its neighbour: the limit rises evenly
+with the logarithm of the set, the rest is mesh noise.
+"""
 
 _NONE = 10.0
-"""Deviation of a limit with which no forces are found."""
+"""Deviation of a limit without forces."""
 
 
 def fitted_limit(loops: YieldingLoops, space: ContactSpace, C: Floats) -> PressureLimit | None:
-    """Limit with which the same contact takes the force and the loss of its static loops.
+    """Limit with which the same contact takes force and loss of its static loops, if any.
 
     Straight lines between the deepest plastic gaps of the states; least squares of the deviations
-    of loss and of softening, compared with elastic bodies, of all states alike, by their force.
+    of loss and softening (against elastic bodies), all states alike by their force.
 
     Parameters
     ----------
     C (nc, nc) [m/N]
-        Elastic compliance of both bodies at its points.
-
-    Returns
-    -------
-    PressureLimit or None
-        None where nothing yields, or no state is resolved.
+        Elastic, of both bodies.
     """
     chosen = _chosen(loops)
     if not chosen:
@@ -101,7 +97,7 @@ def fitted_limit(loops: YieldingLoops, space: ContactSpace, C: Floats) -> Pressu
 
 
 def _chosen(loops: YieldingLoops) -> list[int]:
-    """States to fit: resolved ones, each with so much more force than the one before."""
+    """Resolved states to fit, each with enough more force than the one before."""
     chosen: list[int] = []
     loss, least = loops.loss, 0.0
     for j in reversed(range(len(loops.states))):
@@ -114,7 +110,7 @@ def _chosen(loops: YieldingLoops) -> list[int]:
 
 
 class _Bed:
-    """The contact of static loops with points that yield for themselves."""
+    """Contact of static loops with points that yield for themselves."""
 
     def __init__(self, space: ContactSpace, C: Floats, loops: YieldingLoops) -> None:
         self.space, self.C, self.loops, self.loss = space, C, loops, loops.loss
@@ -128,7 +124,7 @@ class _Bed:
         return np.asarray(self.space.gap - (self.start + approach) * self.space.axial)
 
     def deviations(self, j: int, law: PressureLimit) -> tuple[float, float]:
-        """Deviations of loss and softening from those of a state of the loops."""
+        """Deviations of loss and softening from a state of the loops."""
         n, state = self.space.count, self.loops.states[j]
         limit = Limit(self.space.area, law.set, law.pressure, law.softness)
         worn, gap = Worn.none(n), np.zeros(n)
@@ -158,11 +154,11 @@ class _Bed:
 _LEFT_OUT = "the contact leaves out the yield of its faces"
 
 _ZONE = 5.0
-"""Radius of the first zone, over the half width of the elastic contact at its highest force."""
+"""Radius of the first zone over the half width of the elastic contact."""
 
 
 def loaded_body(case: CaseFile, body: ElasticBody, flexibility: Flexibility) -> LoadedBody:
-    """Body of a contact with its materials; one that is given by its matrices does not yield."""
+    """Body of a contact with its materials; given matrices do not yield."""
     given = case.bodies[body.name].material is None
     materials = {} if given else case.materials_of(body.name, body.mesh.solids)
     return LoadedBody(body=body, flexibility=flexibility, materials=materials)
@@ -181,25 +177,25 @@ def law_loops(
 ) -> YieldingLoops | None:
     """Static loops for the law of a reduced model; None where it stays elastic.
 
-    They are kept in the cache of the upper body.  Bodies of three dimensions are told of by
+    Kept in the cache of the upper body.  Three dimensions:
     :func:`klack.analyses.impact.contact_check.check_yield`.
 
     Parameters
     ----------
     static
-        Of the elastic bodies, beyond that energy.
+        Elastic, beyond that energy.
     wider
-        Contact points of the same surfaces that reach further, or the error again.
+        Contact points that reach further, or the error again.
     energy [J]
     closing [N]
         Force that keeps working while the bodies approach.
     beside
-        Key of what else the law has, and so has no yield; empty for nothing.
+        Key of what the law has instead of yield, or empty.
 
     Warns
     -----
     AccuracyWarning
-        Where yield is left out though the materials have it.
+        Of yield that is left out.
     """
     if not (upper.yields or lower.yields) or upper.body.dimension != 2:
         return None
@@ -250,12 +246,9 @@ def law_loops(
 
 
 def law_with_yield(loops: YieldingLoops, modal_compliance: float) -> YieldingLaw | None:
-    """Law of these loops, see :func:`klack.contact.plasticity.loops.yielding_law`; None for none.
+    """Law of these loops; None, with a warning, where there is none.
 
-    Warns
-    -----
-    AccuracyWarning
-        Where there is none.
+    See :func:`klack.contact.plasticity.loops.yielding_law`.
     """
     try:
         return yielding_law(loops, modal_compliance)
@@ -276,24 +269,19 @@ def loops_with_yield(
 ) -> YieldingLoops:
     """Static loops up to the energy of an impact, and the pressure limit fitted to them.
 
+    Raises as :func:`klack.contact.plasticity.loops.yielding_loops`.
+
     Parameters
     ----------
     static
-        Of the elastic bodies, beyond that energy: it says where they may yield first.
+        Elastic, beyond that energy: where they may yield first.
     space
         Of that contact, or wider.
     C (nc, nc) [m/N]
-        Elastic compliance of both bodies at its points.
+        Elastic, of both bodies.
     energy [J]
     closing [N]
         Force that keeps working while the bodies approach.
-
-    Raises
-    ------
-    ConvergenceError
-        Where the loops end below the impact.
-    ReachError
-        Where the contact grows to the border of the candidate points.
     """
     weight = static.pressures[-1] / static.pressures[-1].sum()
     place = weight @ static.space.points
@@ -315,19 +303,9 @@ def loops_with_yield(
 
 
 def tell_elastic(case: CaseFile, what: str) -> None:
-    """Warn that a computation leaves out the yield stress of the materials; silent without one.
+    """Warn that a computation leaves out the yield stress of materials.
 
-    Parameters
-    ----------
-    case
-        For the materials of its bodies.
-    what
-        That is computed, with its verb: ``the deck is of``.
-
-    Warns
-    -----
-    AccuracyWarning
-        Names the materials.
+    ``what`` is computed, with its verb: ``the deck is of``.
     """
     names = set()
     for body in case.bodies.values():
