@@ -1,4 +1,4 @@
-"""Lay one impact over another: force history and one-third-octave levels."""
+"""Two impacts compared: force history and one-third-octave levels."""
 
 import numpy as np
 import scipy
@@ -18,9 +18,9 @@ _RANGE = 40.0  # [dB] below the highest band
 
 
 def first_impact(history: ImpactHistory) -> TimeSeries:
-    """Force of the first impact alone [N], from the record before touch to the one after release.
+    """Force of the first impact [N], from the record before touch to the one after release.
 
-    Time counts from first touch.
+    Time from first touch.
     """
     measures = measure_impact(history)
     end = measures.first_touch + measures.total_contact_time
@@ -37,12 +37,12 @@ def first_impact(history: ImpactHistory) -> TimeSeries:
 
 
 def impact_third_octaves(history: ImpactHistory, *, high: float | None = None) -> ThirdOctaves:
-    """One-third-octave energies of the force of the first impact, from the band at 20 Hz up.
+    """One-third-octave energies of the force of the first impact, from 20 Hz up.
 
     Parameters
     ----------
     high [Hz]
-        ``None``: a tenth of the record rate.
+        Default: a tenth of the record rate.
     """
     series = first_impact(history)
     limit = _RESOLVED / series.step if high is None else high
@@ -52,9 +52,9 @@ def impact_third_octaves(history: ImpactHistory, *, high: float | None = None) -
 
 
 def compare_histories(reference: ImpactHistory, candidate: ImpactHistory) -> Deviation:
-    """Deviation of the first impact of ``candidate`` from that of ``reference``.
+    """Deviation of the first impact of ``candidate`` from ``reference``.
 
-    Both are aligned at first touch and averaged over the coarser of the two record steps.
+    Both are aligned at first touch and averaged over the coarser record step.
     """
     a, b = measure_impact(reference), measure_impact(candidate)
     high = _RESOLVED / max(reference.step, candidate.step)
@@ -84,7 +84,7 @@ def _history_l2(reference: ImpactHistory, candidate: ImpactHistory) -> float:
 
 
 def _means(series: TimeSeries, edges: NDArray) -> NDArray:
-    """Mean values between new edges; the impulse gathered is interpolated, so none is lost."""
+    """Mean values between new edges; interpolated impulses lose nothing."""
     own = series.start + series.step * (np.arange(series.values.size + 1) - 0.5)
     gathered = np.concatenate(([0.0], np.cumsum(series.values) * series.step))
     impulse = scipy.interpolate.PchipInterpolator(own, gathered)(np.clip(edges, own[0], own[-1]))

@@ -22,9 +22,8 @@ class CumulativeEnergy:
     frequency (k,) [Hz]
         From ``f_1`` to ``f_2``.
     share (k,) [-]
-        From 0 to 1.
     total [unit^2 s]
-        Energy between ``f_1`` and ``f_2``, N^2 s for a force.
+        Between ``f_1`` and ``f_2``.
     """
 
     frequency: NDArray[np.float64]
@@ -32,13 +31,7 @@ class CumulativeEnergy:
     total: float
 
     def frequency_below(self, share: float) -> float:
-        """Frequency [Hz] below which a share of the energy lies, e.g. 0.9.
-
-        Parameters
-        ----------
-        share [-]
-            Above 0 and below 1.
-        """
+        """Frequency [Hz] below which a share (0 to 1) of the energy lies."""
         if not 0.0 < share < 1.0:
             raise InputError(
                 "CumulativeEnergy.frequency_below",
@@ -53,20 +46,15 @@ class CumulativeEnergy:
 
 
 def cumulative_energy(density: Spectrum, *, low: float, high: float) -> CumulativeEnergy:
-    """Add the energy of a transient up over frequency, by trapezia.
+    """Sum the energy of a transient over frequency, by trapezia.
 
     Parameters
     ----------
     density
         One-sided, from :func:`klack.acoustics.spectrum.energy_spectral_density`.
     low, high [Hz]
-        Limits ``f_1`` and ``f_2``; say them beside a share, which depends on them.  A force that
-        stays has no energy of finite size from 0 Hz on.
-
-    Raises
-    ------
-    InputError
-        Limits out of order or out of the density; no energy between them.
+        ``f_1`` and ``f_2``; state them with a share. A force that stays has no finite energy from
+        0 Hz on.
     """
     frequency, values = density.frequency, np.real(density.values)
     if not 0.0 <= low < high <= frequency[-1] * (1.0 + 1e-12):

@@ -12,23 +12,22 @@ __all__ = ["drive_pattern"]
 
 
 def drive_pattern(click: TimeSeries, rate: float, duration: float) -> TimeSeries:
-    r"""Repeat a click; tails that overlap are added.
+    r"""Repeat a click, overlapping tails added.
 
     .. math:: p(t) = \sum_{i=0}^{n-1} p_1(t - i/r), \qquad
               \hat p = \hat p_1\, e^{-i \pi f (n-1)/r}\, \frac{\sin(\pi n f/r)}{\sin(\pi f/r)}
 
-    The sum is taken over the spectrum, so clicks fall between samples where their rate demands it:
-    rounding to samples would be heard as jitter.  The click should be band limited, as that of
-    :func:`klack.acoustics.sound.click_pressure` is.
+    The sum over the spectrum puts clicks between samples: rounding would be audible jitter. The
+    click should be band limited, as :func:`klack.acoustics.sound.click_pressure` is.
 
     Parameters
     ----------
     click
-        Its first value comes first in the pattern.
+        Its first value begins the pattern.
     rate [Hz]
-        Clicks per second, ``r``.
+        ``r``.
     duration [s]
-        Of the pattern; clicks that begin before its end are in it, tails beyond are cut off.
+        Clicks that begin before its end are in it, tails beyond are cut.
     """
     require_positive("drive_pattern: rate", rate, "Hz")
     require_positive("drive_pattern: duration", duration, "s")

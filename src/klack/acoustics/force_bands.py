@@ -1,9 +1,8 @@
 """One-third-octave energies of a force from 20 Hz to 200 kHz.
 
-A seated needle presses before and after the stroke, so the spectrum is that of a
-force that is held at both ends (:func:`klack.acoustics.spectrum.force_spectrum`).  Four decades of
-bands ask for fine frequencies at the low end and for short steps at the high end; each decade has a
-spectrum of its own.
+A seated needle presses before and after the stroke: the force is held at both ends
+(:func:`klack.acoustics.spectrum.force_spectrum`). Low bands need fine frequencies, high ones short
+steps; each decade has a spectrum of its own.
 """
 
 from collections.abc import Sequence
@@ -27,7 +26,7 @@ __all__ = [
 Floats = NDArray[np.float64]
 
 LOWEST, HIGHEST = 17.0, 224e3
-"""Limits [Hz] that hold the bands from 20 Hz to 200 kHz with their edges."""
+"""Limits [Hz] of the bands from 20 Hz to 200 kHz, edges included."""
 _MARGIN = 1.0 + 1e-9  # so that the bands at both ends are within their own edges
 _LEAST_PER_BAND, _MOST_PER_BAND = 8.0, 200.0  # frequencies in the lowest band of a decade
 _RATE, _TOP_RATE = 100.0, 40.0  # of the sampling over the highest frequency of a decade
@@ -41,9 +40,9 @@ class BandDensity:
     Parameters
     ----------
     low, high [Hz]
-        The bands within these limits.
+        Of the bands.
     frequency, values (k,) [Hz], [N^2 s/Hz]
-        A little beyond both limits.
+        A little beyond.
     """
 
     low: float
@@ -60,9 +59,9 @@ def force_densities(
     Parameters
     ----------
     force
-        Means over intervals; held at its first and last value outside.
+        Means over intervals; first and last value are held outside.
     low, high [Hz]
-        Bands within these limits; at most a tenth of the sampling rate.
+        Of the bands; at most a tenth of the sampling rate.
     """
     numbers = band_numbers(low, min(high, 0.1 / force.step))
     lows, highs = band_edges(numbers)
@@ -90,19 +89,12 @@ def force_densities(
 
 
 def density_bands(densities: Sequence[BandDensity]) -> ThirdOctaves:
-    """One-third-octave energies of densities of :func:`force_densities` [N^2 s]."""
+    """One-third-octave energies [N^2 s] of :func:`force_densities`."""
     return _joined([_energies(item, item.frequency, item.values) for item in densities])
 
 
 def force_bands(force: TimeSeries, *, low: float = LOWEST, high: float = HIGHEST) -> ThirdOctaves:
-    """One-third-octave energies of a force, from the band at 20 Hz to that at 200 kHz [N^2 s].
-
-    Parameters
-    ----------
-    force
-        See :func:`force_densities`.
-    low, high [Hz]
-    """
+    """One-third-octave energies of a force [N^2 s]; see :func:`force_densities`."""
     return density_bands(force_densities(force, low=low, high=high))
 
 
@@ -122,16 +114,14 @@ def _joined(parts: Sequence[ThirdOctaves]) -> ThirdOctaves:
 
 
 def averaged(force: TimeSeries, step: float) -> TimeSeries:
-    """Means over longer intervals, so that the impulse stays.
+    """Means over longer intervals, which keep the impulse.
 
-    The first and the last value are held for one interval each, so that the ends stay as they are.
+    First and last value are held for one interval each, so that the ends stay.
 
     Parameters
     ----------
-    force
-        Means over intervals.
     step [s]
-        Rounded to a multiple of the step of the force.
+        Rounded to a multiple of that of the force.
     """
     size = max(1, round(step / force.step))
     if size == 1:

@@ -1,22 +1,21 @@
 r"""Vibration of a held body under the forces of its stops, exactly, step by step.
 
-The forces are constant over each interval (contact forces are recorded as means), so every mode is
-propagated without error, from its static equilibrium under the first force:
+Forces are constant over each interval (recorded means), so modes are propagated without error,
+from static equilibrium under the first force:
 
 .. math:: \ddot q_i + 2 \zeta_i \omega_i \dot q_i + \omega_i^2 q_i = \sum_p \varphi_{ip} F_p
 
-The energy injected at a port is :math:`\int F v\,\mathrm dt = \sum_k F_k\,(y_{k+1} - y_k)` with the
-motion ``y`` of the modes at the port, exactly.  The loss :math:`\int 2 \zeta \omega \dot q^2
-\mathrm dt` is integrated over the exact motion in each interval, not taken as a difference, so the
-balance of both with the energy of the modes is a check.  The static rest of the modes left out is a
-massless spring in the contact, which gives back what it takes; it is not among them.
+The energy injected at a port is :math:`\int F v\,\mathrm dt = \sum_k F_k\,(y_{k+1} - y_k)` with
+the motion ``y`` of the modes, exactly. The loss :math:`\int 2 \zeta \omega \dot q^2 \mathrm dt` is
+integrated over the exact motion, not taken as a difference, so their balance with the energy of
+the modes is a check. The static rest of the omitted modes is a massless spring, which gives back
+what it takes.
 
 The force on the rigid hold follows from the momentum of the whole body,
 
 .. math:: R = \sum_p F_p - \frac{\mathrm d}{\mathrm dt} \sum_i p_i \dot q_i,
 
-which is exact at rest, whatever the number of modes, because the modes left out are in static
-equilibrium with the force.
+exact at rest for any number of modes: the omitted ones are in static equilibrium with the force.
 """
 
 from collections.abc import Mapping
@@ -37,12 +36,12 @@ __all__ = ["ModalResponse", "aligned_forces", "modal_response", "port_forces", "
 def port_forces(
     structure: Structure, stop_forces: Mapping[str, TimeSeries]
 ) -> dict[str, TimeSeries]:
-    """Forces along +z at the ports that the given stops push.
+    """Forces along +z at the ports that stops push.
 
     Parameters
     ----------
-    stop_forces : mapping of stop name to TimeSeries [N]
-        Above zero when the stop presses.
+    stop_forces [N]
+        By stop, above zero when it presses.
     """
     result = {}
     for port, stop, sign in zip(
@@ -63,13 +62,7 @@ def port_forces(
 def aligned_forces(
     structure: Structure, forces: Mapping[str, TimeSeries]
 ) -> tuple[TimeSeries, NDArray[np.float64]]:
-    """One of the forces, for its time axis, and the forces at all ports, shape (n, p) [N].
-
-    Raises
-    ------
-    InputError
-        Without a force, for an unknown port, or for forces on different grids.
-    """
+    """One force, for its time axis, and the forces at all ports (n, p) [N], on one grid."""
     if not forces:
         raise InputError(
             f"forces on '{structure.name}'",
@@ -106,23 +99,22 @@ class ModalResponse:
     Parameters
     ----------
     injected (p,) [J]
-        Work of each port's force on the modes.
+        Work of each force on the modes.
     energy_before [J]
-        Of the static equilibrium at the start.
+        Static equilibrium at the start.
     modal_energy (m,) [J]
-        Kinetic and strain energy of each mode at the end.
+        Kinetic and strain, at the end.
     dissipated (m,) [J]
-        Lost in the damping of each mode.
+        In the damping of each mode.
     ringing (m,) [J]
-        Energy of each mode at the end about its equilibrium under the last force: what it will
-        still lose if that force stays.
+        At the end about equilibrium under the last force: still to be lost if it stays.
     stored (n + 1,) [J]
-        Energy of all modes at the ends of the intervals.
+        All modes, ends of intervals.
     blocked_force [N]
-        Axial force on the hold, means over the intervals; along +z from the forces.
+        Axial, on the hold, means; along +z from the forces.
     sample_time (k,) [s]
     modal_displacement, modal_velocity (k, m) [m sqrt(kg)], [m sqrt(kg)/s]
-        States at the sample times.
+        At the sample times.
     """
 
     body: str
@@ -145,12 +137,12 @@ class ModalResponse:
 
     @property
     def vibration_energy(self) -> float:
-        """Energy put into vibration [J]: lost so far, or still ringing."""
+        """Energy into vibration [J]: lost so far, or ringing."""
         return float(self.dissipated.sum() + self.ringing.sum())
 
     @property
     def residual(self) -> float:
-        """Residual of the energy balance, over the energy throughput [-]."""
+        """Of the energy balance, over the throughput [-]."""
         held = float(self.modal_energy.sum()) - self.energy_before
         lost = float(self.dissipated.sum())
         scale = max(float(np.abs(self.injected).sum()), self.energy_before, float(self.stored[-1]))
@@ -165,12 +157,12 @@ def modal_response(
     Parameters
     ----------
     structure
-        Rigidly held, or on a mount (:func:`klack.acoustics.mount.mounted`).
-    forces : mapping of port name to TimeSeries [N]
-        Along +z, means over intervals whose middles are their times, all on one grid.  The first
-        value has always acted.
+        Rigidly held, or :func:`klack.acoustics.mount.mounted`.
+    forces [N]
+        By port, along +z, means over intervals whose middles are their times, on one grid.  The
+        first value has always acted.
     sample [s]
-        Spacing of recorded states; none are recorded without.
+        Spacing of recorded states; default: none.
     """
     axis, values = aligned_forces(structure, forces)
     every = _interval(sample, axis)
@@ -224,14 +216,9 @@ def modal_response(
 
 
 def surface_velocity(structure: Structure, response: ModalResponse) -> Floats:
-    """Mean normal velocity of every face at the sample times [m/s], shape (k, f).
+    """Mean normal velocity of faces at the sample times [m/s], shape (k, f).
 
-    That of the modes: the static rest follows the force, and its velocity the rate of the force.
-
-    Parameters
-    ----------
-    response
-        With samples.
+    That of the modes, without static rest, which follows the force.
     """
     return np.asarray(response.modal_velocity @ structure.face_shapes.T.astype(np.float64))
 
@@ -255,7 +242,7 @@ def _interval(sample: float | None, axis: TimeSeries) -> int:
 def _march(  # type: ignore[no-untyped-def]
     A, Q, squares, phi, part, force, q, v, every, states, stored, momentum, work, lost
 ):  # pragma: no cover - compiled
-    """Propagate all modes; ``q`` and ``v`` are the states at the start, and then at the end."""
+    """Propagate all modes; ``q`` and ``v`` are states at the start, then at the end."""
     m, ports = phi.shape
     moved = np.zeros(ports)
     for k in range(len(force) + 1):

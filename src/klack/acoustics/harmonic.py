@@ -1,4 +1,4 @@
-r"""Answer of a structure to a harmonic force of 1 N, ``exp(+i omega t)``.
+r"""Response of a structure to a harmonic force of 1 N, ``exp(+i omega t)``.
 
 With :math:`H_i = 1/(\omega_i^2 - \omega^2 + 2 i \zeta_i \omega_i \omega)` and the mobility
 :math:`Y_s` of the support (zero for a rigid hold) the blocked force and the apparent mass are
@@ -7,8 +7,8 @@ With :math:`H_i = 1/(\omega_i^2 - \omega^2 + 2 i \zeta_i \omega_i \omega)` and t
           A = M + \omega^2 \sum_i p_i^2 H_i
 
 and the held surfaces move with :math:`v = B Y_s / (1 + i \omega A Y_s)`, the modes with
-:math:`\dot q_i = i \omega H_i (\varphi_i - i \omega p_i v)`.  Exact for the kept modes; those left
-out answer statically to the force, and move with the support.
+:math:`\dot q_i = i \omega H_i (\varphi_i - i \omega p_i v)`. Exact for kept modes; others respond
+statically, and move with the support.
 """
 
 from dataclasses import dataclass
@@ -32,11 +32,11 @@ class HarmonicResponse:
     ----------
     frequency (k,) [Hz]
     fields (k, b)
-        Of the surface fields of the structure: ``q'`` of the modes [1/(sqrt(kg) ...)], ``i omega``
-        of the static rest of the loaded port, and the velocity of the support.
+        Of the structure: ``q'`` of modes [1/(sqrt(kg) ...)], ``i omega`` of the static rest of the
+        loaded port, velocity of the support.
     support_velocity (k,) [m/(N s)]
     support_force (k,) [-]
-        Axial force on the support: of a rigid hold the blocked force.
+        Axial; of a rigid hold the blocked force.
     """
 
     frequency: NDArray[np.float64]
@@ -60,7 +60,7 @@ def harmonic_response(
     frequency (k,) [Hz]
         Zero or above.
     mount, plate
-        What is below the held surfaces.
+        Below the held surfaces.
     """
     f, at = response_axis(frequency), structure.port_index(port)
     m, count = len(structure.omega), len(structure.port_names)

@@ -2,15 +2,13 @@ r"""Energy that forces bring into a structure, over frequency.
 
 .. math:: \int F v\,\mathrm dt = \int_0^\infty 2\, \mathrm{Re}(Y)\, |\hat F|^2\,\mathrm df
 
-Only damping takes up power for good, so the density is the sum of what the modes lose until they
-are at rest.  Written with the spectrum of the *steps* of the force it stays finite for a force that
-begins or ends above zero:
+Only damping takes up power for good: the density is what the modes lose until they rest. With the
+spectrum of the *steps* of the force it stays finite for a force that begins or ends above zero:
 
 .. math:: e(f) = 2 \sum_i 2 \zeta_i \omega_i \left| H_i \sum_p \varphi_{ip}\,
           \widehat{\mathrm dF}_p \right|^2
 
-Its integral is all the energy that went into vibration: what the forces inject, less the change of
-the static energy between the first and the last one.
+Its integral is the energy into vibration: injected, less the change of the static energy.
 """
 
 from collections.abc import Mapping
@@ -32,22 +30,16 @@ _PER_HALF_WIDTH = 3.0  # frequencies per zeta f: the trapezoidal rule errs by 2 
 def injected_density(
     structure: Structure, forces: Mapping[str, TimeSeries], *, resolution: float | None = None
 ) -> Spectrum:
-    """One-sided density of the energy that the modes lose, from the first force to rest [J/Hz].
+    """Density of the energy that the modes lose, from the first force to rest [J/Hz]; one-sided.
+
+    Rejects undamped modes, whose spectrum is a row of lines.
 
     Parameters
     ----------
-    structure
-        With damping in every mode.
-    forces : mapping of port name to TimeSeries [N]
-        Along +z, means over intervals, constant within them; held at the last value afterwards.
+    forces [N]
+        By port, along +z, constant over intervals; the last value is held.
     resolution [Hz]
-        Inverse of the time left after the record for the vibration to die away; a third of the
-        narrowest half width ``zeta f`` without.
-
-    Raises
-    ------
-    InputError
-        For a structure without damping, whose spectrum is a row of lines.
+        Inverse of the time left to decay; default: a third of the narrowest half width ``zeta f``.
     """
     width = structure.damping * structure.omega / (2.0 * np.pi)
     if not np.all(width > 0.0):
@@ -71,13 +63,13 @@ def injected_density(
 
 
 def injected_energy(density: Spectrum) -> float:
-    """Integral of :func:`injected_density` over all its frequencies [J]."""
+    """Integral of :func:`injected_density` [J]."""
     return float(np.trapezoid(np.real(density.values), density.frequency))
 
 
 @njit
 def _density(omega, steps, w, zeta, phi):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Sum the losses of all modes at all frequencies, shape (k,)."""
+    """Losses of all modes at all frequencies, shape (k,)."""
     out = np.zeros(omega.size)
     for k in range(omega.size):
         square = omega[k] * omega[k]

@@ -1,7 +1,7 @@
-r"""Loudness and sharpness of a sound: ISO 532-1 (Zwicker), time varying, and DIN 45692.
+"""Loudness and sharpness of a sound: ISO 532-1 (Zwicker), time varying, and DIN 45692.
 
-The loudness follows one-third-octave levels every 0.5 ms through the ear's masking and its slow
-decay after a click; one value every 2 ms is given.  The method is that of the package MoSQITo.
+One-third-octave levels every 0.5 ms pass the ear's masking and slow decay; one value per 2 ms is
+given. Method of the package MoSQITo.
 """
 
 from dataclasses import dataclass
@@ -25,25 +25,24 @@ _FAINT = "fainter than 0.1 sone at its loudest: no sharpness is given"
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Loudness:
-    """Loudness over time and its single-number measures.
+    """Loudness over time and single measures.
 
     Parameters
     ----------
     time (n,) [s]
-        Every 2 ms, on the time axis of the sound.
+        Every 2 ms.
     loudness (n,) [sone]
     maximum [sone]
-        The loudest moment, ``N_max``.
+        ``N_max``.
     percentile_5 [sone]
-        ``N_5``, exceeded in 5 % of the time.  Of a single click it depends on how much silence is
-        recorded with it; compare drive patterns.
+        ``N_5``, exceeded in 5 % of the time. For a single click it depends on the silence
+        recorded; compare drive patterns.
     level [phon]
-        Loudness level of the maximum.
+        Of the maximum.
     sharpness [acum]
-        DIN 45692 of the specific loudness summed over the whole sound; 0 where the sound is too
-        faint for it.
+        DIN 45692, of the specific loudness over the whole sound; 0 where too faint.
     note
-        Empty, or what is to be said beside the numbers.
+        Empty, or a remark on the numbers.
     """
 
     time: NDArray[np.float64]
@@ -56,19 +55,9 @@ class Loudness:
 
 
 def time_varying_loudness(pressure: TimeSeries) -> Loudness:
-    """Loudness of a sound in a free field from the front, ISO 532-1:2017 method for time varying.
+    """Loudness of a sound [Pa] at 48 kHz, free field from the front, ISO 532-1:2017, time varying.
 
-    The filters start from silence: a sound that begins at once needs 0.3 s to its final loudness.
-
-    Parameters
-    ----------
-    pressure [Pa]
-        At 48 kHz; its level counts, so it must be in pascal.
-
-    Raises
-    ------
-    InputError
-        Another rate.
+    The filters start from silence: a sudden sound needs 0.3 s to its final loudness.
     """
     if abs(pressure.rate / _RATE - 1.0) > 1e-6:
         raise InputError(
@@ -99,11 +88,7 @@ def loudness_level(loudness: float) -> float:
     .. math:: L_N = 40 + 10 \log_2 N \ (N \ge 1), \qquad
               L_N = \max(3,\ 40 (N + 0.0005)^{0.35}) \ (N < 1)
 
-    ISO 532-1:2017, 5.8; 3 phon is the least that is given.
-
-    Parameters
-    ----------
-    loudness [sone]
+    ISO 532-1:2017, 5.8; 3 phon is the least.
 
     Examples
     --------
@@ -118,8 +103,8 @@ def loudness_level(loudness: float) -> float:
 def _zwicker(pressure: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Loudness, shape (n,) [sone], and specific loudness, shape (240, n) [sone/Bark].
 
-    The steps of MoSQITo's ``loudness_zwtv``, with our own decay of hearing: there it takes three
-    quarters of the time, and lets the end of a sound act on its beginning.
+    Steps of MoSQITo's ``loudness_zwtv``, but its decay of hearing, which takes three quarters of
+    the time, and lets the end of a sound act on its beginning.
     """
     from mosqito.sq_metrics.loudness.loudness_zwst._calc_slopes import _calc_slopes
     from mosqito.sq_metrics.loudness.loudness_zwst._main_loudness import _main_loudness
@@ -133,7 +118,7 @@ def _zwicker(pressure: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArra
 
 
 def _sharpness(specific: NDArray[np.float64]) -> float:
-    r"""Sharpness [acum] of a specific loudness, shape (240,), of any scale.
+    r"""Sharpness [acum] of a specific loudness (240,) of any scale.
 
     .. math:: S = 0.11\, \frac{\int N' g(z) z\,\mathrm dz}{\int N'\,\mathrm dz}, \qquad
               g = 1\ (z \le 15.8), \quad 0.15\, e^{0.42 (z - 15.8)} + 0.85\ (z > 15.8)

@@ -3,9 +3,8 @@ r"""Mobility: velocity per force between the ports of a structure.
 .. math:: Y_{pq} = i\omega \left( \sum_i \frac{\varphi_{ip} \varphi_{iq}}
           {\omega_i^2 - \omega^2 + 2 i \zeta_i \omega_i \omega} + R_{pq} \right)
 
-``R`` is what the modes miss of the static compliance; its share is a spring and takes up no power.
-On a mount the motion of the support is added.  Symmetric (reciprocity), and the real part at the
-driven port is never below zero.
+``R`` is the residual compliance, a spring that takes up no power. On a mount the motion of the
+support is added. Symmetric (reciprocity); the real part at the driven port is never below zero.
 """
 
 import numpy as np
@@ -28,7 +27,7 @@ def drive_point_mobility(
     plate: Plate | None = None,
     residual: bool = True,
 ) -> NDArray[np.complex128]:
-    """Velocity of a port per force on it [m/(N s)], shape (k,); see :func:`transfer_mobility`."""
+    """Velocity of a port per force on it [m/(N s)], as :func:`transfer_mobility`."""
     return transfer_mobility(
         structure, port, port, frequency, mount=mount, plate=plate, residual=residual
     )
@@ -48,13 +47,11 @@ def transfer_mobility(
 
     Parameters
     ----------
-    output, source
-        Names of ports.
     frequency (k,) [Hz]
     mount, plate
-        What is below the held surfaces.
+        Below the held surfaces.
     residual
-        Add the static rest of the modes left out.
+        Add ``R``.
     """
     answer = harmonic_response(structure, frequency, source, mount=mount, plate=plate)
     i, j = structure.port_index(output), structure.port_index(source)
@@ -76,8 +73,8 @@ def support_force_transfer(
 ) -> NDArray[np.complex128]:
     """Axial force on the support per force at a port [-], shape (k,).
 
-    Of a rigid hold that is the blocked force; it goes to 1 towards 0 Hz.  Above the kept modes it
-    goes to the share of the force that they do not carry away, and means nothing.
+    Of a rigid hold the blocked force, which goes to 1 towards 0 Hz. Above the kept modes it means
+    nothing.
     """
     answer = harmonic_response(structure, frequency, port, mount=mount, plate=plate)
     return answer.support_force

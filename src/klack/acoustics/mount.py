@@ -1,4 +1,4 @@
-r"""Elastic mount: the held surfaces move along the axis on a spring, and all with them.
+r"""Elastic mount: the held surfaces move along the axis on a spring.
 
 One rigid boundary mode ``s`` joins the modes of the held body (Craig & Bampton 1968):
 
@@ -8,8 +8,8 @@ One rigid boundary mode ``s`` joins the modes of the held body (Craig & Bampton 
           \begin{pmatrix} q \\ s \end{pmatrix} =
           \begin{pmatrix} \varphi^T F \\ \sum F \end{pmatrix}
 
-with the participations ``p = R_z^T M phi``.  What the kept modes miss of the mass moves with the
-mount.  The force of the impacts stays that of the rigidly held body.
+with the participations ``p = R_z^T M phi``. Mass that the kept modes miss moves with the mount.
+Impact forces stay those of the rigidly held body.
 """
 
 from dataclasses import dataclass, replace
@@ -32,10 +32,10 @@ class Mount:
     Parameters
     ----------
     stiffness [N/m]
-        Along the axis.
+        Axial.
     loss_factor [-]
     mass [kg]
-        Of all that moves on it; the mass of the structure without.
+        That moves on it; default: of the structure.
     """
 
     stiffness: float
@@ -48,13 +48,7 @@ class Mount:
 
 
 def moved_mass(structure: Structure, mount: Mount | None) -> float:
-    """Mass that moves with the support [kg].
-
-    Raises
-    ------
-    InputError
-        If it is less than what the modes of the structure carry.
-    """
+    """Mass on the support [kg], at least that in the modes."""
     mass = structure.mass if mount is None or mount.mass is None else mount.mass
     carried = float(structure.participation @ structure.participation)
     if not mass > carried:
@@ -70,15 +64,11 @@ def moved_mass(structure: Structure, mount: Mount | None) -> float:
 def support_mobility(
     frequency: NDArray[np.float64], mount: Mount | None, plate: Plate | None
 ) -> NDArray[np.complex128]:
-    r"""Velocity of the held surfaces per force on what is below [m/(N s)], shape (k,).
+    r"""Velocity of the held surfaces per force below [m/(N s)], shape (k,).
 
     .. math:: Y_s = \frac{i \omega}{k (1 + i \eta)} + \frac{1}{8 \sqrt{D m''}}
 
-    Spring and plate are in series; zero for a rigid hold.
-
-    Parameters
-    ----------
-    frequency (k,) [Hz]
+    Spring and plate in series; zero for a rigid hold.
     """
     omega = 2.0 * np.pi * np.asarray(frequency, dtype=float)
     total = np.zeros(omega.shape, dtype=complex)
@@ -90,17 +80,11 @@ def support_mobility(
 
 
 def mounted(structure: Structure, mount: Mount) -> Structure:
-    r"""The same structure on an elastic mount, in its new modes.
+    """The same structure, rigidly held before, on an elastic mount, in its new modes.
 
-    The equations of the module text are solved for their eigenmodes without further neglect; all
-    that a :class:`Structure` tells of modes is carried over to the new ones.  Their damping ratios
-    share the losses of the old modes and of the mount in proportion to the energy in each (modal
-    strain energy, Johnson & Kienholz 1982), which holds as long as damped modes do not overlap.
-
-    Parameters
-    ----------
-    structure
-        Rigidly held.
+    The eigenmodes of the module's equations, nothing neglected. Their damping ratios share the
+    losses of the old modes and the mount by the energy in each (modal strain energy, Johnson &
+    Kienholz 1982), as long as damped modes do not overlap.
     """
     mass, m = moved_mass(structure, mount), len(structure.omega)
     M, K = np.eye(m + 1), np.diag([*structure.omega**2, mount.stiffness])
@@ -132,7 +116,7 @@ def mounted(structure: Structure, mount: Mount) -> Structure:
 
 
 def _carried_fields(structure: Structure, psi: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Old surface fields in terms of the new ones, shape (b, b + 1)."""
+    """Old surface fields by the new ones, shape (b, b + 1)."""
     m, b = len(structure.omega), structure.group_gram.shape[1]
     carried = np.zeros((b, b + 1))
     carried[:m, : m + 1] = psi[:m]

@@ -1,9 +1,8 @@
 r"""Decay of loudness in the ear after a sound: the diode network of ISO 532-1:2017, clause 6.
 
-Per critical band the core loudness ``u`` charges a capacitor at once, and through a diode and a
-resistor a second one, slowly.  When it falls, the voltage ``v`` of the first follows a linear
-network with the voltage ``w`` of the second: after a click the ear lets go at once, after a long
-sound slowly.
+Per critical band the core loudness ``u`` charges a capacitor (``v``) at once, and through a diode
+and a resistor a second one (``w``). When it falls, both follow a linear network: the decay after a
+click is fast, after a long sound slow.
 
 .. math::
     \text{rising } (u \ge v): &\quad v = u, \quad t_v\, \dot w = u - w \\
@@ -12,9 +11,9 @@ sound slowly.
         t_v\, \dot w = v - w \\
     \text{falling, } v \le w: &\quad t_l\, \dot v = -v, \quad w = v
 
-with ``t_s = 5 ms``, ``t_l = 15 ms``, ``t_v = 75 ms``; ``v`` never falls below ``u``, nor does ``w``
-rise above ``v`` in falling. ``u`` is taken straight between its values, which come every 0.5 ms, in
-24 steps; each is solved exactly.
+with ``t_s = 5 ms``, ``t_l = 15 ms``, ``t_v = 75 ms``; ``v`` never falls below ``u``, nor does
+``w`` rise above ``v`` in falling. ``u`` is straight between values every 0.5 ms, in 24 exact
+steps.
 """
 
 import numpy as np
@@ -35,7 +34,7 @@ def nonlinear_decay(core: NDArray[np.float64]) -> NDArray[np.float64]:
     Parameters
     ----------
     core (bands, n) [sone/Bark]
-        Every 0.5 ms, zero or more; silence before the first and after the last value.
+        Every 0.5 ms, zero or more; silence before and after.
     """
     h = _STEP / _FINE
     b = (_LONG - _SHORT) / (_SHORT * _VARIABLE)

@@ -1,12 +1,11 @@
-r"""A plate that carries the valve: how easily it bends under a point force, and what it radiates.
+r"""A plate that carries the valve: mobility and radiation.
 
-A force :math:`\hat F` on an infinite thin plate meets the real, frequency-independent mobility
+A force on an infinite thin plate meets the real, frequency-independent mobility
 
 .. math:: Y = \frac{1}{8 \sqrt{D\, m''}}, \qquad D = \frac{E h^3}{12 (1 - \nu^2)}
 
-(Cremer, Heckl & Petersson 2005, sec. 5.2), which is also the mean of a finite plate over frequency
-and place.  The bending power that flows in is lost inside the plate and to the air; in balance the
-air gets
+(Cremer, Heckl & Petersson 2005, sec. 5.2), also the mean of a finite plate over frequency and
+place. Of the bending power the air gets
 
 .. math:: \frac{W_{rad}}{W_{in}} = \frac{\eta_{rad}}{\eta_{rad} + \eta}, \qquad
           \eta_{rad} = \frac{2 \rho c\, \sigma}{\omega m''}
@@ -27,13 +26,7 @@ __all__ = ["Air", "Plate", "baffled_plate_efficiency"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Air:
-    """Still air; the numbers given are those at 20 degC and 1013 hPa.
-
-    Parameters
-    ----------
-    density [kg/m^3]
-    sound_speed [m/s]
-    """
+    """Still air; by default at 20 degC and 1013 hPa."""
 
     density: float = 1.204
     sound_speed: float = 343.2
@@ -57,16 +50,16 @@ _MOST = 2.0  # the formulas have poles that a real plate has not
 class Plate:
     """Thin square plate in bending.
 
-    Thin means that bending waves are longer than six thicknesses: below ``c_L / (20 h)``, 250 kHz
-    for 1 mm of steel.
+    Thin: bending waves longer than six thicknesses, below ``c_L / (20 h)``, 250 kHz for 1 mm of
+    steel.
 
     Parameters
     ----------
     thickness [m]
     area [m^2]
-        Of one side.
+        One side.
     loss_factor [-]
-        Of the mounted plate.
+        Mounted.
     """
 
     thickness: float
@@ -91,7 +84,7 @@ class Plate:
 
     @property
     def mobility(self) -> float:
-        """Velocity per point force of the infinite plate [m/(N s)]; real.
+        """Velocity per point force [m/(N s)]; real.
 
         Examples
         --------
@@ -102,24 +95,18 @@ class Plate:
         return 1.0 / (8.0 * float(np.sqrt(self.bending_stiffness * self.mass_per_area)))
 
     def coincidence(self, air: Air) -> float:
-        """Frequency [Hz] at which a bending wave is as fast as sound in air."""
+        """Frequency [Hz] at which bending waves are as fast as sound."""
         ratio = self.mass_per_area / self.bending_stiffness
         return float(air.sound_speed**2 / (2.0 * np.pi) * np.sqrt(ratio))
 
     def efficiency(self, frequency: Floats, air: Air) -> Floats:
-        """Radiation efficiency [-] of the plate, see :func:`baffled_plate_efficiency`."""
+        """Radiation efficiency [-], see :func:`baffled_plate_efficiency`."""
         return baffled_plate_efficiency(
             frequency, self.coincidence(air), area=self.area, sound_speed=air.sound_speed
         )
 
     def radiated_share(self, frequency: Floats, air: Air) -> Floats:
-        """Share [-] of the bending power that the plate radiates from both sides, shape (k,).
-
-        Parameters
-        ----------
-        frequency (k,) [Hz]
-            Above zero.
-        """
+        """Share [-] of the bending power radiated from both sides, frequency above 0."""
         omega = 2.0 * np.pi * np.asarray(frequency, dtype=float)
         radiation = 2.0 * air.impedance * self.efficiency(frequency, air)
         radiation = radiation / (omega * self.mass_per_area)
@@ -129,7 +116,7 @@ class Plate:
 def baffled_plate_efficiency(
     frequency: Floats, coincidence: float, *, area: float, sound_speed: float
 ) -> Floats:
-    r"""Radiation efficiency of a baffled, simply supported square plate of resonant bending waves.
+    r"""Radiation efficiency of a baffled, simply supported square plate, resonant waves.
 
     Below coincidence corners and edges radiate, with :math:`\lambda = \sqrt{f/f_c}`
 
@@ -139,10 +126,10 @@ def baffled_plate_efficiency(
               \left[\frac{8 c^2}{f_c^2 \pi^4 A}
               \frac{1-2\lambda^2}{\lambda\sqrt{1-\lambda^2}}\right]_{f < f_c/2}
 
-    (Maidanik 1962, with perimeter ``P``), above it :math:`1/\sqrt{1 - f_c/f}`.  Near coincidence
-    :math:`\sqrt{\pi f P/(16 c)}` is the limit, below the first mode :math:`4 A (f/c)^2`, and 2
-    everywhere; the joints are those of EN 12354-1:2000, annex B.  Free edges without a baffle
-    radiate less at low frequencies.  An estimate within some decibels.
+    (Maidanik 1962, with perimeter ``P``), above it :math:`1/\sqrt{1 - f_c/f}`. Limits are
+    :math:`\sqrt{\pi f P/(16 c)}` near coincidence, :math:`4 A (f/c)^2` below the first mode, and 2
+    everywhere, joined as in EN 12354-1:2000, annex B. Free edges without a baffle radiate less at
+    low frequencies. Within some decibels.
 
     Parameters
     ----------

@@ -1,15 +1,13 @@
-r"""Radiated power of a vibrating surface, an upper bound (equivalent radiated power).
+r"""Radiated power of a vibrating surface, an upper bound (ERP).
 
 .. math:: T(f) = \rho c\, \sigma \int_A |Y_n|^2\,\mathrm dA \quad [\mathrm{W/N^2}]
 
-is the power that a force of 1 N (rms) at a port lets a surface radiate, with the normal velocity
-per force :math:`Y_n`.  A transient of the force spectrum :math:`\hat F` radiates the energy
-:math:`T\,2|\hat F|^2` per hertz, f > 0.
+is the power that a surface radiates per 1 N (rms) at a port, with the normal velocity per force
+:math:`Y_n`. A transient radiates the energy :math:`T\,2|\hat F|^2` per hertz, f > 0.
 
-Every element radiates as a piece of a surface that moves in phase over many wavelengths: parts
-that move against each other, and cancel below coincidence, are added here.  Hence the bound.  The
-efficiency of a baffled piston as large as the whole body takes off what a body smaller than the
-wavelength cannot radiate.
+Every element radiates as if the surface moved in phase over many wavelengths; parts that cancel
+below coincidence are added: hence the bound. The efficiency of a baffled piston as large as the
+body takes off what a body smaller than the wavelength cannot radiate.
 """
 
 from dataclasses import dataclass
@@ -44,7 +42,7 @@ _SERIES_BELOW = 1e-2  # of 2 k a; the closed form has lost nine digits there
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PowerTransfer:
-    """Radiated power per mean square force at one port.
+    """Radiated power per mean square force at a port.
 
     Parameters
     ----------
@@ -84,13 +82,13 @@ def power_transfer(
     Parameters
     ----------
     frequency (k,) [Hz]
-        Above zero; fine enough for the resonances, whose half-power width is ``2 zeta f``.
+        Above zero; fine enough for half-power widths ``2 zeta f``.
     port
-        Where the force acts along z.
+        Force along z.
     mount, plate
-        What is below the held surfaces.
+        Below the held surfaces.
     efficiency
-        Of the surface of the body; the plate has its own.
+        Of the body; the plate has its own.
     """
     air = air or Air()
     answer = harmonic_response(structure, frequency, port, mount=mount, plate=plate)
@@ -130,12 +128,6 @@ def piston_efficiency(
     r"""Radiation efficiency of a rigid circular piston in a baffle (Rayleigh 1878, par. 302).
 
     .. math:: \sigma = 1 - \frac{J_1(2 k a)}{k a}, \qquad \pi a^2 = A
-
-    Parameters
-    ----------
-    frequency (k,) [Hz]
-    area [m^2]
-    sound_speed [m/s]
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Single numbers of a sound: levels, and how impulsive it is."""
+"""Single measures of a sound."""
 
 from dataclasses import dataclass
 from math import exp, log10
@@ -98,17 +98,16 @@ class SoundStatistics:
     Parameters
     ----------
     peak_level, peak_level_C [dB re 20 uPa]
-        Of the peak without weighting, and with C.
+        Without weighting, and with C.
     exposure_level, exposure_level_A [dB re (20 uPa)^2 s]
-        Energy of the whole record; per click where the record is one.
+        Of the whole record, perhaps a click.
     equivalent_level_A [dB re 20 uPa]
-        Energy mean over the record.
+        Energy mean.
     fast_level_A [dB re 20 uPa]
         Highest with the time weighting F: that of the exposure + 9.0 dB for a click alone.
     kurtosis, crest_factor [-]
-        Over the whole record, see there.
     duration [s]
-        Of the record, which kurtosis, crest factor and equivalent level depend on.
+        On which kurtosis, crest factor and equivalent level depend.
     """
 
     peak_level: float
@@ -123,12 +122,7 @@ class SoundStatistics:
 
 
 def sound_statistics(pressure: TimeSeries) -> SoundStatistics:
-    """All numbers of a sound at once.
-
-    Parameters
-    ----------
-    pressure [Pa]
-    """
+    """All measures of a sound [Pa]."""
     audible = weighted(pressure, "A")
     return SoundStatistics(
         peak_level=peak_level(pressure),
@@ -167,9 +161,9 @@ def kurtosis(series: TimeSeries) -> float:
 
     .. math:: \beta = \frac{\overline{(p - \bar p)^4}}{\left(\overline{(p - \bar p)^2}\right)^2}
 
-    3 for Gaussian noise, 1.5 for a sine; high for rare clicks.  A click of fixed shape in a record
-    ``k`` times as long has ``k`` times the kurtosis: compare records of the same length, or drive
-    patterns.  0 for a constant.
+    3 for Gaussian noise, 1.5 for a sine, high for rare clicks, 0 for a constant. A click in a
+    record ``k`` times as long has ``k`` times the kurtosis: compare equal lengths, or drive
+    patterns.
     """
     x = series.values - series.values.mean()
     second = float(np.mean(x**2))
@@ -179,19 +173,14 @@ def kurtosis(series: TimeSeries) -> float:
 def crest_factor(series: TimeSeries) -> float:
     """Peak over root mean square; sqrt(2) for a sine; 0 for silence.
 
-    Grows with the square root of the length of the record for a single click.
+    For a single click it grows with the square root of the record length.
     """
     rms = float(np.sqrt(np.mean(series.values**2)))
     return float(np.max(np.abs(series.values)) / rms) if rms > 0.0 else 0.0
 
 
 def peak_level(pressure: TimeSeries) -> float:
-    """Level of the highest absolute sample [dB re 20 uPa]; -inf for silence.
-
-    Parameters
-    ----------
-    pressure [Pa]
-    """
+    """Level of the highest absolute sample [dB re 20 uPa]; -inf for silence."""
     return _level(float(np.max(np.abs(pressure.values))) ** 2 / PRESSURE_REFERENCE**2)
 
 
@@ -199,36 +188,21 @@ def sound_exposure_level(pressure: TimeSeries) -> float:
     r"""Sound exposure level [dB re (20 uPa)^2 s]; -inf for silence.
 
     .. math:: L_E = 10 \lg \frac{\int p^2\,\mathrm dt}{(20\,\mathrm{\mu Pa})^2 \cdot 1\,\mathrm s}
-
-    Parameters
-    ----------
-    pressure [Pa]
     """
     return _level(float(np.sum(pressure.values**2)) * pressure.step / EXPOSURE_REFERENCE)
 
 
 def equivalent_level(pressure: TimeSeries) -> float:
-    """Energy mean level over the record [dB re 20 uPa]; -inf for silence.
-
-    Parameters
-    ----------
-    pressure [Pa]
-    """
+    """Energy mean level [dB re 20 uPa]; -inf for silence."""
     return _level(float(np.mean(pressure.values**2)) / PRESSURE_REFERENCE**2)
 
 
 def pressure_third_octaves(
     pressure: TimeSeries, *, low: float = 17.0, high: float = 22_400.0
 ) -> ThirdOctaves:
-    """One-third-octave sound exposures of a record [Pa^2 s], ideal filters.
+    """One-third-octave sound exposures [Pa^2 s], ideal filters; by default 20 Hz to 20 kHz.
 
     Levels: ``level_re(EXPOSURE_REFERENCE)``, in dB re (20 uPa)^2 s.
-
-    Parameters
-    ----------
-    pressure [Pa]
-    low, high [Hz]
-        From the band at 20 Hz to that at 20 kHz.
     """
     finest = 0.1 * low  # of the lowest band's width, a quarter of low
     count = max(pressure.values.size, int(np.ceil(1.0 / (finest * pressure.step))))

@@ -1,11 +1,11 @@
-r"""From a contact force to a sound pressure that can be listened to: an estimate.
+r"""From a contact force to an audible sound pressure: an estimate.
 
-The structure radiates the power ``T(f) |F|^2``.  All of it is given to a monopole in a free field:
+The radiated power ``T(f) |F|^2`` is given to a monopole in a free field:
 
 .. math:: |\hat p(f)|^2 = \frac{\rho c}{4 \pi r^2}\, T(f)\, |\hat F(f)|^2
 
-``T`` has no phase, so the filter from force to pressure is given minimum phase: causal, and as
-early as possible.  Directivity, reflections and the travel time ``r/c`` are left out.
+``T`` has no phase: the filter from force to pressure gets minimum phase. Directivity, reflections
+and the travel time ``r/c`` are left out.
 """
 
 from math import pi
@@ -24,9 +24,9 @@ __all__ = ["audio_band", "click_pressure", "minimum_phase_filter", "pressure_tra
 def minimum_phase_filter(magnitude: NDArray[np.float64]) -> NDArray[np.complex128]:
     r"""Frequency response of minimum phase with a given magnitude, shape (N/2 + 1,).
 
-    A magnitude alone does not say when a filter answers.  Of all causal and stable filters of one
-    magnitude the minimum-phase one gathers its energy first; its phase is the Hilbert transform of
-    the logarithm of its magnitude (Oppenheim and Schafer, Discrete-Time Signal Processing, ch. 12).
+    Of all causal and stable filters of one magnitude it gathers its energy first; its phase is the
+    Hilbert transform of the logarithm of its magnitude (Oppenheim and Schafer, Discrete-Time
+    Signal Processing, ch. 12).
 
     .. math:: \ln H = \mathcal F\{ w_n\, \mathcal F^{-1}\{\ln |H|\} \}, \qquad
               w_0 = w_{N/2} = 1,\ w_n = 2 \ (0 < n < N/2),\ w_n = 0 \ (n > N/2)
@@ -34,9 +34,8 @@ def minimum_phase_filter(magnitude: NDArray[np.float64]) -> NDArray[np.complex12
     Parameters
     ----------
     magnitude (N/2 + 1,)
-        At N/2 + 1 frequencies, evenly from 0 to half the sampling rate; above zero everywhere.
-        The cepstrum must have died out within N/2 samples, so N is taken much longer than the
-        filter rings.
+        Evenly from 0 to half the sampling rate, above zero. The cepstrum must die out within N/2
+        samples: N is taken much longer than the filter rings.
 
     Examples
     --------
@@ -77,39 +76,28 @@ def click_pressure(
     .. math:: \hat p(f) = H(f)\, \frac{\widehat{\dot F}(f)}{2 \pi i f}, \qquad
               |H(f)| = \sqrt{\frac{\rho c\, T(f)}{4 \pi r^2}}
 
-    The force is taken by its changes within the record: one that is there from the beginning, or
-    stays to the end (a valve held closed), makes no sound at the ends.  The Fourier integral is
-    evaluated below half the rate of the sound alone, so nothing is folded into it; the band is
-    limited between 20 and 23.5 kHz (at 48 kHz), as part of the minimum-phase filter.  All impacts
-    of the record keep their times; time is that of the force, without the travel time ``r/c``.
+    Only changes of the force within the record sound, not a force there at its ends (a valve held
+    closed). The Fourier integral is evaluated below half the rate of the sound alone: no aliasing;
+    the minimum-phase filter limits the band between 20 and 23.5 kHz (at 48 kHz). Time is that of
+    the force; the sound begins 5 ms earlier, for the onset of a first impact.
 
     Parameters
     ----------
     force [N]
-        Means over its steps; no longer than those of the sound.
+        Means over steps, no longer than those of the sound.
     frequency (k,) [Hz]
-        Increasing; a value at 0 is ignored.
+        Increasing; 0 is ignored.
     transfer (k,) [W/N^2]
-        Radiated power per mean square force ``T``, zero or more.  In between it is interpolated
-        monotonically in logarithms; below the first frequency it falls with ``f^4`` (surface held
-        by a stiffness, smaller than the wave length), above the last it stays.
+        ``T``, zero or more, interpolated monotonically in logarithms; below the first frequency it
+        falls with ``f^4`` (surface held by a stiffness, smaller than the wave length), above the
+        last it stays.
     distance [m]
     density [kg/m^3]
     sound_speed [m/s]
     rate [Hz]
         Of the sound.
     tail [s]
-        Sound after the end of the force record.
-
-    Returns
-    -------
-    TimeSeries [Pa]
-        Begins 5 ms before the force record, so that the onset of a first impact is in it.
-
-    Raises
-    ------
-    InputError
-        Force too coarse, frequencies not increasing, negative or vanishing transfer.
+        After the force record.
     """
     for name, value, unit in (
         ("distance", distance, "m"),
@@ -148,15 +136,15 @@ def pressure_transfer(
 ) -> NDArray[np.complex128]:
     """Minimum-phase filter with a given squared magnitude, band limited.
 
-    Of the magnitude ``(2 sin(pi f / rate))^2`` is taken out before the logarithm is transformed and
-    put back as ``(1 - z^-1)^2``, which is of minimum phase itself: at 0 Hz the rest is finite.
+    ``(2 sin(pi f / rate))^2`` is taken out before the logarithm and put back as ``(1 - z^-1)^2``,
+    of minimum phase: the rest is finite at 0 Hz.
 
     Parameters
     ----------
     f (N/2 + 1,) [Hz]
         Evenly from 0 to half the rate.
     frequency, squared (k,) [Hz], [Pa^2/N^2]
-        Interpolated as in :func:`click_pressure`.
+        Interpolated as :func:`click_pressure`.
     rate [Hz]
     """
     first = f[1]
@@ -171,11 +159,7 @@ def pressure_transfer(
 def audio_band(f: NDArray[np.float64], *, rate: float = 48_000.0) -> NDArray[np.float64]:
     """Magnitude of the band limit: 1 up to 20 kHz, half a cosine down to 1e-6 at 23.5 kHz.
 
-    Parameters
-    ----------
-    f [Hz]
-    rate [Hz]
-        Other rates than 48 kHz shift the limits in proportion.
+    Other rates [Hz] than 48 kHz shift the limits in proportion.
     """
     x = np.clip((f / rate - _PASS) / (_STOP - _PASS), 0.0, 1.0)
     band: NDArray[np.float64] = np.maximum(0.5 * (1.0 + np.cos(pi * x)), _FLOOR)

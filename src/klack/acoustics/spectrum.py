@@ -1,14 +1,13 @@
-r"""Spectra of transients: how much impulse an impact carries at each frequency.
+r"""Spectra of transients: impulse at each frequency.
 
 .. math:: \hat F(f) = \int F(t)\, e^{-2\pi i f t}\,\mathrm dt \quad [\mathrm{N\,s}], \qquad
           E(f) = 2\,|\hat F(f)|^2 \quad [\mathrm{N^2 s/Hz}]
 
-so that the integral of the one-sided energy spectral density ``E`` from 0 to infinity is the
-integral of ``F^2`` over time (Parseval), and ``F(0)`` is the impulse. Levels: of the spectrum ``20
-lg(|F| / 1 uN s)``, of the density ``10 lg(E / ((1 uN)^2 s/Hz))``; a band energy is levelled re ``(1
-uN)^2 s``, so it has the level re 1 uN of a steady force with the same energy in one second. A
-transient that starts and ends at zero needs no window; one that is cut off gets a half-cosine tail,
-whose length is the caller's decision.
+The integral of the one-sided energy spectral density ``E`` is that of ``F^2`` over time
+(Parseval), and ``F(0)`` is the impulse. Levels: spectrum ``20 lg(|F| / 1 uN s)``, density ``10
+lg(E / ((1 uN)^2 s/Hz))``, band energy re ``(1 uN)^2 s``, the level re 1 uN of a steady force with
+the same energy in one second. A transient from zero to zero needs no window; one cut off gets a
+half-cosine tail of the caller's length.
 """
 
 from collections.abc import Callable
@@ -49,7 +48,7 @@ _Zoom = Callable[[NDArray[np.float64]], NDArray[np.complex128]]
 
 
 def force_series(history: ImpactHistory) -> TimeSeries:
-    """Contact force of a history as a time series [N]."""
+    """Contact force of a history [N]."""
     return TimeSeries(
         step=history.step,
         values=history.force,
@@ -60,12 +59,7 @@ def force_series(history: ImpactHistory) -> TimeSeries:
 
 
 def half_cosine_tail(series: TimeSeries, *, length: float) -> TimeSeries:
-    """Fade the last ``length`` seconds of a series to zero with half a cosine.
-
-    Parameters
-    ----------
-    length [s]
-    """
+    """Fade the last ``length`` [s] of a series to zero with half a cosine."""
     count = round(length / series.step)
     if not 0 < count <= series.values.size:
         raise InputError(
@@ -90,13 +84,12 @@ def impulse_spectrum(
     Parameters
     ----------
     series
-        Starts and ends near zero (see :func:`half_cosine_tail`).
+        From zero to zero (:func:`half_cosine_tail`).
     resolution [Hz]
-        Largest distance of the frequencies; zeros are padded to reach it.  Padding interpolates the
-        spectrum, it adds no information.
+        Largest distance of the frequencies, by zero padding, which interpolates.
     interval_means
-        The values are means over their steps (histories are): the ``sinc`` of that mean is divided
-        out up to half the sampling rate.  ``False``: the values are samples.
+        Values are means over steps (histories): their ``sinc`` is divided out up to half the
+        sampling rate. ``False``: samples.
     """
     values = series.values
     peak = float(np.max(np.abs(values)))
@@ -130,13 +123,13 @@ def impulse_spectrum(
 def change_spectrum(
     series: TimeSeries, *, high: float, count: int, origin: float = 0.0
 ) -> NDArray[np.complex128]:
-    r"""Fourier integral of the rate of change within a record, at even frequencies.
+    r"""Fourier integral of the rate of change within a record, shape (count,) [unit].
 
     .. math:: \int \dot F(t)\, e^{-2\pi i f (t - t_0)}\,\mathrm dt
 
-    A force that is there from the beginning, or that stays to the end, does not count as a change
-    there.  Values are means over their steps; far finer ones than ``high`` needs are averaged, and
-    the ``sinc^2`` of means and straight changes is divided out.
+    A force at the ends of the record is no change there. Values are means over steps; far finer
+    ones than ``high`` needs are averaged, and the ``sinc^2`` of means and straight changes is
+    divided out.
 
     Parameters
     ----------
@@ -144,18 +137,9 @@ def change_spectrum(
         At least two values per period of ``high``.
     high [Hz]
     count
-        Of the frequencies, from 0 to ``high``.
+        Even frequencies from 0 to ``high``.
     origin [s]
-        Time ``t_0`` that phases belong to.
-
-    Returns
-    -------
-    complex array, shape (count,) [unit]
-
-    Raises
-    ------
-    InputError
-        Series too coarse for ``high``.
+        ``t_0``.
     """
     require_positive("change_spectrum: high", high, "Hz")
     if series.step * high * _COARSE > 1.0 + 1e-9:
@@ -184,7 +168,7 @@ def change_spectrum(
 def _zoom(size: int, high: float, count: int, rate: float) -> _Zoom:
     """Fourier sums of ``size`` values at ``count`` frequencies from 0 to ``high``.
 
-    What a transform prepares is kept for the next record of the same length, unless it is large.
+    Preparations are kept for the next record of this length, unless large.
     """
     made = _kept_zoom if size + count <= _KEPT else _kept_zoom.__wrapped__
     return made(size, high, count, rate)
@@ -196,23 +180,21 @@ def _kept_zoom(size: int, high: float, count: int, rate: float) -> _Zoom:
 
 
 def force_spectrum(series: TimeSeries, *, high: float, resolution: float | None = None) -> Spectrum:
-    r"""Fourier integral of a record that may begin or stay loaded, one-sided, [unit s].
+    r"""Fourier integral of a record that may begin or end loaded, one-sided, [unit s].
 
     .. math:: \hat F(f) = \frac{1}{2\pi i f} \int \dot F(t)\, e^{-2\pi i f t}\,\mathrm dt
 
-    The same as :func:`impulse_spectrum` where the record begins and ends at zero.  A force that
-    stays adds its ``1/f`` at low frequencies; it cannot be given at 0 Hz, where the value of the
-    next frequency is put.
+    As :func:`impulse_spectrum` from zero to zero. A force that stays adds ``1/f``; 0 Hz gets the
+    value of the next frequency.
 
     Parameters
     ----------
     series
-        Means over its steps.
+        Means over steps.
     high [Hz]
-        Last frequency; record at least twice as many values per second.
+        At most half the sampling rate.
     resolution [Hz]
-        Largest distance of the frequencies; ``None``: an eighth of the inverse length of the
-        record, within 0.1 and 2 Hz.
+        Largest distance; default: an eighth of the inverse record length, within 0.1 and 2 Hz.
     """
     span = series.values.size * series.step
     wanted = 1.0 / (_OVERSAMPLED * span)
@@ -227,13 +209,7 @@ def force_spectrum(series: TimeSeries, *, high: float, resolution: float | None 
 
 
 def energy_spectral_density(spectrum: Spectrum) -> Spectrum:
-    """One-sided energy spectral density ``2 |F(f)|^2`` [unit^2 / Hz * s^0], real.
-
-    Parameters
-    ----------
-    spectrum
-        From :func:`impulse_spectrum`, in N s; the density is in N^2 s/Hz = (N s)^2.
-    """
+    """One-sided density ``2 |F(f)|^2``, of N s in N^2 s/Hz = (N s)^2."""
     return Spectrum(
         frequency=spectrum.frequency,
         values=2.0 * np.abs(spectrum.values) ** 2,
@@ -243,24 +219,12 @@ def energy_spectral_density(spectrum: Spectrum) -> Spectrum:
 
 
 def impulse_level(spectrum: Spectrum) -> NDArray[np.float64]:
-    """Level of an impulse spectrum [dB re 1 uN s], shape (k,).
-
-    Parameters
-    ----------
-    spectrum
-        In N s.
-    """
+    """Level of an impulse spectrum [N s], dB re 1 uN s, shape (k,)."""
     smallest = np.finfo(float).tiny
     return 20.0 * np.log10(np.maximum(np.abs(spectrum.values), smallest) / IMPULSE_REFERENCE)
 
 
 def density_level(density: Spectrum) -> NDArray[np.float64]:
-    """Level of an energy spectral density of a force [dB re (1 uN)^2 s/Hz], shape (k,).
-
-    Parameters
-    ----------
-    density
-        From :func:`energy_spectral_density`, in N^2 s/Hz.
-    """
+    """Level of a force density [N^2 s/Hz], dB re (1 uN)^2 s/Hz, shape (k,)."""
     smallest = np.finfo(float).tiny
     return 10.0 * np.log10(np.maximum(np.real(density.values), smallest) / DENSITY_REFERENCE)

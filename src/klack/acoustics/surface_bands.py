@@ -1,12 +1,12 @@
-r"""Motion of a surface and the sound it radiates, band by band, under the forces of all ports.
+r"""Motion of a surface and its sound, band by band, under the forces of all ports.
 
-With the velocity spectra :math:`y_i(f)` of the surface fields under all forces together, one matrix
-per band holds everything,
+With the velocity spectra :math:`y_i(f)` of the surface fields under all forces, one matrix per
+band,
 
 .. math:: C_{ij} = \int_{band} 2\,\mathrm{Re}(y_i\, y_j^*)\,\mathrm df:
 
-the squared normal velocity of a face, integrated over time, is :math:`\phi^T C \phi`, and a group
-with the Gram matrix ``G`` radiates :math:`\rho c\, \mathrm{tr}(G C)` if its efficiency is 1.
+gives the squared normal velocity of a face over time, :math:`\phi^T C \phi`, and the energy
+:math:`\rho c\, \mathrm{tr}(G C)` that a group with the Gram matrix ``G`` radiates at efficiency 1.
 """
 
 from collections.abc import Iterator, Mapping
@@ -43,7 +43,7 @@ _DECAY = 2.0  # inverse half widths zeta f of ringing after the record: all but 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RadiatedBands:
-    """Energy that a transient radiates.
+    """Energy radiated by a transient.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class RadiatedBands:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Decade:
-    """Spectra over some bands: frequency (k,), fields (k, b), force (k,), weights (n, k) [Hz]."""
+    """Bands: frequency (k,), fields (k, b), force (k,), weights (n, k) [Hz]."""
 
     frequency: Floats
     fields: Complexes
@@ -75,13 +75,11 @@ class _Decade:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SurfaceSpectra:
-    """Velocity spectra of a surface in some bands, computed once for several questions.
+    """Velocity spectra of a surface in bands, computed once.
 
     Parameters
     ----------
     bands (n, 2) [Hz]
-    parts
-        Spectra, decade by decade.
     """
 
     structure: Structure
@@ -91,7 +89,7 @@ class SurfaceSpectra:
     parts: tuple[_Decade, ...]
 
     def face_velocity(self, *, period: float = 1.0) -> Floats:
-        """Normal velocity of every face in every band; see :func:`face_band_velocity`."""
+        """Normal velocity of faces in bands, as :func:`face_band_velocity`."""
         require_positive("face velocity: period", period, "s")
         own = self.structure
         shapes = np.hstack([own.face_shapes, own.face_residual, own.axial_normals[:, None]])
@@ -124,11 +122,11 @@ class SurfaceSpectra:
         return RadiatedBands(names=names, bands=self.bands, energy=energy)
 
     def support_energy(self) -> Floats:
-        r"""Energy that flows through the held surfaces into mount and plate, in every band [J].
+        r"""Energy through the held surfaces into mount and plate, in every band [J].
 
         .. math:: \int_{band} 2\,\mathrm{Re}(Y_s)\,|\hat F_s|^2\,\mathrm df
 
-        with mobility :math:`Y_s` of the support and force :math:`F_s` on it; zero for a rigid hold.
+        with mobility :math:`Y_s` of the support; zero for a rigid hold.
         """
         return np.array(
             [
@@ -152,16 +150,16 @@ def surface_spectra(
     mount: Mount | None = None,
     plate: Plate | None = None,
 ) -> SurfaceSpectra:
-    """Velocity spectra of the surface under all forces together.
+    """Velocity spectra of the surface under all forces.
 
     Parameters
     ----------
-    forces : mapping of port name to TimeSeries [N]
-        Along +z, means over intervals; held at their first and last values outside.
+    forces [N]
+        By port, along +z, means over intervals; held at both ends.
     bands (n, 2) [Hz]
-        Lower and upper edges, ascending.
+        Edges, ascending.
     mount, plate
-        What is below the held surfaces.
+        Below the held surfaces.
     """
     aligned_forces(structure, forces)
     edges = _edges(bands, forces)
@@ -178,18 +176,9 @@ def face_band_velocity(
     plate: Plate | None = None,
     period: float = 1.0,
 ) -> Floats:
-    """Normal velocity of every face in every band: rms over a period with one such transient.
+    """Normal velocity of faces in bands (n, f) [m/s]: rms over a period with one such transient.
 
-    Parameters
-    ----------
-    structure, forces, bands, mount, plate
-        See :func:`surface_spectra`.
-    period [s]
-        From click to click.
-
-    Returns
-    -------
-    array, shape (n, f) [m/s]
+    Parameters as of :func:`surface_spectra`; ``period`` [s] is from click to click.
     """
     spectra = surface_spectra(structure, forces, bands, mount=mount, plate=plate)
     return spectra.face_velocity(period=period)
@@ -207,13 +196,8 @@ def radiated_bands(
 ) -> RadiatedBands:
     """Energy that each group of the surface, and the plate, radiate in every band.
 
-    Unlike :func:`klack.acoustics.radiation.power_transfer` for one port, the forces of several
-    ports add with their phases here.  The same upper bound.
-
-    Parameters
-    ----------
-    structure, forces, bands, mount, plate
-        See :func:`surface_spectra`.
+    As of :func:`klack.acoustics.radiation.power_transfer`, but forces of several ports add with
+    their phases. Parameters as of :func:`surface_spectra`.
     """
     spectra = surface_spectra(structure, forces, bands, mount=mount, plate=plate)
     return spectra.radiated(efficiency=efficiency, air=air)
@@ -226,7 +210,7 @@ def _decades(
     mount: Mount | None,
     plate: Plate | None,
 ) -> Iterator[_Decade]:
-    """Spectra of the surface fields, decade by decade: low bands need fine frequencies."""
+    """Spectra by decade: low bands need fine frequencies."""
     first = 0
     while first < len(edges):
         within = edges[first:, 1] <= max(_DECADE * edges[first, 0], edges[first, 1]) * 1.0001
@@ -265,7 +249,7 @@ def _decade(
 
 
 def _spacing(structure: Structure, edges: Floats, mount: Mount | None, length: float) -> float:
-    """Distance of frequencies [Hz] that resolves the bands, the record and the resonances."""
+    """Distance of frequencies [Hz] that resolves bands, record and resonances."""
     width = float(edges[0, 1] - edges[0, 0])
     f = structure.omega / (2.0 * np.pi)
     near = (f > 0.5 * edges[0, 0]) & (f < 2.0 * edges[-1, 1])
@@ -277,7 +261,7 @@ def _spacing(structure: Structure, edges: Floats, mount: Mount | None, length: f
 
 
 def _products(fields: Complexes, weights: Floats) -> Floats:
-    """Integral of ``2 Re(y y^*)`` with these weights, shape (b, b)."""
+    """Weighted integral of ``2 Re(y y^*)``, shape (b, b)."""
     within = np.flatnonzero(weights)
     if not within.size:
         return np.zeros((fields.shape[1], fields.shape[1]))

@@ -1,9 +1,8 @@
-r"""One-third-octave bands of transients, base ten (IEC 61260-1:2014).
+"""One-third-octave bands of transients, base ten (IEC 61260-1:2014).
 
-Middle frequencies ``f_m = 1000 Hz * G^(k/3)`` with ``G = 10^(3/10)``; a band reaches from ``f_m
-G^(-1/6)`` to ``f_m G^(1/6)``.  The standard stops in the audible range; the same formula is used
-here as far up as needed.  A band energy is the integral of the energy spectral density over the
-band, with the fractional part of the frequency steps at both edges: ideal filters, no leakage.
+Middle frequencies ``f_m = 1000 Hz * G^(k/3)`` with ``G = 10^(3/10)``, bands from ``f_m G^(-1/6)``
+to ``f_m G^(1/6)``, beyond the audible range of the standard too. A band energy is the integral of
+the energy spectral density, with fractions of steps at the edges: ideal filters.
 """
 
 from dataclasses import dataclass
@@ -30,7 +29,7 @@ ENERGY_REFERENCE = 1e-12  # [N^2 s], (1 uN)^2 over 1 s
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ThirdOctaves:
-    """Energy of a transient in one-third-octave bands.
+    """Energy of a transient in bands.
 
     Parameters
     ----------
@@ -38,8 +37,7 @@ class ThirdOctaves:
         ``k``: 0 is the band at 1 kHz.
     middle, low, high (n,) [Hz]
     energy (n,) [unit^2 s]
-        Integral of the energy spectral density over the band, N^2 s for a force, Pa^2 s for a
-        sound.
+        N^2 s for a force, Pa^2 s for a sound.
     """
 
     number: NDArray[np.int64]
@@ -50,23 +48,17 @@ class ThirdOctaves:
 
     @property
     def level(self) -> NDArray[np.float64]:
-        """Level of each band of a force [dB re (1 uN)^2 s = 1e-12 N^2 s], shape (n,)."""
+        """Level of each band of a force [dB re (1 uN)^2 s], shape (n,)."""
         return self.level_re(ENERGY_REFERENCE)
 
     def level_re(self, reference: float) -> NDArray[np.float64]:
-        """Level of each band [dB re ``reference``], shape (n,).
-
-        Parameters
-        ----------
-        reference [unit^2 s]
-            Of a sound (20 uPa)^2 s.
-        """
+        """Level of each band [dB re ``reference``], of a sound (20 uPa)^2 s, shape (n,)."""
         smallest = np.finfo(float).tiny
         return 10.0 * np.log10(np.maximum(self.energy, smallest) / reference)
 
 
 def middle_frequencies(number: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Exact middle frequencies [Hz] of bands by number (0 is 1 kHz).
+    """Exact middle frequencies [Hz] of bands (0 is 1 kHz).
 
     Examples
     --------
@@ -77,18 +69,13 @@ def middle_frequencies(number: NDArray[np.int64]) -> NDArray[np.float64]:
 
 
 def band_edges(number: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Lower and upper edge frequencies [Hz] of bands by number."""
+    """Lower and upper edges [Hz] of bands."""
     middle = middle_frequencies(number)
     return middle * _G ** (-1.0 / 6.0), middle * _G ** (1.0 / 6.0)
 
 
 def band_numbers(low: float, high: float) -> NDArray[np.int64]:
-    """Numbers of the bands that lie within ``low`` to ``high`` [Hz] with both edges.
-
-    Parameters
-    ----------
-    low, high [Hz]
-    """
+    """Bands within ``low`` to ``high`` [Hz], edges included."""
     if not 0.0 < low < high:
         raise InputError(
             "band_numbers",
@@ -103,7 +90,7 @@ def band_numbers(low: float, high: float) -> NDArray[np.int64]:
 
 
 def nominal_label(number: int) -> str:
-    """Nominal middle frequency of a band for axes and tables, from the R10 series.
+    """Nominal middle frequency of a band, from the R10 series.
 
     Examples
     --------
@@ -121,10 +108,9 @@ def band_energies(density: Spectrum, *, low: float, high: float) -> ThirdOctaves
     Parameters
     ----------
     density
-        From :func:`klack.acoustics.spectrum.energy_spectral_density`; linear between its
-        frequencies.
+        Linear between its frequencies.
     low, high [Hz]
-        Bands within these limits, see :func:`band_numbers`; not above the last frequency.
+        See :func:`band_numbers`; at most the last frequency.
     """
     frequency, values = density.frequency, np.real(density.values)
     if high > frequency[-1]:

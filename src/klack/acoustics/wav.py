@@ -17,18 +17,12 @@ _SUBTYPE = "PCM_24"
 
 
 def full_scale_of(*pressures: TimeSeries, headroom: float = 6.0) -> float:
-    """Full scale [Pa] that several sounds can share, so that they compare by ear.
+    """Full scale [Pa] that sounds can share, to compare by ear; 20 uPa if all are silent.
 
     Parameters
     ----------
-    *pressures [Pa]
     headroom [dB]
-        Between the highest peak of all and full scale.
-
-    Returns
-    -------
-    float [Pa]
-        20 uPa if all sounds are silent.
+        From the highest peak to full scale.
     """
     peak = max((float(np.max(np.abs(p.values))) for p in pressures), default=0.0)
     return float(peak * 10.0 ** (headroom / 20.0)) if peak > 0.0 else _PRESSURE_REFERENCE
@@ -37,7 +31,7 @@ def full_scale_of(*pressures: TimeSeries, headroom: float = 6.0) -> float:
 def level_statement(full_scale: float) -> str:
     """Full scale in pascal and as a level.
 
-    A sine of full scale has ``20 lg(full scale / (sqrt(2) 20 uPa))`` dB.
+    A full-scale sine has ``20 lg(full scale / (sqrt(2) 20 uPa))`` dB.
 
     Examples
     --------
@@ -53,31 +47,20 @@ def level_statement(full_scale: float) -> str:
 
 
 def write_wav(path: Path, pressure: TimeSeries, *, full_scale: float) -> None:
-    """Write a sound as WAV of 24 bit and 48 kHz, with its level in the comment of the file.
+    """Write a sound [Pa] at 48 kHz as WAV of 24 bit, with its level in the comment.
+
+    Rejects a peak above full scale.
 
     Parameters
     ----------
-    pressure [Pa]
-        At 48 kHz.
     full_scale [Pa]
-        Pressure of the largest number that the file can hold; see :func:`full_scale_of`.
-
-    Raises
-    ------
-    InputError
-        Another rate, or a peak above full scale (it would be clipped).
+        Largest number of the file; see :func:`full_scale_of`.
     """
     path.write_bytes(wav_bytes(pressure, full_scale=full_scale))
 
 
 def wav_bytes(pressure: TimeSeries, *, full_scale: float) -> bytes:
-    """Content of the file that :func:`write_wav` writes, for a report.
-
-    Parameters
-    ----------
-    pressure [Pa]
-    full_scale [Pa]
-    """
+    """Content of the file of :func:`write_wav`."""
     import soundfile
 
     require_positive("write_wav: full_scale", full_scale, "Pa")

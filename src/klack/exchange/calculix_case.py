@@ -15,21 +15,14 @@ __all__ = ["calculix_impact", "calculix_settings"]
 
 
 def calculix_impact(case: Case, progress: Progress) -> CalculixImpact:
-    """Mesh and place the bodies of a case, with the forces that the full order applies.
+    """Mesh and place the bodies of a case, with the forces of the full order; solids only.
 
-    A closing spring pushes with its preload, as in the full order.
-
-    Raises
-    ------
-    InputError
-        For axisymmetric bodies, before anything is meshed.
+    A closing spring pushes with its preload.
 
     Warns
     -----
     AccuracyWarning
-        If the case has a guide or an upper stop, which only the interface level supports, or
-        friction between the faces, whose law in CalculiX is another, materials that yield or worn
-        faces.
+        Of a guide, an upper stop, friction (another law), materials that yield and worn faces.
     """
     if case.dimension != 3:
         raise InputError(
@@ -85,7 +78,7 @@ def calculix_impact(case: Case, progress: Progress) -> CalculixImpact:
 
 
 def _other_friction(faces: Friction) -> str:
-    """What the friction of CalculiX has not of that of the case; empty without friction."""
+    """What CalculiX's friction lacks of that of the case, or empty."""
     if faces.is_none:
         return ""
     left_out = ""
@@ -109,14 +102,14 @@ def calculix_settings(
     duration: float | None = None,
     penalty: float | None = None,
 ) -> CalculixSettings:
-    """Settings of a run, from the case where they are not given.
+    """Settings of a run.
 
     Parameters
     ----------
     step [s]
-        That of the full order without.
+        Default: of the full order.
     duration [s]
-        That of the case without.
+        Default: of the case.
     penalty [Pa/m]
     """
     return CalculixSettings(

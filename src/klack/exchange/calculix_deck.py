@@ -1,24 +1,22 @@
 r"""An impact as an input deck of CalculiX (ccx), a witness that shares no code with klack.
 
-Both bodies go out on their own mesh, element by element: C3D4, C3D6, C3D8, C3D10, C3D15, C3D20 have
-the node order and the face numbers of :mod:`klack.mesh.families`.  The contact is ccx's
-face-to-face penalty: at every integration point of the upper (slave) surface the pressure is
+Elements C3D4, C3D6, C3D8, C3D10, C3D15, C3D20 have the node order and face numbers of
+:mod:`klack.mesh.families`. The contact is ccx's face-to-face penalty: at every integration point
+of the upper (slave) surface the pressure is
 
 .. math:: p = K \max(0, -g)
 
-with the overclosure :math:`-g` on the curved faces.  With friction they hold
-:math:`\min(\lambda s, \mu p)` across, *s* the elastic part of the slip: a spring of the stick slope
-:math:`\lambda` before the slider, where klack's faces stick without giving way.  The system is
-then unsymmetric, which the iterative solvers of ccx do not take, and the deck holds a ballast: a
-heavy cube in free flight.  ccx stops a run of fixed steps where the energy balance during contact
-leaves its bounds (some 0.3 % of the largest energy), as if friction were an error of the steps; a
-thousandfold energy of the model keeps it from that, and touches nothing else.
+with the overclosure :math:`-g` on the curved faces. With friction they hold :math:`\min(\lambda s,
+\mu p)` across, *s* the elastic part of the slip: a spring of the stick slope :math:`\lambda`
+before the slider, where klack's faces stick rigidly. The system is then unsymmetric, which the
+iterative solvers of ccx do not take, and the deck has a ballast, a heavy cube in free flight: ccx
+stops a run of fixed steps where the energy balance leaves some 0.3 % of the largest energy, as if
+friction were an error of the steps; a thousandfold energy prevents that.
 
-The Hilber-Hughes-Taylor rule of ccx takes
-fixed steps (``DIRECT``): its automatic steps would also cut at impacts, but no two runs could then
-be compared step by step.
+The Hilber-Hughes-Taylor rule takes fixed steps (``DIRECT``), so that runs can be compared step by
+step.
 
-Units of the deck are mm, t, s, N, MPa, mJ: ccx holds some absolute tolerances that suit them.
+Units are mm, t, s, N, MPa, mJ, which suit absolute tolerances of ccx.
 """
 
 from collections.abc import Iterator, Mapping
@@ -53,7 +51,7 @@ __all__ = [
 CalculixSolver = Literal["ITERATIVE SCALING", "ITERATIVE CHOLESKY", "SPOOLES", "PARDISO", "PASTIX"]
 
 UPPER, LOWER = "UPPER", "LOWER"
-"""Names of the element sets of the two bodies; node sets and surfaces start with them."""
+"""Element sets of the two bodies; node sets and surfaces begin so."""
 
 _TYPES = {
     **{"tet4": "C3D4", "tet10": "C3D10", "hex8": "C3D8", "hex20": "C3D20"},
@@ -69,21 +67,17 @@ _BALLAST_FACTOR = 1e3  # its kinetic energy over that of the upper body
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CalculixImpact:
-    """Two solids and their motion.
+    """Two solids and their motion; the upper one flies in -z.
 
     Parameters
     ----------
-    upper, lower
-        Placed for the start; the upper one flies in -z.
-    upper_surface, lower_surface
-        Where they meet.
     materials : mapping of body name to mapping of solid to Material
     speed [m/s]
-        Of the upper body at the place where it is.
+        Of the upper body where it is.
     closing_force [N]
-        Constant force on the upper body, positive in -z, spread over it like its weight.
+        Constant, on the upper body, positive in -z, spread like its weight.
     friction [-]
-        Coulomb's coefficient between the faces, whether they stick or slip.
+        Coulomb's coefficient, sticking or slipping.
     """
 
     title: str
@@ -104,16 +98,15 @@ class CalculixSettings:
     Parameters
     ----------
     step, duration [s]
-        Fixed time increment, and time from the start.
+        Fixed increment, and time from the start.
     penalty [Pa/m]
-        Pressure per overclosure; :func:`default_penalty` proposes one.
+        Pressure per overclosure, see :func:`default_penalty`.
     alpha [-]
-        Of Hilber, Hughes & Taylor (1977), -1/3 to 0: 0 is the trapezoidal rule without any
-        numerical damping, -0.05 the default of ccx.
+        Of Hilber, Hughes & Taylor (1977), -1/3 to 0: 0 is the trapezoidal rule without numerical
+        damping, -0.05 the default of ccx.
     solver
-        Equation solver.  At time steps that resolve an impact the mass dominates: ``ITERATIVE
-        SCALING`` gave the printed digits of SPOOLES in a third of the time, and is the choice
-        without friction; with friction it is ``SPOOLES``.
+        Default: ``ITERATIVE SCALING``, which gave the printed digits of SPOOLES in a third of the
+        time, as the mass dominates at such steps; with friction ``SPOOLES``.
     stick [-]
         Stick slope over penalty.
     """
@@ -151,9 +144,8 @@ def default_penalty(impact: CalculixImpact) -> float:
     .. math:: K = 300\, E^* / h
 
     with the contact modulus :math:`1 / E^* = \sum (1 - \nu^2) / E` of the softest solids and the
-    smallest element *h* of the two surfaces, which a sound mesh keeps below the half width *b* of
-    the contact.  A layer of stiffness K adds :math:`p / K`, the bodies give way by some
-    :math:`p\, b / E^*`: less than 1/300 comes from the penalty.
+    smallest element *h* of both surfaces, on a sound mesh below the half width *b* of the contact.
+    The penalty adds :math:`p / K` to some :math:`p\, b / E^*`: less than 1/300.
     """
     inverse = sum(
         1.0
@@ -171,18 +163,12 @@ def default_penalty(impact: CalculixImpact) -> float:
 
 
 def start_of_flight(impact: CalculixImpact, step: float) -> tuple[float, float]:
-    """Where and how fast the upper body starts: its shift along +z [m] and its speed [m/s].
+    """Shift along +z [m] and speed [m/s] of the upper body at the start.
 
-    A penalty would turn an overlap into energy, and klack's placement lets curved faces overlap a
-    little where their weighted gap is zero.  So the upper body starts two steps of flight before
-    any point touches.  Without outside force it is brought there from any distance; with one it is
-    only moved back if it is nearer than that, and its speed is what the force has left of the given
-    one on the way back.
-
-    Raises
-    ------
-    InputError
-        If the surfaces do not face each other, or the force alone would already stop the flight.
+    A penalty turns overlap into energy, and curved faces overlap a little where their weighted gap
+    is zero. So the upper body starts two steps of flight before any point touches. Under an
+    outside force it is only moved back if nearer, at the speed that the force leaves of the given
+    one; rejected if the force alone would stop the flight.
     """
     distance = _distance(impact)
     least = _FLIGHT_STEPS * step * impact.speed
@@ -201,10 +187,10 @@ def start_of_flight(impact: CalculixImpact, step: float) -> tuple[float, float]:
 
 
 def _distance(impact: CalculixImpact) -> float:
-    """Travel of the upper body to -z until any point touches [m], negative where they overlap.
+    """Travel of the upper body to -z until any point touches [m], negative for overlap.
 
-    The faces of a coarse swept mesh wave by up to 0.1 um between their nodes, which a penalty at
-    integration points feels, so they are sampled densely.
+    Sampled densely: faces of a coarse swept mesh wave by up to 0.1 um between their nodes, which a
+    penalty at integration points feels.
     """
     sides = (impact.upper.mesh, impact.upper_surface, impact.lower.mesh, impact.lower_surface)
     distance = axial_distance(*sides)
@@ -219,19 +205,15 @@ def _distance(impact: CalculixImpact) -> float:
 
 
 def write_deck(impact: CalculixImpact, settings: CalculixSettings, path: Path) -> None:
-    """Write the deck; ``ccx`` is started with its name without ``.inp``."""
+    """Write the deck; start ``ccx`` with its name without ``.inp``."""
     with path.open("w", encoding="ascii", newline="\n") as stream:
         stream.writelines(f"{line}\n" for line in deck_lines(impact, settings))
 
 
 def deck_lines(impact: CalculixImpact, settings: CalculixSettings) -> Iterator[str]:
-    """Lines of the deck, in the order in which ccx wants them.
+    """Lines of the deck, in the order of ccx.
 
-    Raises
-    ------
-    InputError
-        For bodies of revolution, a body a that is held, an iterative solver with friction, and what
-        :func:`start_of_flight` refuses.
+    Rejects bodies of revolution, a held body a, and an iterative solver with friction.
     """
     _require_solids(impact)
     shift, speed = start_of_flight(impact, settings.step)
@@ -329,7 +311,7 @@ def _wrapped(numbers: list[int]) -> Iterator[str]:
 
 
 def _faces(mesh: Mesh, surface: Surface) -> Iterator[tuple[int, int]]:
-    """Element (in the order of all blocks) and side of every face of a surface."""
+    """Element (over all blocks) and side of every face."""
     table = FaceTable.of(mesh.blocks)
     first = np.cumsum([0, *(len(block.connectivity) for block in mesh.blocks)])
     for block in surface.blocks:
@@ -354,7 +336,7 @@ def _section_lines(role: str, mesh: Mesh, materials: Mapping[str, Material]) -> 
 
 
 def _ballast_lines(impact: CalculixImpact, node: int, element: int) -> Iterator[str]:
-    """Cube in free flight beside the bodies, its numbers after ``node`` and ``element``."""
+    """Cube in free flight, numbered after ``node`` and ``element``."""
     bodies = (impact.upper.mesh, impact.lower.mesh)
     size = max(float(np.ptp(mesh.points, axis=0).max()) for mesh in bodies) / _MM
     first = max(float(mesh.points[:, 0].max()) for mesh in bodies) / _MM + size
@@ -439,7 +421,7 @@ def _solver(impact: CalculixImpact, settings: CalculixSettings) -> CalculixSolve
 
 
 def _solid_set(role: str, mesh: Mesh, solid: str) -> str:
-    """Name of the element set of a solid; names of solids may hold signs that ccx does not take."""
+    """Element set of a solid, without signs that ccx does not take."""
     return f"{role}_{mesh.solids.index(solid) + 1}"
 
 

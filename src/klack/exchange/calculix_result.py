@@ -1,12 +1,11 @@
 """Contact force and energies that CalculiX (ccx) printed into its ``.dat`` file.
 
-Read are, of every time printed: the resultant of ``*CONTACT PRINT ... CF``, the spring energy of
-``*CONTACT PRINT ... CELS`` and the totals of ``*EL PRINT ... ELSE, ELKE`` (internal and kinetic
-energy of a set).  All else in the file is ignored.  Beside ``NAME.dat`` two more files are read
-if they are there: ``NAME.sta`` for the number of iterations, ``NAME.log`` (what ccx wrote to the
-terminal) for its wall time.
+Read are the resultant of ``*CONTACT PRINT ... CF``, the spring energy of ``*CONTACT PRINT ...
+CELS`` and the totals of ``*EL PRINT ... ELSE, ELKE`` (internal and kinetic energy of a set); the
+rest is ignored. If there, ``NAME.sta`` gives the number of iterations, ``NAME.log`` (terminal
+output) the wall time.
 
-A ``.dat`` file holds no units.  Decks of klack are in mm, t, s, N, mJ, and that is assumed.
+Units mm, t, s, N, mJ are assumed.
 """
 
 import re
@@ -46,20 +45,18 @@ class CalculixResult:
 
     Parameters
     ----------
-    source
-        The file.
     time (n,) [s]
-        Ends of the increments; the first one is above 0.
+        Ends of increments.
     force (n,) [N]
-        Axial contact force, pressing the bodies apart above zero.
+        Axial, pressing the bodies apart above zero.
     sideways (n,) [N]
-        Magnitude of the resultant normal to the axis.
+        Normal to the axis.
     contact_energy (n,) [J] or empty
-        Stored in the penalty.
+        In the penalty.
     internal, kinetic : mapping of set name to array, shape (n,) [J]
         Strain and kinetic energy of the element sets that were printed.
     iterations
-        Of all increments together.
+        Total.
     wall_time [s]
     """
 
@@ -87,10 +84,7 @@ class CalculixResult:
 
     @property
     def impulse(self) -> NDArray[np.float64]:
-        """Impulse gathered from the start to each time, shape (n,) [N s].
-
-        By the trapezoidal rule, which is that of the time integration of ccx.
-        """
+        """Impulse to each time, shape (n,) [N s], by the trapezoidal rule, as ccx integrates."""
         time, force = np.append(0.0, self.time), np.append(0.0, self.force)
         return np.cumsum(np.diff(time) * (force[1:] + force[:-1]) / 2.0)
 
@@ -117,14 +111,7 @@ class _Tables:
 
 
 def read_calculix(path: Path) -> CalculixResult:
-    """Read the ``.dat`` file of a run.
-
-    Raises
-    ------
-    InputError
-        If the file is missing, too large, cut off, holds no contact force or that of several
-        pairs, or values that are not numbers.
-    """
+    """Read the ``.dat`` file of a run, with the contact force of one pair."""
     path = Path(path)
     _require_file(path)
     tables = _Tables()
@@ -178,7 +165,7 @@ def _refuse(path: Path, got: str, expected: str, hint: str = "") -> InputError:
 
 
 def _read(path: Path, stream: Iterator[str], tables: _Tables) -> None:
-    """Collect the tables; each heading is followed by an empty line and its numbers."""
+    """Collect tables: heading, empty line, numbers."""
     for line in stream:
         if len(line) > _LONGEST_LINE:
             raise _refuse(path, f"a line of {len(line)} signs", "a .dat file of CalculiX")
@@ -267,7 +254,7 @@ def _series(path: Path, name: str, table: _Table, time: NDArray[np.float64]) -> 
 
 
 def _iterations(path: Path) -> int | None:
-    """Sum of the fourth column of the status file; None where it is not there."""
+    """Sum of the fourth column of the status file, if any."""
     if not path.is_file() or path.stat().st_size > _LARGEST:
         return None
     total = 0
@@ -280,7 +267,7 @@ def _iterations(path: Path) -> int | None:
 
 
 def _wall_time(path: Path) -> float | None:
-    """Time in the last lines of what ccx wrote to the terminal; None where it is not there."""
+    """Time in the last lines of the terminal output, if any."""
     if not path.is_file():
         return None
     with path.open("rb") as stream:
@@ -292,16 +279,12 @@ def _wall_time(path: Path) -> float | None:
 def other_run(result: CalculixResult, reference: ImpactHistory) -> OtherRun:
     """Impact of ccx in the form in which klack compares.
 
+    Rejects another kinetic energy at the start: the file is of another case, or in other units.
+
     Parameters
     ----------
     reference
-        Of the same case, for masses, names, speed and outside force.
-
-    Raises
-    ------
-    InputError
-        If the kinetic energy at the start is not that of the case: the file belongs to another
-        one, or has other units.
+        For masses, names, speed and outside force.
     """
     motion = _motion(result, reference)
     return OtherRun(
@@ -316,16 +299,16 @@ def other_run(result: CalculixResult, reference: ImpactHistory) -> OtherRun:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Motion:
-    """Momentum balance of the upper body at the printed times.
+    """Momentum balance of the upper body.
 
     Parameters
     ----------
     force [N]
-        From outside, positive in +z.
+        From outside, along +z.
     velocity (n,) [m/s]
         Of the centre of mass.
     work (n,) [J]
-        Done by the outside force since the first time.
+        Of the outside force.
     """
 
     force: float
@@ -344,7 +327,7 @@ def _motion(result: CalculixResult, reference: ImpactHistory) -> _Motion:
 
 
 def _flight_speed(result: CalculixResult, reference: ImpactHistory, force: float) -> float:
-    """Speed at the first time [m/s], when the upper body still flies without strain."""
+    """Speed at the first time [m/s], in flight without strain."""
     if UPPER not in result.kinetic:
         return reference.speed
     start, expected = float(result.kinetic[UPPER][0]), 0.5 * reference.mass_a * reference.speed**2
@@ -362,7 +345,7 @@ def _flight_speed(result: CalculixResult, reference: ImpactHistory, force: float
 
 
 def _history(result: CalculixResult, reference: ImpactHistory, motion: _Motion) -> ImpactHistory:
-    """Records of equal length: the median one, keeping the impulse; the gap is not known."""
+    """Records of the median length, keeping the impulse; the gap is unknown."""
     step = float(np.median(np.diff(result.time, prepend=0.0)))
     count = int(np.floor(result.time[-1] / step * (1.0 + 1e-6)))
     edges = np.arange(count + 1) * step
@@ -386,9 +369,9 @@ def _history(result: CalculixResult, reference: ImpactHistory, motion: _Motion) 
 
 
 def _ledger(result: CalculixResult, reference: ImpactHistory, motion: _Motion) -> EnergyLedger:
-    """Energies at the end; empty where the run did not print them all.
+    """Energies at the end; empty where not all printed.
 
-    ccx prints no work of friction, so with friction the balance is not known.
+    ccx prints no work of friction: with friction the balance is unknown.
     """
     if not len(result.total_energy) or reference.ledger.friction:
         return EnergyLedger(initial=0.0, bodies=())
@@ -416,7 +399,7 @@ def _ledger(result: CalculixResult, reference: ImpactHistory, motion: _Motion) -
 
 
 def _swing(result: CalculixResult, motion: _Motion) -> float | None:
-    """Largest deviation of the energy from its balance, over that at the start."""
+    """Largest deviation from the energy balance, over the initial energy."""
     total = result.total_energy
     if not len(total):
         return None

@@ -23,12 +23,12 @@ _RESULTS = (".dat", ".sta", ".cvg", ".log", ".frd", ".12d")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CalculixRun:
-    """A finished run.
+    """Finished run.
 
     Parameters
     ----------
     data
-        The ``.dat`` file with forces and energies.
+        The ``.dat`` file.
     wall_time [s]
     """
 
@@ -37,7 +37,7 @@ class CalculixRun:
 
 
 def find_calculix() -> Path | None:
-    """Find the program ccx on the search path; None if it is not installed."""
+    """Program ccx on the search path, if any."""
     for name in _NAMES:
         if found := shutil.which(name):
             return Path(found)
@@ -45,13 +45,7 @@ def find_calculix() -> Path | None:
 
 
 def require_calculix() -> Path:
-    """Find the program ccx.
-
-    Raises
-    ------
-    InputError
-        If it is not installed; the text says how to get it.
-    """
+    """Program ccx; the error says how to get it."""
     program = find_calculix()
     if program is None:
         raise InputError(
@@ -72,23 +66,21 @@ def run_calculix(
     time_limit: float | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> CalculixRun:
-    """Run a deck; ``NAME.dat``, ``NAME.sta`` and ``NAME.log`` are written next to it.
+    """Run a deck ``NAME.inp``; ``NAME.dat``, ``NAME.sta`` and ``NAME.log`` appear beside it.
 
     Parameters
     ----------
-    deck
-        ``NAME.inp``.
     duration [s]
-        Simulated time of the deck, for the progress.
+        Simulated, for the progress.
     time_limit [s]
-        Of wall-clock time; the run is stopped beyond it.
+        Wall-clock; then the run is stopped.
     progress
-        Called with the fraction done, 0 to 1.
+        Gets the fraction done.
 
     Raises
     ------
     InputError
-        If ccx is not installed, or refuses the deck.
+        If ccx is not installed, or rejects the deck.
     ConvergenceError
         If it stops early, crashes, or reaches the time limit.
     """
@@ -149,7 +141,7 @@ def _wait(
 
 
 def _reached(status: Path) -> float:
-    """Simulated time [s] in the last line of the status file."""
+    """Simulated time [s] in the status file."""
     try:
         with status.open("rb") as stream:
             stream.seek(max(0, status.stat().st_size - 400))

@@ -1,4 +1,4 @@
-"""The models of a case that can leave klack: its reduced bodies, and the pair with its contacts."""
+"""Models of a case for other programs: reduced bodies, and the pair with its contacts."""
 
 import warnings
 from collections.abc import Mapping
@@ -31,12 +31,12 @@ __all__ = ["CaseModels", "case_models"]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CaseModels:
-    """Models of a case for other programs.
+    """Models of a case.
 
     Parameters
     ----------
     pair
-        All bodies, their contacts and films; what else drives the needle stays outside.
+        All bodies, contacts and films; other drives stay outside.
     step [s]
     outside
         Components of a valve that no model has.
@@ -62,19 +62,14 @@ def case_models(
 ) -> CaseModels:
     """Reduce the bodies of a case as its runs do, and join them.
 
-    The pair of an impact keeps the constant force and the spring of the case.  That of a whole
-    valve has its end stops with their films; springs, fluid and solenoid stay with the user, who
-    gives their forces.
-
-    Raises
-    ------
-    InputError
-        For bodies that cannot be built, or a valve without end stops.
+    The pair of an impact keeps constant force and spring; that of a valve its end stops with
+    films, while the user gives the forces of springs, fluid and solenoid. Rejects a valve without
+    end stops.
 
     Warns
     -----
     AccuracyWarning
-        For friction of the faces and for materials that yield, which exported models leave out.
+        Of friction of faces and yield, which exported models leave out.
     """
     tell_elastic(case, "exported models are those of")
     if isinstance(case, ValveCase):
@@ -117,7 +112,7 @@ def _of_impact(
 
 
 def _frictionless(case: Case) -> Case:
-    """The case as exported models can have it: their laws have no memory."""
+    """The case as exported models have it: their laws have no memory."""
     if case.contact.faces.is_none:
         return case
     warnings.warn(
@@ -144,7 +139,7 @@ def _smooth_valve(case: ValveCase) -> ValveCase:
 
 
 def _of_given(case: Case, progress: Progress, threads: int | None) -> CaseModels:
-    """Bodies that other programs have reduced or assembled, joined at their ports."""
+    """Bodies reduced or assembled by other programs, joined at ports."""
     given = build_given_pair(case, progress, threads=threads)
     sources = {item.name: item.source for item in given.summaries}
     provenance = replace(_provenance(case, {}), meshes=sources)

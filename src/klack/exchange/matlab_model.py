@@ -1,4 +1,4 @@
-"""Models as MATLAB files (version 5) with small scripts beside them, for MATLAB and Octave."""
+"""Models as MATLAB files (version 5) with scripts, for MATLAB and Octave."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -33,15 +33,11 @@ def write_matlab(models: Sequence[ModalModel], folder: Path) -> tuple[Path, ...]
 
     ``NAME_ss.m`` makes an ``ss`` object, ``NAME_mechss.m`` a sparse second-order one,
     ``NAME_block.m`` a block of Simulink; of a pair ``NAME_rhs.m`` is the right-hand side with the
-    contacts and ``NAME_impact.m`` runs it.
+    contacts and ``NAME_impact.m`` runs it. Returns the ``.mat`` files, each followed by its
+    scripts.
 
-    Parameters and errors are those of :func:`klack.exchange.model_folder.model_folder`;
-    a model of more than 2 GB and a contact law with dissipation are errors as well.
-
-    Returns
-    -------
-    tuple of Path
-        The ``.mat`` file of each model, followed by its scripts.
+    Parameters and errors are those of :func:`klack.exchange.model_folder.model_folder` and
+    :func:`matlab_structure`.
     """
     names: list[str] = []
     with model_folder(models, folder) as stage:
@@ -71,14 +67,11 @@ def matlab_structure(model: ModalModel) -> dict[str, Any]:
     """Fields of the structure ``klack``; names end with their unit where they have one.
 
     Matrices of :func:`klack.exchange.state_space.state_space` (``A``, ``B``, ``C``, ``D``, ``x0``,
-    ``constant_rate``, ``output_offset``) and of :func:`klack.exchange.state_space.second_order`
+    ``constant_rate``, ``output_offset``) and :func:`klack.exchange.state_space.second_order`
     (``M``, ``Dm``, ``K``, ``Bm``, ``Cm``, ``Gm``); names and units as cells of text; modes;
     contacts as a cell of structures; what made it.
 
-    Raises
-    ------
-    InputError
-        For a model of more than 2 GB, or a contact law with dissipation.
+    Rejects models of more than 2 GB, and contact laws with dissipation.
     """
     first, second, origin = state_space(model), second_order(model), model.provenance
     content: dict[str, Any] = {

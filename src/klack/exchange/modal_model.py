@@ -1,7 +1,6 @@
 r"""Exported model: modes, inputs, outputs and contacts, as plain numbers.
 
-Every writer of models (FMU, Modelica, MATLAB, text) starts from a :class:`ModalModel`, so all of
-them hold the same equations,
+Every writer of models (FMU, Modelica, MATLAB, text) starts from a :class:`ModalModel`:
 
 .. math::
     \ddot q_i + 2 \zeta_i \omega_i \dot q_i + \omega_i^2 q_i
@@ -45,14 +44,14 @@ Quantity = Literal["displacement", "velocity", "gap", "force"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Provenance:
-    """Origin of a model, stated in every exported file.
+    """Origin of a model, in every exported file.
 
     Parameters
     ----------
     version
         Of klack.
     created
-        Date and time, ISO 8601.
+        ISO 8601.
     meshes : mapping of body name to str
         Elements and degrees of freedom in words.
     """
@@ -71,7 +70,7 @@ class ModelInput:
     Parameters
     ----------
     name
-        Made of letters, digits and underscores, as all names of a model.
+        Of letters, digits and underscores, as all names of a model.
     shape (m,) [1/sqrt(kg)]
         Modal forces of 1 N.
     """
@@ -87,11 +86,11 @@ class ModelOutput:
 
     Parameters
     ----------
-    quantity : "displacement" [m] or "velocity" [m/s]
+    quantity [m] or [m/s]
     shape (m,) [1/sqrt(kg)]
-        Times the modal displacements or velocities.
+        Factors of modal displacements or velocities.
     offset [m] or [m/s]
-        Value at ``q = 0``.
+        At ``q = 0``.
     """
 
     name: str
@@ -103,12 +102,12 @@ class ModelOutput:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ModelContact:
-    """A contact, with a squeeze film or not, in series with a compliance or not.
+    """Contact, perhaps with a squeeze film, perhaps in series with a compliance.
 
     Parameters
     ----------
     shape (m,) [1/sqrt(kg)]
-        ``gamma`` of the gap.
+        ``gamma``.
     gap [m]
         At ``q = 0``.
     law
@@ -126,31 +125,31 @@ class ModelContact:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ModalModel:
-    """One linear body, or bodies with their contacts, ready to be written for another program.
+    """One linear body, or bodies with contacts, for another program.
 
     Parameters
     ----------
     name
-        An identifier: letters, digits and underscores.
+        Identifier.
     omega, damping (m,) [rad/s], [-]
-        Of all modes of all bodies; rigid modes have 0.
+        Of all bodies; rigid modes have 0.
     mode_names
         ``needle_1``, ``needle_2``, ..., body by body.
     start, start_velocity (m,) [m sqrt(kg)], [m/s sqrt(kg)]
-        Modal state at the start.
+        Modal state.
     rise (m,) [sqrt(kg)]
-        Modal displacements of a rigid motion of the moving body of a pair by 1 m along +z.
+        Modal displacements of a rigid motion of the moving body by 1 m along +z.
     constant (m,) [N/sqrt(kg)]
-        Modal forces that always act (weight, preload).
+        Constant modal forces (weight, preload).
     contacts
-        Of a pair; gap and force of each are outputs of the model as well.
+        Gap and force of each are outputs as well.
     residual_compliance (n_inputs, n_inputs) [m/N]
-        Of a body: what its modes miss of the static compliance between its ports.  Not part of the
-        equations; a contact stiffness of the user belongs in series with it.
+        Of a body: not part of the equations; a contact stiffness of the user belongs in series
+        with it.
     step [s]
-        Step of the time integration that gives klack's own accuracy.
+        Of klack's own accuracy.
     duration [s]
-        A sensible end of a first simulation.
+        Of a first simulation.
     """
 
     name: str
@@ -172,12 +171,12 @@ class ModalModel:
 
     @property
     def mode_count(self) -> int:
-        """Number of modes; the model has twice as many states."""
+        """Number of modes, half that of states."""
         return len(self.omega)
 
     @property
     def frequencies(self) -> NDArray[np.float64]:
-        """Eigenfrequencies [Hz] of the bodies, shape (m,); rigid ones are 0."""
+        """Eigenfrequencies [Hz], shape (m,); rigid ones are 0."""
         return self.omega / (2.0 * np.pi)
 
     def input_matrix(self) -> NDArray[np.float64]:
@@ -186,21 +185,16 @@ class ModalModel:
         return np.column_stack([np.empty((self.mode_count, 0)), *columns])
 
     def output_matrices(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Factors of modal displacements and of modal velocities, shape (n_outputs, m) each."""
+        """Factors of modal displacements and velocities, shape (n_outputs, m) each."""
         shapes = np.array([item.shape for item in self.outputs]).reshape(-1, self.mode_count)
         moved = np.array([item.quantity == "displacement" for item in self.outputs], dtype=bool)
         return shapes * moved[:, None], shapes * ~moved[:, None]
 
 
 def body_model(body: ReducedBody, *, provenance: Provenance, step: float) -> ModalModel:
-    """Linear body: force at every port in, displacement and velocity at every port out.
+    """Linear body: force at every port in, displacement and velocity at ports and observers out.
 
-    Parameters
-    ----------
-    body
-        Its observers are further outputs.
-    step [s]
-        Recommended step.
+    ``step`` [s] is recommended.
     """
     m = body.mode_count
     names = {port: identifier(port) for port in (*body.port_names, *body.observer_names)}
@@ -264,21 +258,16 @@ def pair_model(
     Parameters
     ----------
     system
-        Its constant forces and springs stay inside the model.
+        Its constant forces and springs stay inside.
     moving
-        The needle: a free body.
+        The needle, a free body.
     contact_names
-        One per contact of the system.
+        One each.
     films
-        One per contact; none without.
+        One each; default: none.
     speed [m/s]
-        Of the moving body at the start, along +z (negative: closing).
+        Of the moving body, along +z (negative: closing).
     step, duration [s]
-
-    Raises
-    ------
-    InputError
-        If the moving body is held.
     """
     body = system.body(moving)
     if body.rigid_count == 0:
@@ -403,19 +392,13 @@ def _contacts(
 
 
 def identifier(text: str) -> str:
-    """Name that C, MATLAB and Modelica accept: letters, digits, underscores, no digit first."""
+    """Name for C, MATLAB and Modelica: letters, digits, underscores, no digit first."""
     plain = "".join(c if c.isascii() and (c.isalnum() or c == "_") else "_" for c in text)
     return plain if plain[:1].isalpha() else f"m_{plain}"
 
 
 def choose_body(bodies: Sequence[ReducedBody], name: str | None) -> tuple[ReducedBody, ...]:
-    """Bodies of that name, or all of them.
-
-    Raises
-    ------
-    InputError
-        If there is none of that name.
-    """
+    """Bodies of that name, or all."""
     if name is None:
         return tuple(bodies)
     names = [body.name for body in bodies]

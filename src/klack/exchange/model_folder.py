@@ -14,26 +14,20 @@ from klack.files.whole import whole_files
 __all__ = ["LONGEST", "model_folder", "named_apart"]
 
 LONGEST = 55
-"""Characters of the name of a model; MATLAB allows 63 for the name of a file."""
+"""Characters of a model name; MATLAB allows 63 for a file."""
 
 
 @contextmanager
 def model_folder(models: Sequence[ModalModel], folder: Path) -> Iterator[Path]:
-    """Give a place for the files of these models; they move into ``folder`` when all are complete.
+    """Place for the files of these models, which move into ``folder`` when all are complete.
+
+    Rejects equal names (in any case, as file systems do), names too long, and models without
+    modes.
 
     Parameters
     ----------
-    models
-        With distinct names.
     folder
-        Made where it is missing; files of the same name are replaced.
-
-    Raises
-    ------
-    InputError
-        For two models of one name (small and capital letters are the same, as for many file
-        systems), a name that is too long, a model without modes, or a folder that cannot be
-        written to.
+        Made where missing; files of the same name are replaced.
     """
     for name, count in Counter(model.name.lower() for model in models).items():
         if count > 1:
@@ -63,9 +57,9 @@ def model_folder(models: Sequence[ModalModel], folder: Path) -> Iterator[Path]:
 
 
 def named_apart(model: ModalModel) -> ModalModel:
-    """Return the model with a number appended to repeated names.
+    """Model with numbers appended to repeated names.
 
-    Ports ``tip-a`` and ``tip_a`` have the same name in most programs.
+    ``tip-a`` and ``tip_a`` are one name in most programs.
     """
     inputs = identifiers([item.name for item in model.inputs])
     outputs = identifiers([output.name for output in model.outputs], inputs)

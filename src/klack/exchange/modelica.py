@@ -1,8 +1,8 @@
-"""Models as flat Modelica text that needs no library: a linear body, or a pair with its contacts.
+"""Models as flat Modelica text that needs no library.
 
-The text keeps to what every tool takes: arrays of parameters, one loop of equations, functions with
-plain algorithms.  Forces come in as ``input Real``, displacements, gaps and contact forces are
-``output Real``.
+It keeps to what every tool takes: arrays of parameters, one loop of equations, functions with
+plain algorithms. Forces are ``input Real``, displacements, gaps and contact forces ``output
+Real``.
 """
 
 import html
@@ -39,7 +39,7 @@ _TAKEN = frozenset(
 
 
 def number(value: float) -> str:
-    """Shortest text that reads back as the same number."""
+    """Shortest text that reads back equal."""
     return repr(float(value))
 
 
@@ -50,7 +50,7 @@ def text(words: str) -> str:
 
 
 def class_name(name: str) -> str:
-    """Name of a class that is neither a keyword nor a variable of the model."""
+    """Class name that is no keyword or variable."""
     return f"{name}_model" if name in _TAKEN else name
 
 
@@ -77,16 +77,10 @@ def _declared(declaration: str, items: list[str], words: str) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class ContactText:
-    """Lines of one contact.
+    """Lines of one contact; ``suffix`` ends the names of its variables.
 
-    Without a film the contact force is a function of the gap: in series with a compliance ``D`` it
-    solves ``F = f(-gap - D F)`` inside a function.  A film in series with a compliance has its
-    compression ``e`` as a state, see :func:`contact_text`.
-
-    Parameters
-    ----------
-    suffix
-        Ending of the names of its variables.
+    Without a film the force is a function of the gap, in series with ``D`` the solution of ``F =
+    f(-gap - D F)``. A film in series has a state ``e``, see :func:`contact_text`.
     """
 
     suffix: str
@@ -97,16 +91,15 @@ class ContactText:
 def contact_text(model: ModalModel, index: int) -> ContactText:
     r"""Variables and equations of a contact.
 
-    A film in series with a compliance ``D`` has the state ``e``, the compression.  With the gap
-    ``z = gap + e`` between the surfaces and ``e_c = max(e, -D F_s)``, where the film cavitates,
+    A film in series with ``D`` has the compression ``e`` as state. With the gap ``z = gap + e``
+    between the surfaces and ``e_c = max(e, -D F_s)``, where the film cavitates,
 
     .. math:: \dot e = -\frac{e_c + D c(z)\,\dot g}{\max(D\,c(z), \tau)} + \frac{e_c - e}{\tau},
               \qquad F = e_c / D .
 
-    This is ``F = -c \dot z`` wherever ``D c`` is above the relaxation time ``tau``; far apart,
-    where the force is small, it is late by ``tau`` and not stiff.  The contact is closed while
-    neither ``z`` nor the gap of the bodies is above zero; the film is at rest then and ``e``
-    decays.
+    This is ``F = -c \dot z`` where ``D c`` is above the relaxation time ``tau``; far apart, where
+    the force is small, it is late by ``tau`` and not stiff. Closed while neither ``z`` nor the gap
+    is above zero: the film rests and ``e`` decays.
     """
     contact = model.contacts[index]
     name = contact.name
@@ -213,9 +206,9 @@ def _force(contact: ModelContact) -> str:
 
 
 def law_functions(contacts: Sequence[ModelContact]) -> Iterable[str]:
-    """Functions of the laws of these contacts, and of films where there are any.
+    """Functions of the laws of these contacts, and of films.
 
-    Sizes and loop bounds are plain numbers: not every tool takes others in a function.
+    Sizes and loop bounds are plain numbers: not every tool takes others.
     """
     for contact in contacts:
         kind = contact_kind(contact)
@@ -317,8 +310,7 @@ _FILM = """
 def write_modelica(models: Sequence[ModalModel], folder: Path) -> tuple[Path, ...]:
     """Write one file ``NAME.mo`` for each model.
 
-    Parameters and errors are those of :func:`klack.exchange.model_folder.model_folder`;
-    a contact law with dissipation is an error as well.
+    As :func:`klack.exchange.model_folder.model_folder` and :func:`modelica_text`.
     """
     names = [f"{class_name(model.name)}.mo" for model in models]
     with model_folder(models, folder) as stage:
@@ -328,15 +320,11 @@ def write_modelica(models: Sequence[ModalModel], folder: Path) -> tuple[Path, ..
 
 
 def modelica_text(model: ModalModel) -> str:
-    """Return one class of Modelica 3.4 for a body or a pair.
+    """Class of Modelica 3.4 for a body or a pair.
 
-    The states ``q`` and ``v`` are the modal displacements and velocities; parameters
-    ``start_velocity`` and ``start_rise`` move the needle of a pair at the start, as in the FMU.
-
-    Raises
-    ------
-    InputError
-        For a contact law with dissipation, which holds for rigid bodies only.
+    States ``q`` and ``v`` are modal displacements and velocities; ``start_velocity`` and
+    ``start_rise`` move the needle of a pair at the start, as in the FMU. Rejects a contact law
+    with dissipation, which holds for rigid bodies only.
     """
     name = class_name(model.name)
     lines = [f"model {name} {text(_headline(model))}"]
@@ -430,7 +418,7 @@ def _modes(model: ModalModel) -> Iterable[str]:
 
 
 def _shapes(model: ModalModel) -> dict[str, str]:
-    """Array that holds the modal shape of each input and output; equal ones share it."""
+    """Array of the modal shape of each input and output; equal ones share it."""
     first: dict[bytes, str] = {}
     return {
         name: first.setdefault(shape.tobytes(), f"shape_{name}")

@@ -5,10 +5,10 @@ With the state ``x = (q, v)`` of modal displacements and velocities and the forc
 .. math::
     \dot x = A x + B u + x_c, \qquad y = C x + D u + y_0 .
 
-A body has the forces on its ports as inputs.  A pair has the outside forces, then the force of each
-contact; its outputs end with the gap of each contact.  So the pair becomes the model of
-:mod:`klack.exchange.modal_model` as soon as each contact force is fed back from its gap.
-``x_c`` and ``y_0`` (constant forces, gaps at ``q = 0``) are zero for a body.
+Inputs of a body are the forces on its ports; of a pair the outside forces, then each contact
+force; its outputs end with the gaps, to be fed back to contact forces
+(:mod:`klack.exchange.modal_model`). ``x_c`` and ``y_0`` (constant forces, gaps at ``q = 0``) are
+zero for a body.
 """
 
 from dataclasses import dataclass
@@ -40,29 +40,28 @@ __all__ = [
 ]
 
 ContactKind = Literal["none", "linear", "power", "table"]
-"""A squeeze film alone, ``F = k d``, ``F = K d^n``, piecewise cubic."""
+"""Squeeze film alone, ``F = k d``, ``F = K d^n``, piecewise cubic."""
 
 
 _LARGEST = 2**31 - 2**20
-"""Bytes of A: MATLAB files of version 5 hold less than 2 GiB in one structure."""
+"""Bytes of A: MATLAB 5 holds less than 2 GiB in a structure."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FirstOrder:
-    """First-order form of ``n = 2 m`` states.
+    """First-order form, ``n = 2 m`` states.
 
     Parameters
     ----------
-    A, B, C, D : array, shapes (n, n), (n, n_inputs), (n_outputs, n), (n_outputs, n_inputs)
-        D is zero: what the modes miss is not in it.
+    A, B, C, D (n, n), (n, n_inputs), (n_outputs, n), (n_outputs, n_inputs)
+        D is zero.
     residual_feedthrough (n_outputs, n_inputs) [m/N]
-        D with the residual compliance of a body, for those who want it; zero for a pair.
+        D with the residual compliance of a body; zero for a pair.
     constant_rate (n,)
         ``x_c``.
     output_offset (n_outputs,)
         ``y_0``.
     start (n,)
-        State at the start.
     state_names, state_units, input_names, input_units, output_names, output_units
         Modal displacements are in m sqrt(kg).
     """
@@ -105,12 +104,9 @@ class SecondOrder:
 
 
 def state_space(model: ModalModel) -> FirstOrder:
-    """Return the first-order form with inputs, outputs and contacts in the order of the model.
+    """First-order form, inputs, outputs and contacts in the order of the model.
 
-    Raises
-    ------
-    InputError
-        For so many modes that A would not fit into 2 GB, or for none.
+    Rejects more modes than fit into 2 GB, and none.
     """
     m = model.mode_count
     _require_size(model)
@@ -151,7 +147,7 @@ def state_space(model: ModalModel) -> FirstOrder:
 
 
 def second_order(model: ModalModel) -> SecondOrder:
-    """Return the second-order form, with the inputs and outputs of :func:`state_space`."""
+    """Second-order form, inputs and outputs of :func:`state_space`."""
     push, moved, speed = _matrices(model)
     return SecondOrder(
         M=csc_array(diags_array(np.ones(model.mode_count))),
@@ -164,15 +160,14 @@ def second_order(model: ModalModel) -> SecondOrder:
 
 
 def to_control(model: ModalModel, *, residual_compliance: bool = False) -> "control.StateSpace":
-    """Return the linear part as an object of the package python-control, with all names.
+    """Linear part as an object of python-control, with all names.
 
-    Constant forces, gaps at ``q = 0`` and the state at the start are not part of such an object:
-    see :func:`state_space`.
+    Without constant forces, gaps at ``q = 0`` and start: see :func:`state_space`.
 
     Parameters
     ----------
     residual_compliance
-        Put what the modes of a body miss into D.
+        Of a body, to be put into D.
 
     Raises
     ------
@@ -195,16 +190,16 @@ def to_control(model: ModalModel, *, residual_compliance: bool = False) -> "cont
 
 
 def start_speed(model: ModalModel) -> float:
-    """Velocity [m/s] of the moving body of a pair at the start, + opening; 0 for a body."""
+    """Initial velocity [m/s] of the moving body of a pair, + opening; 0 for a body."""
     square = float(model.rise @ model.rise)
     return float(model.rise @ model.start_velocity) / square if square else 0.0
 
 
 def relaxation_time(model: ModalModel) -> float:
-    """Time constant [s] of a series compliance whose film is weak: a fifth of the step of klack.
+    """Time constant [s] of a series compliance whose film is weak: a fifth of klack's step.
 
-    With the usual 20 ns it moves the peak force by less than 1e-6 and the speed of the rebound by
-    2e-5 (two rods with a strong film); a shorter one is more exact and stiffer.
+    With the usual 20 ns it moves the peak force by less than 1e-6 and the rebound speed by 2e-5
+    (two rods with a strong film); a shorter one is stiffer.
     """
     return RELAXATION * model.step
 
@@ -212,11 +207,8 @@ def relaxation_time(model: ModalModel) -> float:
 def contact_kind(contact: ModelContact) -> ContactKind:
     """Form of the elastic law of a contact.
 
-    Raises
-    ------
-    InputError
-        For a law with dissipation: it needs the speed of each first touch, and would count the
-        wave losses of bodies with modes twice.
+    Rejects dissipation, which needs the speed of each first touch, and would count the wave losses
+    of bodies with modes twice.
     """
     law = contact.law
     if law is None:
@@ -239,7 +231,7 @@ def contact_kind(contact: ModelContact) -> ContactKind:
 def law_table(contact: ModelContact) -> NDArray[np.float64]:
     """Rows of a table law: start [m], force there [N], factors of s, s^2, s^3; shape (k, 5).
 
-    The last row has no end: it is the linear continuation.
+    The last row is the endless linear continuation.
     """
     law = contact.law
     assert isinstance(law, TableLaw)
@@ -249,7 +241,7 @@ def law_table(contact: ModelContact) -> NDArray[np.float64]:
 def _matrices(
     model: ModalModel,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Modal forces of inputs and contacts; factors of q and of v in outputs and gaps."""
+    """Modal forces of inputs and contacts; factors of q and v in outputs and gaps."""
     gaps = np.array([contact.shape for contact in model.contacts]).reshape(-1, model.mode_count)
     moved, speed = model.output_matrices()
     return (
@@ -260,7 +252,7 @@ def _matrices(
 
 
 def _with_residual(model: ModalModel, D: NDArray[np.float64]) -> NDArray[np.float64]:
-    """D with the residual compliance at the displacements of the ports that have an input."""
+    """D with residual compliance at displacements of ports with input."""
     out = D.copy()
     if model.kind == "body":
         rows = {output.name: i for i, output in enumerate(model.outputs)}

@@ -1,6 +1,6 @@
-"""Models as plain text: matrices as CSV and as ASCII columns, as one-dimensional system tools read.
+"""Models as plain text: CSV and ASCII columns, for one-dimensional system tools.
 
-All numbers have 17 digits, so reading them back gives the same model to the last bit.
+17 digits give the same model to the last bit.
 """
 
 import csv
@@ -23,18 +23,16 @@ _DEEPEST = 20e-6  # [m] indentation of its table
 
 
 def write_text(models: Sequence[ModalModel], folder: Path) -> tuple[Path, ...]:
-    """Write each model as text files that start with its name.
+    """Write each model as text files.
 
-    ``NAME_A.csv``, ``_B``, ``_C``, ``_D`` hold bare numbers, one row per line, and ``NAME_A.txt``
-    and so on the same with blanks.  ``NAME_state_space.csv`` has all four with their names in one
-    file, as :func:`klack.bodies.model_files.reduced_models.read_state_space` reads it.
-    ``NAME_modes.csv`` has frequency, damping and shapes [1/sqrt(kg)]; ``NAME_law.csv``
-    (``NAME_CONTACT_law.csv`` where there are several contacts) indentation and force;
-    ``NAME_info.txt`` says what is what.  A body has a D with its residual compliance as well,
+    ``NAME_A.csv``, ``_B``, ``_C``, ``_D`` hold bare numbers, one row per line, ``NAME_A.txt`` and
+    so on the same with blanks. ``NAME_state_space.csv`` has all four with their names
+    (:func:`klack.bodies.model_files.reduced_models.read_state_space`). ``NAME_modes.csv`` has
+    frequency, damping and shapes [1/sqrt(kg)]; ``NAME_law.csv`` (``NAME_CONTACT_law.csv`` of
+    several) indentation and force; ``NAME_info.txt`` says what is what. A body also has
     ``NAME_D_with_residual_compliance``.
 
-    Parameters and errors are those of :func:`klack.exchange.model_folder.model_folder`;
-    a model of more than 2 GB and a contact law with dissipation are errors as well.
+    Parameters and errors as :func:`klack.exchange.matlab_model.write_matlab`.
     """
     names: list[str] = []
     with model_folder(models, folder) as stage:
@@ -80,7 +78,7 @@ def _write_table(path: Path, heads: Sequence[str], rows: NDArray[np.float64]) ->
 
 
 def _modes(model: ModalModel) -> tuple[list[str], NDArray[np.float64]]:
-    """One row per mode; a body has a column for each port, as klack's reader of modes expects."""
+    """One row per mode; a body has a column for each port, as klack reads it."""
     heads, columns = ["frequency [Hz]", "damping"], [model.frequencies, model.damping]
     if model.kind == "body":
         for output in model.outputs:
@@ -98,10 +96,9 @@ def _modes(model: ModalModel) -> tuple[list[str], NDArray[np.float64]]:
 
 
 def _law_points(contact: ModelContact) -> NDArray[np.float64]:
-    """Indentation [m] and force [N]: the points of a table, or a formula at many points.
+    """Indentation [m] and force [N] of a table, or of a formula at many points.
 
-    The points of a table are met exactly; what a tool draws between them is its own affair, so each
-    interval has ten further points of klack's curve.
+    Tools draw their own curves between table points, so each interval has ten further points.
     """
     assert contact.law is not None
     if contact_kind(contact) == "table":

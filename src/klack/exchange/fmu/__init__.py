@@ -1,1 +1,1 @@
-"""Models as Functional Mock-up Units: C sources, binaries, model description, documentation."""
+"""Models as Functional Mock-up Units."""

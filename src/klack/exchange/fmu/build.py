@@ -31,18 +31,13 @@ __all__ = ["build_fmu", "data_header", "source_texts"]
 def data_header(model: ModalModel, guid: str) -> str:
     """Text of the header.
 
-    Names and counts are seen by every source file; the arrays only by the one that defines
-    ``KLACK_ARRAYS`` before.  Every number has 17 digits, so the compiler reads the same double.
+    Names and counts are seen by every source file; arrays only by the one that defines
+    ``KLACK_ARRAYS`` before.  Numbers have 17 digits: the compiler reads the same double.
 
     Parameters
     ----------
     guid
-        What an importing program has to show at the instantiation.
-
-    Raises
-    ------
-    InputError
-        For a number that is not finite.
+        Shown by an importing program at instantiation.
     """
     variables = fmu_variables(model)
     names = [variable.name for variable in variables]
@@ -114,7 +109,7 @@ def data_header(model: ModalModel, guid: str) -> str:
 
 
 def constants_header() -> str:
-    """Text of ``klack_constants.h``: what the C sources share with klack's own time step."""
+    """Text of ``klack_constants.h``: constants shared with klack's time step."""
     lines = [
         f"#define KLACK_{name} ({value}) /* {meaning} */"
         for name, value, meaning in shared_constants("C")
@@ -129,7 +124,7 @@ def constants_header() -> str:
 
 
 def _padded(modes: int) -> int:
-    """Modes are filled up, so that loops over them need no rest."""
+    """Mode count, filled up so that loops need no rest."""
     return LANES * max(1, -(-modes // LANES))
 
 
@@ -138,7 +133,7 @@ def _number(name: str, value: float) -> str:
 
 
 def _array(name: str, values: ArrayLike) -> str:
-    """One array; C has none without elements, so an empty one gets a zero."""
+    """One array; an empty one gets a zero, as C requires."""
     numbers = [_digits(name, x) for x in np.asarray(values, dtype=float).ravel()] or ["0"]
     return f"static const double {name}[{len(numbers)}] = {{{_wrapped(numbers)}}};"
 
@@ -190,31 +185,19 @@ _MADE = (1980, 1, 1, 0, 0, 0)  # time of all files: the same model gives the sam
 def build_fmu(
     model: ModalModel, path: Path, *, fmi: Literal[2, 3], platforms: Sequence[str] | None = None
 ) -> Path:
-    """Write an FMU with model exchange and co-simulation, sources and binaries.
-
-    The file is written whole or not at all.
+    """Write an FMU with model exchange and co-simulation, sources and binaries, or nothing.
 
     Parameters
     ----------
     model
         Its name is the model identifier.
     path
-        Of the FMU; a file there is replaced.
+        A file there is replaced.
     fmi
         Version of the standard.
     platforms
-        Of the binaries, see :data:`klack.exchange.fmu.compiler.PLATFORMS`; that of this program by
-        default.  The sources are inside, so an importing program may compile its own.
-
-    Returns
-    -------
-    Path
-        ``path``.
-
-    Raises
-    ------
-    InputError
-        Without a compiler, or for another version.
+        Of :data:`klack.exchange.fmu.compiler.PLATFORMS`; default: of this program.  An importing
+        program may compile the sources inside.
     """
     if fmi not in SOURCE_FILES:
         raise InputError(
@@ -237,7 +220,7 @@ def build_fmu(
 
 
 def source_texts(model: ModalModel, fmi: Literal[2, 3], guid: str) -> dict[str, bytes]:
-    """Files of the folder ``sources`` by name: all that a C99 compiler needs."""
+    """Files of the folder ``sources``: all that a C99 compiler needs."""
     names = (*SOURCE_FILES[fmi], *_HEADERS)
     texts = {name: (_HERE / "sources" / name).read_bytes() for name in names}
     standard = sorted((_HERE / "headers" / f"fmi{fmi}").glob("*.h"))
@@ -250,7 +233,7 @@ def source_texts(model: ModalModel, fmi: Literal[2, 3], guid: str) -> dict[str, 
 
 
 def _guid(model: ModalModel, fmi: Literal[2, 3]) -> str:
-    """Made of all numbers and sources: another model has another one."""
+    """Of all numbers and sources: other models have another."""
     texts = source_texts(model, fmi, "")
     digest = sha256(b"\0".join(texts[name] for name in sorted(texts)))
     return f"{{{UUID(bytes=digest.digest()[:16])}}}"
@@ -277,7 +260,7 @@ def _binaries(
 
 
 def _write(path: Path, files: Mapping[str, bytes]) -> None:
-    """Write under another name first, then move: there is never a partial FMU."""
+    """Write under another name, then move."""
     with whole_file(path) as new, zipfile.ZipFile(new, "w", zipfile.ZIP_DEFLATED) as archive:
         for inside in sorted(files):
             archive.writestr(_entry(inside), files[inside])

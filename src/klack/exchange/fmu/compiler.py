@@ -1,4 +1,4 @@
-"""C compilers for the binaries of an FMU: that of the system, or the one of the package ziglang."""
+"""C compilers for FMU binaries: of the system, or of the package ziglang."""
 
 import importlib.util
 import platform
@@ -17,18 +17,18 @@ __all__ = ["PLATFORMS", "Target", "compile_library", "require_compilers", "this_
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """A platform that binaries can be made for.
+    """Platform for binaries.
 
     Parameters
     ----------
     folders
-        Of its binaries inside an FMU of version 2 and of version 3.
+        In an FMU of version 2 and of version 3.
     suffix
         Of a shared library.
     triple
-        What zig calls it.
+        Of zig.
     package
-        Words for who has no compiler.
+        Advice without compiler.
     cross
         Programs that compile for it on any machine.
     """
@@ -62,7 +62,7 @@ PLATFORMS = {
         ("aarch64-darwin", "aarch64-darwin"), ".dylib", "aarch64-macos", _XCODE
     ),
 }
-"""Platforms by their names in FMI 2.0; where that has none, by those of FMI 3.0."""
+"""Platforms by their names in FMI 2.0, else 3.0."""
 
 # no fused multiplications: every processor computes the same numbers
 _OPTIONS = ("-std=c99", "-O3", "-ffp-contract=off", "-fvisibility=hidden", "-shared")
@@ -70,7 +70,7 @@ _LOG_HEAD = 2000
 
 
 def this_platform() -> str:
-    """Name of the platform that this program runs on."""
+    """Platform of this program."""
     arm = platform.machine().lower() in ("arm64", "aarch64")
     if sys.platform == "win32":
         return "win64"
@@ -80,13 +80,7 @@ def this_platform() -> str:
 
 
 def require_compilers(platforms: Sequence[str] | None) -> None:
-    """Check that there is a compiler for every platform; None is that of this program.
-
-    Raises
-    ------
-    InputError
-        For an unknown platform, and for one without compiler; the text says what to install.
-    """
+    """Check the compilers of the platforms; None: this one."""
     for name in (this_platform(),) if platforms is None else platforms:
         _command(name)
 
@@ -94,23 +88,19 @@ def require_compilers(platforms: Sequence[str] | None) -> None:
 def compile_library(
     sources: Sequence[Path], include: Sequence[Path], library: Path, *, platform: str
 ) -> None:
-    """Compile C sources into a shared library without other dependencies than the C library.
+    """Compile C sources into a shared library that depends on the C library alone.
 
     Parameters
     ----------
     include
-        Folders of headers.
+        Header folders.
     library
-        Written; its folder exists.
-    platform
-        One of :data:`PLATFORMS`.
+        In an existing folder.
 
     Raises
     ------
-    InputError
-        Without a compiler for that platform.
     ConvergenceError
-        If the compiler fails; its words are in the text.
+        With the words of a failing compiler.
     """
     command = [*_command(platform), *_OPTIONS]
     if PLATFORMS[platform].suffix != ".dll":
@@ -128,7 +118,7 @@ def compile_library(
 
 
 def _command(name: str) -> list[str]:
-    """Start of the command line of the compiler for a platform."""
+    """Start of the compiler's command line."""
     if name not in PLATFORMS:
         raise InputError(
             "platforms of an FMU",

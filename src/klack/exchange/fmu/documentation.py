@@ -1,4 +1,4 @@
-"""Pages and pictures inside an FMU: what the model is, how to connect it, where it ends."""
+"""Pages and pictures inside an FMU."""
 
 from collections.abc import Sequence
 from importlib.resources import files
@@ -40,7 +40,7 @@ _POINTS = 1200
 
 
 def port_picture(model: ModalModel, outputs: Sequence[str]) -> bytes:
-    """SVG: inputs on the left of a block, outputs on its right."""
+    """SVG: inputs left of a block, outputs right."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
     from matplotlib.patches import Rectangle
@@ -68,7 +68,7 @@ def port_picture(model: ModalModel, outputs: Sequence[str]) -> bytes:
 
 
 def answer_picture(model: ModalModel) -> bytes:
-    """SVG: receptances of a body over frequency, or the contact laws of a pair."""
+    """SVG: receptances of a body, or contact laws of a pair."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
@@ -82,7 +82,7 @@ def answer_picture(model: ModalModel) -> bytes:
 
 
 def receptance(model: ModalModel, output: int, source: int, f: NDArray[np.float64]) -> NDArray[Any]:
-    r"""Displacement per force [m/N], complex, at the frequencies ``f`` [Hz].
+    r"""Displacement per force [m/N] at frequencies ``f`` [Hz].
 
     .. math:: H = \sum_i \frac{c_i b_i}{\omega_i^2 - \omega^2 + 2 j \zeta_i \omega_i \omega}
     """
@@ -164,7 +164,7 @@ def _draw_laws(axes: "Axes", model: ModalModel) -> None:
 
 
 def _deepest(model: ModalModel, contact: int) -> float:
-    """Indentation [m] at the last point of a table, or at 1 kN of another law."""
+    """Indentation [m] at the end of a table, or at 1 kN."""
     law = model.contacts[contact].law
     points = getattr(law, "indentation", None)
     if points is not None:
@@ -188,13 +188,7 @@ def _svg(figure: "Figure") -> bytes:
 def documentation_files(model: ModalModel, *, fmi: Literal[2, 3] = 2) -> dict[str, bytes]:
     """Files of the documentation by their path inside the FMU.
 
-    The page, its two pictures, the licence of the C sources, and the icon where the version of the
-    standard expects it.
-
-    Parameters
-    ----------
-    fmi
-        Version of the standard.
+    Page, two pictures, licence of the C sources, and the icon where the standard expects it.
     """
     outputs = [v.name for v in fmu_variables(model) if v.causality == "output"]
     place = {2: "model.png", 3: "terminalsAndIcons/icon.png"}[fmi]
@@ -239,7 +233,7 @@ def _page(model: ModalModel) -> str:
 
 
 def _top_frequency(model: ModalModel) -> float:
-    """Frequency [Hz] up to which every body has modes: the lowest of their highest ones."""
+    """Frequency [Hz] up to which every body has modes."""
     highest: dict[str, float] = {}
     for name, frequency in zip(model.mode_names, model.frequencies, strict=True):
         body = name.rpartition("_")[0]

@@ -1,9 +1,8 @@
 """``modelDescription.xml`` of an FMU: what an importing program reads before it loads anything.
 
-FMI 2.0 counts variables from 1 in its model structure, FMI 3.0 names them by value reference; both
-have the same variables with the same value references (:mod:`klack.exchange.fmu.variables`).
-Version 2 leaves the time out, as some importers of that version stumble over it; version 3 needs
-it.  The event indicator of a contact is its gap.
+FMI 2.0 counts variables from 1 in its model structure, FMI 3.0 names them by value reference
+(:mod:`klack.exchange.fmu.variables`). Version 2 leaves the time out, over which some importers
+stumble; version 3 needs it. The event indicator of a contact is its gap.
 """
 
 from collections.abc import Mapping, Sequence
@@ -30,9 +29,9 @@ __all__ = [
 def supports_model_exchange(model: ModalModel) -> bool:
     """Whether the forces of a model follow from its states.
 
-    Not so where forces depend on the rate of a surface that a series compliance keeps apart from
-    the body: a squeeze film (its time constant falls with the third power of the gap, down to far
-    below any step) or a damped law.  Such a model has co-simulation alone.
+    Not where forces depend on the rate of a surface behind a series compliance: a squeeze film
+    (its time constant falls with the third power of the gap, far below any step) or a damped law.
+    Such a model has co-simulation alone.
     """
     return not any(
         contact.series_compliance > 0.0 and feels_speed(contact) for contact in model.contacts
@@ -40,16 +39,16 @@ def supports_model_exchange(model: ModalModel) -> bool:
 
 
 def feels_speed(contact: ModelContact) -> bool:
-    """Whether the force of a contact depends on the rate of its gap."""
+    """Whether a contact force depends on the rate of its gap."""
     return contact.film is not None or isinstance(contact.law, HuntCrossley)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Dependencies:
-    """Value references of unknowns and of what they depend on, all in increasing order.
+    """Value references of unknowns and what they depend on, increasing.
 
-    An importing program finds algebraic loops and the pattern of its Jacobian from these lists.  No
-    output depends directly on an input: forces act on velocities, and those on displacements.
+    For algebraic loops and the pattern of the Jacobian. No output depends directly on an input:
+    forces act on velocities, those on displacements.
 
     Parameters
     ----------
@@ -125,7 +124,7 @@ def _picked(references: NDArray[np.int64], shape: NDArray[np.float64]) -> tuple[
 
 
 SOURCE_FILES = {2: ("klack_model.c", "klack_fmi2.c"), 3: ("klack_model.c", "klack_fmi3.c")}
-"""C sources of both versions of the standard."""
+"""C sources of both versions."""
 
 _DISPLAY_UNITS = {"m": ("um", 1e6), "s": ("us", 1e6)}
 _TOLERANCE = 1e-8
@@ -142,7 +141,7 @@ def model_description(model: ModalModel, *, fmi: Literal[2, 3], guid: str) -> st
     fmi
         Version of the standard.
     guid
-        What the binary compares at its instantiation.
+        Compared by the binary at instantiation.
     """
     variables = fmu_variables(model)
     exchange = supports_model_exchange(model)
@@ -171,14 +170,10 @@ def model_description(model: ModalModel, *, fmi: Literal[2, 3], guid: str) -> st
 
 
 def communication_step(model: ModalModel) -> float:
-    """Recommended communication step [s]: 50 internal steps, but 500 in a first simulation.
+    """Recommended communication step [s]: 50 internal ones, but 500 or more in a first simulation.
 
-    Rounded down to 1, 2 or 5 times a power of ten.
-
-    Notes
-    -----
-    Inputs are held over a step, so the error of a coupled simulation falls with its first power.
-    The contact itself is integrated with the internal step, whatever the communication step is.
+    Rounded down to 1, 2 or 5 times a power of ten. Inputs are held over a step: the error of a
+    coupled simulation is of first order. Contacts are integrated with the internal step.
     """
     longest = min(_LONGEST * model.step, model.duration / _FEWEST)
     mantissa, exponent = f"{longest * (1 + 1e-9):.15e}".split("e")
@@ -246,7 +241,7 @@ def _units(root: ET.Element, variables: Sequence[FmuVariable]) -> None:
 
 
 def _initial(model: ModalModel, variable: FmuVariable) -> str | None:
-    """How the value at the start comes about; None where the standard allows no word."""
+    """How the start value comes about; None where the standard allows no word."""
     if variable.causality == "input":
         return None
     known = variable.start is not None and (
@@ -256,7 +251,7 @@ def _initial(model: ModalModel, variable: FmuVariable) -> str | None:
 
 
 def _attributes(model: ModalModel, variable: FmuVariable) -> dict[str, str]:
-    """Attributes of the number itself, in the same words in both versions."""
+    """Attributes of the number, the same in both versions."""
     found = {"unit": variable.unit}
     for word, value in (
         ("min", variable.minimum),
@@ -285,7 +280,7 @@ def _words(model: ModalModel, variable: FmuVariable, reference: int) -> dict[str
 def _variables(
     root: ET.Element, model: ModalModel, variables: Sequence[FmuVariable], fmi: int, exchange: bool
 ) -> None:
-    """Variables, those of version 2 with an element for their number; derivatives count from 1."""
+    """Variables; in version 2 each with an element for its number; derivatives from 1."""
     listed = ET.SubElement(root, "ModelVariables")
     for reference, variable in enumerate(variables):
         words, number = _words(model, variable, reference), _attributes(model, variable)
@@ -318,9 +313,9 @@ def _structure(
     fmi: int,
     exchange: bool,
 ) -> None:
-    """What depends on what: in groups that count from 1 in version 2, by references in version 3.
+    """Dependencies: by counts from 1 in version 2, by references in version 3.
 
-    The initialization computes outputs, and in model exchange states and derivatives.
+    Initialization computes outputs, and in model exchange states and derivatives.
     """
     structure = ET.SubElement(root, "ModelStructure")
     initial = [r for r in sorted(found.at_start) if variables[r].causality == "output" or exchange]
@@ -344,17 +339,17 @@ def _structure(
 
 
 def _number(value: float) -> str:
-    """Shortest text that reads back as the same number."""
+    """Shortest text that reads back equal."""
     return repr(float(value))
 
 
 def _text(text: str) -> str:
-    """One line without characters that XML cannot hold."""
+    """One line that XML can hold."""
     return " ".join("".join(c if c.isprintable() else " " for c in text).split())
 
 
 def build_description(model: ModalModel) -> str:
-    """XML text; one configuration that every C99 compiler can build, on every platform."""
+    """XML text: one configuration for every C99 compiler and platform."""
     root = ET.Element("fmiBuildDescription", fmiVersion="3.0")
     configuration = ET.SubElement(root, "BuildConfiguration", modelIdentifier=model.name)
     files = ET.SubElement(configuration, "SourceFileSet", language="C99")

@@ -1,8 +1,7 @@
-"""Variables of an FMU and their value references, for the C sources and both model descriptions.
+"""Variables of an FMU and their value references.
 
-Value references count from 0 in the order of :func:`fmu_variables`: inputs, outputs, parameters,
-states (displacements of all modes, then velocities), their derivatives.  Version 3 of the standard
-adds the time after the last of them.
+References count from 0 in the order of :func:`fmu_variables`: inputs, outputs, parameters, states
+(displacements of all modes, then velocities), their derivatives; in version 3, the time.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -25,7 +24,7 @@ UNITS: Mapping[str, Mapping[str, int]] = {
     "m.kg1/2/s": {},
     "m.kg1/2/s2": {},
 }
-"""Units of the variables and their SI exponents; modal units have half powers, so none."""
+"""Units and their SI exponents; modal units have half powers, so none."""
 
 
 _USUAL_FORCE, _USUAL_WAY = 100.0, 1e-6  # [N], [m]
@@ -57,19 +56,19 @@ class FmuVariable:
 
 
 def contact_suffix(model: ModalModel, index: int) -> str:
-    """Ending of the names of a contact's variables; none where there is only one contact."""
+    """Ending of the names of a contact's variables; none for a single one."""
     return "" if len(model.contacts) == 1 else f"_{model.contacts[index].name}"
 
 
 def fmu_variables(model: ModalModel) -> tuple[FmuVariable, ...]:
     """All variables in the order of their value references.
 
-    Outputs: those of the model, then for each contact ``gap`` (between the bodies) [m],
-    ``contact_force`` (at this instant; in co-simulation the mean over the last internal step),
-    ``mean_contact_force`` and ``peak_contact_force`` (over the last communication step; in model
-    exchange equal to ``contact_force``) [N], and ``film_force`` [N] where it has a film.
-    Parameters: ``internal_step`` [s] and, of a pair, ``start_velocity`` [m/s] and ``start_rise``
-    [m] of the moving body.  A name that comes again gets ``_2``, ``_3`` and so on.
+    Outputs: those of the model, then for each contact ``gap`` [m], ``contact_force`` (in
+    co-simulation the mean over the last internal step), ``mean_contact_force`` and
+    ``peak_contact_force`` (over the last communication step; in model exchange equal to
+    ``contact_force``) [N], and ``film_force`` [N] of a film. Parameters: ``internal_step`` [s]
+    and, of a pair, ``start_velocity`` [m/s] and ``start_rise`` [m] of the moving body. Repeated
+    names get ``_2``, ``_3`` and so on.
     """
     variables = _distinct(
         [
@@ -192,7 +191,7 @@ def _states(model: ModalModel) -> Iterator[FmuVariable]:
 
 
 def _rates(states: Sequence[FmuVariable], first: int) -> Iterator[FmuVariable]:
-    """Derivatives of the states, whose value references count from ``first``."""
+    """Derivatives of the states, from ``first``."""
     for i, state in enumerate(states):
         yield FmuVariable(
             name=f"der({state.name})",
@@ -204,10 +203,10 @@ def _rates(states: Sequence[FmuVariable], first: int) -> Iterator[FmuVariable]:
 
 
 def _usual_states(model: ModalModel) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Usual sizes of modal displacements and velocities; solvers scale their tolerance by them.
+    """Usual modal displacements and velocities, by which solvers scale their tolerance.
 
-    Rigid modes: 1 um and 1 m/s.  Elastic ones ring with a sudden force ``F`` of 100 N at the port
-    that moves them most, ``F phi / omega^2`` and ``F phi / omega``.
+    Rigid modes: 1 um and 1 m/s. Elastic ones: a sudden ``F`` of 100 N at the port that moves them
+    most, ``F phi / omega^2`` and ``F phi / omega``.
     """
     rigid = np.sqrt(max(float(model.rise @ model.rise), 1e-6))
     shapes = [item.shape for item in model.inputs] + [item.shape for item in model.contacts]
@@ -222,7 +221,7 @@ def _usual_states(model: ModalModel) -> tuple[NDArray[np.float64], NDArray[np.fl
 
 
 def _distinct(variables: Sequence[FmuVariable]) -> list[FmuVariable]:
-    """Variables with a number behind each name that was there before."""
+    """Variables, repeated names numbered."""
     taken = {variable.name for variable in variables}
     seen: set[str] = set()
     found = []

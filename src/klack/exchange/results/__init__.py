@@ -1,1 +1,1 @@
-"""Results of a study for other programs: time histories, numbers and fields."""
+"""Results of a study for other programs."""

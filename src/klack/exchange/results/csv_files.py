@@ -1,4 +1,4 @@
-"""Results as plain tables of text: one file for each run and axis, numbers to the last bit."""
+"""Results as plain text tables, one per run and axis, numbers to the last bit."""
 
 import csv
 import json
@@ -15,23 +15,9 @@ __all__ = ["write_csv"]
 def write_csv(table: ResultTable, folder: Path) -> tuple[Path, ...]:
     """Write ``<run>.csv``, ``<run>_<axis>.csv`` for further axes, ``numbers.csv``, ``about.json``.
 
-    UTF-8, comma and decimal point; the one line above the numbers names each column with its unit,
-    ``contact force [N]``; the first column is the axis.  Every number is the shortest text that
-    gives the same double again; one that does not exist is left empty.
-
-    Parameters
-    ----------
-    folder
-        Files of the same names are replaced, once all are complete.
-
-    Returns
-    -------
-    tuple of Path
-
-    Raises
-    ------
-    InputError
-        If the place cannot be written to.
+    UTF-8, comma and decimal point; one line names each column with its unit, ``contact force
+    [N]``; the first column is the axis. Every number is the shortest text of its double; missing
+    ones are empty. Files of the same names are replaced, once all are complete.
     """
     parts = [
         (run.name if i == 0 else f"{run.name}_{axis.name}", axis, channels)

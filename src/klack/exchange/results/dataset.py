@@ -28,7 +28,7 @@ __all__ = ["dataset_of"]
 
 
 class Variable(NamedTuple):
-    """Dimensions, values and attributes (``units``, ``long_name``, ``comment``) of one quantity."""
+    """Dimensions, values, and attributes (``units``, ``long_name``, ``comment``)."""
 
     dimensions: tuple[str, ...]
     values: NDArray[Any] | float | int | bool
@@ -47,8 +47,7 @@ def noise_variables(design: NoiseDesign) -> tuple[dict[str, Variable], dict[str,
     """Variables and coordinates of a design: forces of the stops, bodies, sound of one click.
 
     Over ``band``, the middles of third octaves: energies of force, radiated energy, sound
-    exposure.  Forces share the axis ``time`` where they are sampled alike; every stop has a
-    frequency axis of its own.
+    exposure. Forces share ``time`` where sampled alike; every stop has a frequency axis.
     """
     bands = design.band_middle
     coordinates = {
@@ -110,9 +109,8 @@ _SAID = {"failure": "why there are no measures", "doubts": "what speaks against 
 def points_variables(study: StudyRecord) -> tuple[dict[str, Variable], dict[str, Variable]]:
     """Variables and coordinates of all points, in the order of the design.
 
-    Parameters and measures are of shape (points,) over ``point``, by their names with underscores
-    for what Python does not take; ``failure`` says why a point has no measures, ``doubts`` what
-    speaks against its numbers.
+    Parameters and measures (points,) over ``point``, names with underscores; ``failure`` says why
+    a point has no measures, ``doubts`` what speaks against its numbers.
     """
     names = identifiers([item.name for item in study.columns], ("point", *_SAID))
     variables = {
@@ -135,10 +133,10 @@ def _about(item: StudyColumn) -> dict[str, str]:
 
 
 def shots_variables(study: ShotsStudy) -> tuple[dict[str, Variable], dict[str, Variable]]:
-    """Variables and coordinates of all shots and of the centred one.
+    """Variables and coordinates of all shots and the centred one.
 
-    Numbers of a shot are of shape (n + 1,) over ``shot``; height and force of shape (n + 1, k)
-    over ``shot`` and time.  Shots are counted from 1; the last row, shot 0, is the centred one.
+    Numbers (n + 1,) over ``shot``; height and force (n + 1, k) over ``shot`` and time. Shots count
+    from 1; the last row, shot 0, is the centred one.
     """
     shots, centred = study.shot_traces, study.centric_traces
     count = study.shots.count
@@ -173,11 +171,11 @@ def shots_variables(study: ShotsStudy) -> tuple[dict[str, Variable], dict[str, V
 
 
 def strokes_variables(shots: VariantShots) -> tuple[dict[str, Variable], dict[str, Variable]]:
-    """Variables and coordinates of all strokes of a variant and of the centred one.
+    """Variables and coordinates of all strokes of a variant and the centred one.
 
-    Numbers of a stroke are of shape (n + 1,) over ``stroke``, those of the first impact on a stop
-    behind its name, ``seat_peak_force``; the lift is of shape (n + 1, k) over ``stroke`` and
-    ``time``.  Strokes are counted from 0; the last row, stroke -1, is the centred one.
+    Numbers (n + 1,) over ``stroke``, of the first impact on a stop behind its name,
+    ``seat_peak_force``; lift (n + 1, k) over ``stroke`` and ``time``. Strokes count from 0; the
+    last row, stroke -1, is the centred one.
     """
     variables = {
         measure.key: _column(measure, shots.strokes, shots.centric) for measure in STROKE_MEASURES
@@ -214,24 +212,24 @@ Variables = dict[str, Variable]
 def dataset_of(record: object, measured: Iterable[Measured], run: str | None = None) -> Any:
     """Curves and numbers of one run of a record as an ``xarray.Dataset``.
 
-    Coordinates are the axes of the run; every variable has ``units`` and ``long_name``, as in
-    netCDF files (:func:`klack.exchange.results.netcdf.write_netcdf`).
+    Variables have ``units`` and ``long_name``, as in netCDF files
+    (:func:`klack.exchange.results.netcdf.write_netcdf`).
 
     Parameters
     ----------
     record : ImpactStudy, StrokeStudy, ShotsStudy, StrokeShotsStudy, StudyRecord or NoiseStudy
     measured : iterable of (name, part of the record, measures)
-        Those of the record; the numbers of a noise study are read from them.
+        Of the record; a noise study needs none.
     run
-        Level, variant or design; the answer of an impact, the reference of a stroke, the first
-        design by default.  Shots and studies have one run.
+        Level, variant or design; default: answer of an impact, reference of a stroke, first
+        design. Shots and studies have one run.
 
     Raises
     ------
     MissingExtraError
         Without the package xarray.
     InputError
-        For another record, or a run that it does not have.
+        For another record or run.
     """
     xarray = optional_package("xarray", "datasets of results", "exchange")
     about: dict[str, str]
@@ -294,7 +292,7 @@ def _named(run: str | None, usual: str, known: Iterable[str]) -> str:
 
 
 def _table_variables(run: ResultRun) -> tuple[Variables, Variables]:
-    """Data variables and coordinates, by names that Python takes."""
+    """Data variables and coordinates, by Python names."""
     axes = identifiers([axis.name for axis in run.axes])
     dimension = dict(zip([axis.name for axis in run.axes], axes, strict=True))
     coordinates = {

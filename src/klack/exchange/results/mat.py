@@ -1,4 +1,4 @@
-"""Results as a MATLAB file (version 5): one structure for each run, read by MATLAB and Octave."""
+"""Results as a MATLAB file (version 5): one structure per run."""
 
 from pathlib import Path
 from typing import Any
@@ -17,23 +17,12 @@ _OWN = ("about", "names", "units", "axes", "numbers", "label", "solver", "name")
 
 
 def write_mat(table: ResultTable, path: Path) -> Path:
-    """Write a file of which ``plot(reduced.time, reduced.contact_force)`` makes sense.
+    """Write a file for ``plot(reduced.time, reduced.contact_force)``.
 
-    A run is a structure of columns: its axes and its channels.  ``run.units.X`` is the unit of
-    ``run.X``, ``run.names.X`` its name in klack, ``run.axes.X`` the field that it is drawn over;
-    ``run.numbers`` holds the numbers of the run, ``about`` what made them.  Text with characters
-    beyond ASCII ends in blanks.
-
-    Returns
-    -------
-    Path
-        Of the file.
-
-    Raises
-    ------
-    InputError
-        If a run is larger than 2 GiB, which the format cannot hold, or the place cannot be written
-        to.
+    A run is a structure of axes and channels. ``run.units.X`` is the unit of ``run.X``,
+    ``run.names.X`` its name in klack, ``run.axes.X`` the field that it is drawn over;
+    ``run.numbers`` holds its numbers, ``about`` what made them. Text beyond ASCII ends in blanks.
+    Rejects runs of more than 2 GiB.
     """
     runs = identifiers([run.name for run in table.runs], _OWN)
     variables: dict[str, Any] = {

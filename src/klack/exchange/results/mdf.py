@@ -1,7 +1,7 @@
 """Results as MDF 4, so that measurement tools open a computed stroke like a measured one.
 
-Every run and axis of time is one channel group with its own time master.  Curves over frequency are
-left out: a master of MDF is a time, an angle, a distance or an index.
+One channel group per run and axis of time. No curves over frequency: a master of MDF is a time, an
+angle, a distance or an index.
 """
 
 from datetime import UTC, datetime
@@ -15,24 +15,14 @@ __all__ = ["write_mdf"]
 
 
 def write_mdf(table: ResultTable, path: Path) -> Path:
-    """Write an MDF 4.10 file; channels are named ``wet/needle.tip displacement``.
+    """Write an MDF 4.10 file; channels are called ``wet/needle.tip displacement``.
 
-    Parameters
-    ----------
-    path
-        Ends in ``.mf4``; another suffix is kept, but few tools look for it.
-
-    Returns
-    -------
-    Path
-        Of the file.
+    Few tools look for another suffix than ``.mf4``.
 
     Raises
     ------
     MissingExtraError
         Without the package asammdf.
-    InputError
-        If the place cannot be written to.
     """
     asammdf = optional_package("asammdf", "writing MDF", "exchange")
     with asammdf.MDF(version="4.10") as file:
@@ -65,7 +55,7 @@ def write_mdf(table: ResultTable, path: Path) -> Path:
 
 
 def _start(created: str) -> datetime:
-    """Date of the study; the epoch if it carries none."""
+    """Date of the study, or the epoch."""
     try:
         date = datetime.fromisoformat(created)
     except ValueError:

@@ -1,7 +1,7 @@
-"""Results as netCDF-4: one group for each run, every channel over the dimension of its axis.
+"""Results as netCDF-4: one group per run, channels over the dimension of their axis.
 
-Attributes follow the CF conventions (``units``, ``long_name``, ``title``, ``history``, ...).  The
-numbers are the doubles of the study, compressed without loss.
+Attributes follow the CF conventions (``units``, ``long_name``, ``title``, ``history``, ...);
+doubles are compressed without loss.
 """
 
 from io import BytesIO
@@ -17,30 +17,23 @@ from klack.files.whole import whole_file
 __all__ = ["write_netcdf"]
 
 _PLACES = {"title": "title", "description": "comment", "created": "date_created"}
-"""Lines of the table that have a name of their own in the conventions."""
+"""Table lines with names of their own in the conventions."""
 
 _LONGEST = 15_000
-"""Characters of an attribute: HDF5 holds 64 KiB, and a character takes up to four bytes."""
+"""Characters of an attribute: HDF5 holds 64 KiB, up to four bytes each."""
 
 
 def write_netcdf(table: ResultTable, path: Path) -> Path:
-    """Write a file that netCDF4, xarray, MATLAB, ParaView and ``ncdump`` open.
+    """Write a file for netCDF4, xarray, MATLAB, ParaView and ``ncdump``.
 
-    Group ``/reduced`` holds the coordinate variables (``time``, ``time_edge``), the channels over
-    them and the numbers of the run as variables without dimension.  Names of variables have
-    underscores for blanks and points; ``long_name`` keeps the name of klack.
-
-    Returns
-    -------
-    Path
-        Of the file.
+    Group ``/reduced`` holds coordinates (``time``, ``time_edge``), the channels over them and the
+    numbers of the run without dimension. Names have underscores for blanks and points;
+    ``long_name`` keeps the name of klack.
 
     Raises
     ------
     MissingExtraError
         Without the package h5netcdf.
-    InputError
-        If the place cannot be written to.
     """
     h5netcdf = optional_package("h5netcdf", "writing netCDF", "exchange")
     # HDF5 writes to memory: it ends the process where the disk is full when it closes a file

@@ -1,8 +1,8 @@
 r"""One impact of a stroke in three dimensions as a film for ParaView.
 
-Displacements follow from the recorded modal coordinates, :math:`u = \Phi q`, of the needle and of
-the body that it meets; stresses follow from them.  So both are those of the kept modes: the local
-indentation under the contact points, which the static residual compliance carries, is not in them.
+Displacements follow from the recorded modal coordinates, :math:`u = \Phi q`, stresses from them.
+Both are those of the kept modes, without the local indentation under the contact points, which the
+residual compliance carries.
 """
 
 from collections.abc import Mapping
@@ -34,7 +34,7 @@ __all__ = ["valve_shapes", "write_spatial_series"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class BodyShapes:
-    """A body and the shapes of its coordinates.
+    """Body and shapes of its coordinates.
 
     Parameters
     ----------
@@ -42,8 +42,8 @@ class BodyShapes:
         Rigid ones first.
     omega (m,) [rad/s]
     above [m]
-        By stop: how far the upper body stands above its drawing where the network has its
-        displacements 0, the lower one as it is drawn; of the stops of this body.
+        By stop of this body: how far the upper body is above its drawing at displacements 0 of the
+        network, the lower one as drawn.
     is_upper
         By stop.
     """
@@ -58,15 +58,7 @@ class BodyShapes:
 def valve_shapes(
     case: ValveCase, progress: Progress = silent, *, threads: int | None = None
 ) -> dict[str, BodyShapes]:
-    """Mesh the bodies of a valve, and compute the modes that its network keeps.
-
-    Meshes, factors and modes are those that a run has cached.
-
-    Raises
-    ------
-    InputError
-        For a case that no valve can be built from.
-    """
+    """Mesh the bodies of a valve, and compute the modes of its network, as cached by a run."""
     with threadpool_limits(limits=threads or 1, user_api="blas"):
         parts = valve_parts(case, build_valve_bodies(case, progress), progress, threads or 1)
         for flexibility in parts.flexibilities.values():
@@ -101,13 +93,13 @@ def write_ring(
     fields: Mapping[str, NDArray[np.float64]],
     time: float,
 ) -> None:
-    """Write as many lines round the axis z as there are values in each field.
+    """Write lines round the axis z, one per value in each field.
 
     Parameters
     ----------
     radius, height [m]
     fields (S,)
-        Values of the sectors, the first of which begins at +x; in single precision.
+        Of the sectors, the first from +x; single precision.
     time [s]
     """
     count = len(next(iter(fields.values())))
@@ -128,7 +120,7 @@ _SAME = 1e-6  # of the largest mark of a body: its shapes are those of the resul
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Part:
-    """One body of the film: its grid, and the fields of it."""
+    """One body of the film: its grid and fields."""
 
     name: str
     stem: str
@@ -167,32 +159,22 @@ def write_spatial_series(
 
     Fields in single precision: ``displacement`` [m] from the drawing, ``deformation`` [m] without
     the rigid motion, ``stress`` [Pa] (xx, yy, zz, xy, yz, xz) and ``von_mises`` [Pa]; of the ring
-    ``line_load`` [N/m] and ``sector_force`` [N].  The needle stands where it is drawn, the other
-    body where it meets it.
+    ``line_load`` [N/m] and ``sector_force`` [N]. The needle is where it is drawn, the other body
+    where it meets it. Rejects half sections, impacts without recorded motion, and bodies other
+    than those of the result.
 
     Parameters
     ----------
     case
-        That the study was computed from.
+        Of the study.
     folder
-        What stands there under the same names is replaced when everything is complete.
+        Files of the same names are replaced when everything is complete.
     impact
-        As the report numbers the impacts of the variant, from 1.
+        Of the variant, from 1, as in the report.
     variant
-        The first one by default.
+        Default: the first.
     frames
-        At most so many instants, evenly among those that were recorded.
-
-    Returns
-    -------
-    Path
-        Of the ``.pvd``.
-
-    Raises
-    ------
-    InputError
-        For half sections, an impact whose motion was not recorded, fewer than two frames, a case
-        whose bodies are not those of the result, or a place that cannot be written to.
+        At most, evenly among the recorded instants; two at least.
     """
     if frames < 2:
         raise InputError(
@@ -253,7 +235,7 @@ def _run(study: StrokeStudy, variant: str | None) -> StrokeVariant:
 
 
 def _recorded(run: StrokeVariant, impact: int) -> tuple[SpatialImpact, ModalMoments]:
-    """Record of an impact with the motion of its bodies."""
+    """Record of an impact with the motion of bodies."""
     known = {
         number: (record, record.modes)
         for number, _, record in recorded_impacts(run)
@@ -310,7 +292,7 @@ def _parts(
 
 
 def _require_same(name: str, found: BodyShapes, q: Floats, marks: Floats) -> None:
-    """Refuse coordinates of other shapes: mesh, sign or pairing of modes may differ."""
+    """Reject other shapes: mesh, sign or pairing of modes may differ."""
     here = shape_marks(found.shapes)
     if found.shapes.shape[1] != q.shape[1]:
         raise _other_bodies(
@@ -330,7 +312,7 @@ def _other_bodies(got: str) -> InputError:
 
 
 def _loads(record: SpatialImpact, time: float) -> dict[str, Floats]:
-    """Loads of the sectors in the interval that ends at or after a moment; 0 outside."""
+    """Loads of the sectors in the interval that ends at or after a moment; else 0."""
     at = int(np.searchsorted(record.edges, time * (1.0 - 1e-12))) - 1
     if 0 <= at < len(record.sector_force):
         return {"line_load": record.line_load[at], "sector_force": record.sector_force[at]}

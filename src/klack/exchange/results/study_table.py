@@ -31,16 +31,7 @@ __all__ = ["about_study", "result_table", "stroke_table"]
 def about_study(
     study: CaseRecord | NoiseStudy, own: Mapping[str, str], bodies: Iterable[BodySummary] = ()
 ) -> dict[str, str]:
-    """Case, versions, date and meshes, with the study's own lines between them.
-
-    Parameters
-    ----------
-    study : CaseRecord or NoiseStudy
-    own
-        Lines of this kind of study.
-    bodies
-        Whose meshes are named.
-    """
+    """Case, versions, date and meshes of bodies, with the study's own lines between."""
     about = {
         "case": study.case,
         "title": study.title,
@@ -64,7 +55,7 @@ Of = TypeVar("Of")
 
 
 def measure_scalar(measure: Measure[Of], of: Of) -> ResultScalar:
-    """Name, unit, value and definition of a measure; nan where it has no value."""
+    """Name, unit, value (or nan) and definition of a measure."""
     value = measure.read(of)
     return ResultScalar(
         name=measure.name,
@@ -78,9 +69,9 @@ _MEAN = "mean over the interval around that time"
 
 
 def impact_table(study: ImpactStudy) -> ResultTable:
-    """Time histories of all levels, numbers of the impact, modal energies, transfer functions.
+    """Histories of all levels, numbers of the impact, modal energies, transfer functions.
 
-    Pressure fields and pictures of the study are left out: they are no curves.
+    Without pressure fields and pictures.
     """
     about = about_study(
         study,
@@ -236,7 +227,7 @@ def _transfer(item: TransferComparison) -> ResultRun:
 
 
 def stroke_table(study: StrokeStudy) -> ResultTable:
-    """All channels of all variants, fine records of every end stop, impacts, energy balance."""
+    """Channels of all variants, records of end stops, impacts, energy balance."""
     own = {
         "reference": study.reference.name,
         "needle": study.needle,
@@ -362,13 +353,7 @@ def _stroke_scalars(variant: StrokeVariant) -> tuple[ResultScalar, ...]:
 
 
 def result_table(study: ImpactStudy | StrokeStudy) -> ResultTable:
-    """Every curve and every number of a study, with units and with what made them.
-
-    Parameters
-    ----------
-    study : ImpactStudy or StrokeStudy
-        Computed, or read by :func:`klack.analyses.catalogue.load_result`.
-    """
+    """Every curve and number of a study, computed or loaded, with units and what made them."""
     if isinstance(study, ImpactStudy):
         return impact_table(study)
     return stroke_table(study)

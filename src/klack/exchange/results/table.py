@@ -1,4 +1,4 @@
-"""The numbers of a study as one plain table: what every writer of results starts from."""
+"""Numbers of a study as one plain table, from which all writers start."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -24,19 +24,16 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ResultAxis:
-    """Axis of the values of some channels.
+    """Axis of channels.
 
     Parameters
     ----------
     name
-        For example ``"time"``; its own within a run.
-    quantity : ``"time"`` or ``"frequency"``
+        As ``"time"``; unique in a run.
     unit
         SI.
     values (n,) [unit]
         Rising strictly.
-    meaning
-        In words.
     """
 
     name: str
@@ -53,14 +50,14 @@ class ResultChannel:
     Parameters
     ----------
     name
-        In the words of klack, for example ``"needle.tip displacement"``.
+        As ``"needle.tip displacement"``.
     axis
-        Name of a :class:`ResultAxis` of the same run.
+        Of the same run.
     unit
         SI; ``"1"`` for a pure number.
     values (n,) [unit]
     meaning
-        Sign and where between two instants the value holds.
+        Sign, and where between two instants the value holds.
     """
 
     name: str
@@ -72,7 +69,7 @@ class ResultChannel:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ResultScalar:
-    """One number of a run; nan where it does not exist."""
+    """Number of a run, or nan."""
 
     name: str
     unit: str
@@ -87,11 +84,11 @@ class ResultRun:
     Parameters
     ----------
     name
-        For example ``"reduced"`` or ``"wet"``.
+        As ``"reduced"`` or ``"wet"``.
     label
-        What a legend says.
+        For a legend.
     solver
-        What computed it, in words.
+        In words.
     """
 
     name: str
@@ -118,7 +115,7 @@ class ResultRun:
             yield axis, tuple(item for item in self.channels if item.axis == axis.name)
 
     def channel(self, name: str) -> ResultChannel:
-        """Channel of that name; :class:`KeyError` if there is none."""
+        """Channel of that name, or :class:`KeyError`."""
         return {item.name: item for item in self.channels}[name]
 
 
@@ -128,11 +125,10 @@ class ResultTable:
 
     Parameters
     ----------
-    kind : ``"impact"`` or ``"stroke"``
     about
-        Case, title, version of klack, date, mesh, ...: what made the numbers.
+        Case, title, version of klack, date, mesh, ...
     case_text
-        The case file as it was read.
+        As read.
     runs
         The reference first.
     """
@@ -143,7 +139,7 @@ class ResultTable:
     runs: tuple[ResultRun, ...]
 
     def run(self, name: str) -> ResultRun:
-        """Run of that name; :class:`KeyError` if there is none."""
+        """Run of that name, or :class:`KeyError`."""
         return {item.name: item for item in self.runs}[name]
 
 
@@ -152,12 +148,7 @@ LONGEST = 63
 
 
 def identifiers(names: Sequence[str], taken: Collection[str] = ()) -> tuple[str, ...]:
-    """Letters, digits and underscores, no digit first, at most 63 characters, no two the same.
-
-    Parameters
-    ----------
-    taken
-        Names that are used already.
+    """Letters, digits and underscores, no digit first, at most 63, all different and not taken.
 
     Examples
     --------
@@ -168,7 +159,7 @@ def identifiers(names: Sequence[str], taken: Collection[str] = ()) -> tuple[str,
 
 
 def file_stems(names: Sequence[str]) -> tuple[str, ...]:
-    """Names of files without their suffix: no folder, no hidden file, no two the same.
+    """File names without suffix: no folder, no hidden file, all different.
 
     Examples
     --------
@@ -180,9 +171,9 @@ def file_stems(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def octave_text(words: str) -> str:
-    """Text with a blank for each further byte of its letters.
+    """Text with a blank per further byte of its letters.
 
-    scipy counts letters where Octave reads bytes: without them the end of "Stäbe" is lost.
+    scipy counts letters, Octave bytes: the end of "Stäbe" would be lost.
     """
     return words + " " * (len(words.encode()) - len(words))
 

@@ -1,7 +1,7 @@
-"""An impact as a film for ParaView: displacement, velocity and stress of both bodies over time.
+"""An impact as a film for ParaView: displacement, velocity and stress of both bodies.
 
-At the full level the fields are those of the run, node by node; at the reduced level
-:mod:`klack.analyses.impact.recovered_motion` recovers them from the modes.
+At the full level node by node; at the reduced level
+:mod:`klack.analyses.impact.recovered_motion` recovers the fields from the modes.
 """
 
 from collections.abc import Sequence
@@ -43,26 +43,15 @@ def write_impact_series(
     """Compute one impact and write ``<case>_<level>.pvd`` with one grid per body and instant.
 
     Fields in single precision: ``displacement`` [m] from the start of the motion, ``velocity``
-    [m/s], ``stress`` [Pa] (xx, yy, zz, xy, yz, xz) and ``von_mises`` [Pa]; a body that came as
-    matrices has no stress.  Axisymmetric bodies are drawn in the half plane y = 0.
+    [m/s], ``stress`` [Pa] (xx, yy, zz, xy, yz, xz) and ``von_mises`` [Pa], except of given
+    matrices. Axisymmetric bodies are in the half plane y = 0.
 
     Parameters
     ----------
     folder
-        What stands there under the same names is replaced when everything is complete.
+        Files of the same names are replaced when everything is complete.
     frames
-        Instants, evenly spaced over ``run.duration``; fewer if the run has fewer steps.
-
-    Returns
-    -------
-    Path
-        Of the ``.pvd``.
-
-    Raises
-    ------
-    InputError
-        For a case that this level cannot compute, fewer than two frames, or a place that cannot be
-        written to.
+        Evenly over ``run.duration``, at most one per step; two at least.
     """
     if frames < 2:
         raise InputError(
@@ -118,14 +107,14 @@ class _Film:
 def stress_grid(
     case: Case | ValveCase, name: str, mesh: Mesh
 ) -> tuple[StressField | None, VtuGrid]:
-    """Stress of a body, if its material is known, and the grid of its fields."""
+    """Stress of a body of known material, and the grid of its fields."""
     known = case.bodies[name].material is not None
     field = StressField(mesh, case.materials_of(name, mesh.solids)) if known else None
     return field, VtuGrid(mesh if field is None else field.mesh)
 
 
 def _fields(stress: StressField | None, body: MotionOfBody) -> dict[str, NDArray[np.float64]]:
-    """Nodal fields at the points of the grid."""
+    """Nodal fields of the grid."""
     if stress is None:
         return {"displacement": body.displacement, "velocity": body.velocity}
     d = stress.mesh.dimension
@@ -160,6 +149,6 @@ def _run_full(
 
 
 def _instants(duration: float, step: float, frames: int) -> tuple[int, ...]:
-    """Steps at which the frames are, as even as whole steps allow."""
+    """Steps of frames, as even as possible."""
     last = ceil(duration / step * (1.0 - 1e-9))
     return tuple(dict.fromkeys(round(k * last / (frames - 1)) for k in range(frames)))

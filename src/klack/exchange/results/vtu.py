@@ -1,7 +1,6 @@
-"""Unstructured grids of VTK (``.vtu``) and series of them (``.pvd``), as ParaView reads them.
+"""Unstructured grids of VTK (``.vtu``) and series (``.pvd``), for ParaView.
 
-The node order of all element families is that of VTK.  Numbers are binary, compressed by zlib and
-written as base64, so that a file is valid XML.
+All element families have VTK's node order. Numbers are binary, by zlib and base64: valid XML.
 """
 
 import zlib
@@ -28,10 +27,10 @@ _PIECE = 2**20  # bytes that are compressed at once
 
 
 class VtuGrid:
-    """One mesh, ready to be written with any number of fields.
+    """One mesh, for any number of fields.
 
-    An axisymmetric mesh lies in the plane y = 0: x is the radius and z the axis, so that it fits to
-    solids and can be revolved about z (ParaView: *Rotational Extrusion*).
+    An axisymmetric mesh is in the plane y = 0, x the radius, as for solids; ParaView's *Rotational
+    Extrusion* turns it.
     """
 
     def __init__(self, mesh: Mesh) -> None:
@@ -52,13 +51,9 @@ class VtuGrid:
         self._piece = grid_piece(points, nodes, sizes, types, {"solid": solid.astype("i8")})
 
     def write(self, path: Path, fields: Mapping[str, NDArray[Any]], time: float) -> None:
-        """Write the grid with its fields.
+        """Write the grid with fields (n_points,) or (n_points, components) in single precision.
 
-        Parameters
-        ----------
-        fields : mapping of str to array, shape (n_points,) or (n_points, components)
-            Written in single precision.  Two components are those along x and z.
-        time [s]
+        Two components are those along x and z; ``time`` in [s].
         """
         three = {name: self._three(values) for name, values in fields.items()}
         write_grid(path, self._piece, three, time)
@@ -77,7 +72,7 @@ def grid_piece(
     types: NDArray[np.uint8],
     of_cells: Mapping[str, NDArray[Any]],
 ) -> str:
-    """Points and cells, as the text of a grid has them; ``sizes`` are numbers of nodes."""
+    """Points and cells as text; ``sizes`` are node counts."""
     return (
         f'<Piece NumberOfPoints="{len(points)}" NumberOfCells="{len(sizes)}">\n'
         f"<Points>\n{data_array('Points', points.astype('f8'))}</Points>\n"
@@ -108,7 +103,7 @@ def _arrays(fields: Mapping[str, NDArray[Any]]) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SeriesFile:
-    """One file of a series: its time [s], its part, and its path relative to the series."""
+    """File of a series: time [s], part, relative path."""
 
     time: float
     part: int
@@ -117,7 +112,7 @@ class SeriesFile:
 
 
 def write_pvd(path: Path, files: Iterable[SeriesFile]) -> None:
-    """Write the list that makes a series of grids: ParaView opens it as one."""
+    """Write the list of a series of grids."""
     lines = [
         f'<DataSet timestep="{item.time!r}" part="{item.part}" name={quoteattr(item.name)} '
         f"file={quoteattr(item.file)}/>\n"
@@ -132,7 +127,7 @@ def write_pvd(path: Path, files: Iterable[SeriesFile]) -> None:
 
 
 def data_array(name: str, values: NDArray[Any], *, tuples: bool = False) -> str:
-    """One array with its head: number of pieces, size of a piece, of the last, compressed sizes."""
+    """Array with head: number of pieces, size of a piece, of the last, compressed sizes."""
     raw = np.ascontiguousarray(values).astype(values.dtype.newbyteorder("<")).tobytes()
     pieces = [zlib.compress(raw[i : i + _PIECE], 4) for i in range(0, len(raw), _PIECE)]
     rest = len(raw) % _PIECE
