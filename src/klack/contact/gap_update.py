@@ -14,8 +14,9 @@ nanometre in first order, ten aside by a hundred.
 Gaps round a ring after a body of revolution has left its axis, on the curved surfaces.
 
 The hats of the half section (:mod:`klack.contact.mortar`) stand at equal angles of the ring; the
-other surface is a revolved meridian. A line :math:`x + s n` has the radius :math:`\rho(s) = |(x +
-s n)_\perp|`, a curve in the half plane :math:`(\rho, z)`, and meets the meridian by its tangent,
+other surface is a revolved meridian. A line :math:`x + s n` has the radius
+:math:`\rho(s) = |(x + s n)_\perp|`, a curve in the half plane :math:`(\rho, z)`, and meets the
+meridian by its tangent,
 
 .. math:: \frac{d \rho}{d s} = \frac{(x + s n)_\perp \cdot n_\perp}{\rho} ,
 

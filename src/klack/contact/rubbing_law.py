@@ -1,9 +1,9 @@
 r"""Contact law with memory: what two faces with Coulomb friction do along the axis of motion.
 
 The faces slip along the meridian: up the cone while the contact closes, down while it opens. The
-law is a bed of springs, each touching at an indentation :math:`g_j`. Pressed in by :math:`x =
-\langle d - g_j \rangle` it has the force :math:`n_j x` of the pressure, and that of the friction,
-a spring :math:`k_j` with a slider,
+law is a bed of springs, each touching at an indentation :math:`g_j`. Pressed in by
+:math:`x = \langle d - g_j \rangle` it has the force :math:`n_j x` of the pressure, and that of the
+friction, a spring :math:`k_j` with a slider,
 
 .. math::
     F = \sum_j n_j x_j + k_j (x_j - s_j), \qquad |k_j (x_j - s_j)| \le h_j x_j, \qquad

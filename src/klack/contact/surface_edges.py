@@ -1,10 +1,9 @@
 r"""Edges of a contact surface: where the named surface ends, and where the skin has a corner.
 
-A contact that reaches the end of the *named* surface may continue beyond it; one on a sharp
-corner has no width of its own; at a blunt edge within a contact the pressure has no limit.  The
-angle between the outward normals of two faces that meet tells,
-:math:`\cos\vartheta = n_1 \cdot n_2`, positive where the body is convex.  In a half section an
-edge is a point.
+A contact that reaches the end of the *named* surface may continue beyond it; one on a sharp corner
+has no width of its own; at a blunt edge within a contact the pressure has no limit. The angle
+between the outward normals of two faces that meet tells, :math:`\cos\vartheta = n_1 \cdot n_2`,
+positive where the body is convex. In a half section an edge is a point.
 """
 
 from collections.abc import Mapping, Sequence

@@ -6,12 +6,12 @@ of the upper (slave) surface the pressure is
 
 .. math:: p = K \max(0, -g)
 
-with the overclosure :math:`-g` on the curved faces. With friction they hold :math:`\min(\lambda s,
-\mu p)` across, *s* the elastic part of the slip: a spring of the stick slope :math:`\lambda`
-before the slider, where klack's faces stick rigidly. The system is then unsymmetric, which the
-iterative solvers of ccx do not take, and the deck has a ballast, a heavy cube in free flight: ccx
-stops a run of fixed steps where the energy balance leaves some 0.3 % of the largest energy, as if
-friction were an error of the steps; a thousandfold energy prevents that.
+with the overclosure :math:`-g` on the curved faces. With friction they hold
+:math:`\min(\lambda s, \mu p)` across, *s* the elastic part of the slip: a spring of the stick
+slope :math:`\lambda` before the slider, where klack's faces stick rigidly. The system is then
+unsymmetric, which the iterative solvers of ccx do not take, and the deck has a ballast, a heavy
+cube in free flight: ccx stops a run of fixed steps where the energy balance leaves some 0.3 % of
+the largest energy, as if friction were an error of the steps; a thousandfold energy prevents that.
 
 The Hilber-Hughes-Taylor rule takes fixed steps (``DIRECT``), so that runs can be compared step by
 step.

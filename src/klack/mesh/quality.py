@@ -2,8 +2,8 @@
 
 The scaled Jacobian at the corners is the determinant of the edge tangents over the product of
 their lengths, times the factor that makes it 1 for the ideal corner. The tangent at a corner of a
-serendipity element depends on the edge only, :math:`t = 4 x_m - 3 x_0 - x_1` (linear: :math:`x_1 -
-x_0`), so it is exact for every family.
+serendipity element depends on the edge only, :math:`t = 4 x_m - 3 x_0 - x_1` (linear:
+:math:`x_1 - x_0`), so it is exact for every family.
 """
 
 from collections.abc import Sequence

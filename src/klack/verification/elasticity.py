@@ -367,9 +367,8 @@ def free_bar_frequencies(
 ) -> tuple[np.ndarray, np.ndarray]:
     r"""First three frequencies (3,) [Hz] after Euler-Bernoulli, and after Timoshenko.
 
-    Frequency equation of the free beam with shear and rotary inertia: Huang 1961.  Shear
-    coefficient of the circle: Hutchinson 2001,
-    :math:`6 (1 + \nu)^2 / (7 + 12 \nu + 4 \nu^2)`.
+    Frequency equation of the free beam with shear and rotary inertia: Huang 1961. Shear
+    coefficient of the circle: Hutchinson 2001, :math:`6 (1 + \nu)^2 / (7 + 12 \nu + 4 \nu^2)`.
 
     Parameters
     ----------

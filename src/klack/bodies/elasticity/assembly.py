@@ -60,8 +60,7 @@ def assemble_order(
     """Stiffness [N/m] and mass [kg] of a body of revolution in one Fourier order around its axis.
 
     Three amplitudes a, b, w per node, see :mod:`klack.bodies.elasticity.fourier_body`; the mass
-    does
-    not couple them, and is for a and b twice that of w.
+    does not couple them, and is for a and b twice that of w.
 
     Parameters
     ----------

@@ -1,10 +1,9 @@
 r"""Memory of a factorisation before it is made.
 
-MKL counts the entries of the factor in its analysis.  For SuperLU and NGSolve the growth of nested
+MKL counts the entries of the factor in its analysis. For SuperLU and NGSolve the growth of nested
 dissection is taken (George 1973: :math:`n \log n` entries in the plane, Lipton, Rose & Tarjan
-1979:
-:math:`n^{4/3}` in space) with a factor measured on bodies of valves: bulky ones in space, since
-slim ones fill less.
+1979: :math:`n^{4/3}` in space) with a factor measured on bodies of valves: bulky ones in space,
+since slim ones fill less.
 """
 
 from math import log2
@@ -45,8 +44,7 @@ def require_factor_memory(
     """Reject a factorisation that does not fit.
 
     The error names the element size that would fit: memory grows with h^-4 in space and with h^-2
-    in
-    the plane.
+    in the plane.
 
     Parameters
     ----------

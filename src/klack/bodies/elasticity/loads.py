@@ -121,8 +121,8 @@ Floats = NDArray[np.float64]
 class NearLoads:
     r"""Loads of one body with their answers.
 
-    With flexibility F, loads :math:`f_i` and answers :math:`u_i = F f_i`, the combination :math:`u
-    = \sum_i c_i u_i` with
+    With flexibility F, loads :math:`f_i` and answers :math:`u_i = F f_i`, the combination
+    :math:`u = \sum_i c_i u_i` with
 
     .. math:: \sum_j (f_i^T u_j)\, c_j = u_i^T f, \qquad
         e^2 = \frac{f^T F f - \sum_i c_i\, u_i^T f}{f^T F f}

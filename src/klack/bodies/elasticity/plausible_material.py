@@ -1,7 +1,7 @@
 r"""Density, modulus and wave speed of a body, read off its matrices.
 
 Under the uniform strain :math:`u = x\,e_x` a body of volume V stores
-:math:`u^T K u = V (\lambda + 2\mu)`; the mass is :math:`\rho V`.  Where only nodes are known, the
+:math:`u^T K u = V (\lambda + 2\mu)`; the mass is :math:`\rho V`. Where only nodes are known, the
 box around them bounds V from above, so density and modulus are lower bounds; the wave speed
 :math:`c = \sqrt{u^T K u / m}` needs no volume.
 """

@@ -93,12 +93,10 @@ def require_rigid_motions(
 ) -> float:
     """Check that rigid motions cause no forces; returns the largest relative one.
 
-    In row i the sum of ``K_ij R_j`` is compared with the sum of the magnitudes.  Rows of nodes
-    that
+    In row i the sum of ``K_ij R_j`` is compared with the sum of the magnitudes. Rows of nodes that
     share an element with one missing in the files cannot cancel and are left out; without
-    elements,
-    at most half of the rows may be tied to missing ones.  The error says whether the order of the
-    rows, the coordinates or a support within K is to blame.
+    elements, at most half of the rows may be tied to missing ones. The error says whether the
+    order of the rows, the coordinates or a support within K is to blame.
     """
     R = rigid_motions(mesh)
     size = abs(K) @ np.abs(R)
@@ -176,9 +174,8 @@ def without_rigid_strain(K: csr_array, M: csr_array, mesh: Mesh) -> csr_array:
     """Remove the rounding of its file from the stiffness of a free body, so that K R = 0.
 
     Numbers of 7 to 10 digits leave forces :math:`E = K R`, small against K, that give rigid
-    motions a
-    frequency.  Those of shifts are taken out of the diagonal blocks.  For what is left, with a
-    support :math:`G` of three nodes, :math:`G^T R = 1`,
+    motions a frequency. Those of shifts are taken out of the diagonal blocks. For what is left,
+    with a support :math:`G` of three nodes, :math:`G^T R = 1`,
 
     .. math:: K' = K - E G^T - G E^T + G (R^T E) G^T
 

@@ -200,8 +200,7 @@ class RingSections:
         """Displacement of each section, then rotation of each, shape (2 k, 3 n_nodes).
 
         In order 0 along and about the axis; in order 1 towards the direction of bending and about
-        the
-        one across it; zero for higher orders.
+        the one across it; zero for higher orders.
         """
         k, nodes = self.count, len(self.points)
         if order > 1:

@@ -54,8 +54,8 @@ class RefinedFactorization(Closing):
     As a preconditioner of conjugate gradients it gives all digits, in the time of two to three
     solves in double precision: it pays only where memory decides.
 
-    The iteration stops by the error in the energy, :math:`r^T A^{-1} r \approx r^T \tilde A^{-1}
-    r` over :math:`x^T A x`.
+    The iteration stops by the error in the energy,
+    :math:`r^T A^{-1} r \approx r^T \tilde A^{-1} r` over :math:`x^T A x`.
 
     Parameters
     ----------

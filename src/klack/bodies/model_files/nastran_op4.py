@@ -1,9 +1,8 @@
 """Matrices that Nastran writes with OUTPUT4 (``.op4``): ASCII or binary, of either byte order.
 
 Columns are stored one after another, either whole from the first to the last non-zero row, or as
-strings of non-zeros.  The head of a string packs length and first row into one integer (up to
-65 535 rows), or holds them in two (BIGMAT).  Every count is checked against the bytes before
-memory
+strings of non-zeros. The head of a string packs length and first row into one integer (up to
+65 535 rows), or holds them in two (BIGMAT). Every count is checked against the bytes before memory
 is taken.
 """
 

@@ -213,8 +213,7 @@ def read_uff_modes(path: Path) -> FileModalData:
     """Read all normal modes.
 
     Rejects complex modes and a file without dataset 55: frequency responses (dataset 58) need a
-    modal
-    analysis first.
+    modal analysis first.
     """
     if path.stat().st_size > _LARGEST:
         raise InputError(

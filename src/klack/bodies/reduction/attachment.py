@@ -164,8 +164,7 @@ def _nearest(
     """Square of an eigenfrequency [(rad/s)^2] too near to a shift, else None.
 
     Inverse iteration from the response of unit M-norm: the next vector is at most as long as one
-    over
-    the distance to the nearest eigenvalue that the load excites.
+    over the distance to the nearest eigenvalue that the load excites.
     """
     limit = 2.0 * _NEAR * shift
     for column in response.T:

@@ -69,8 +69,7 @@ def body_of_state_space(
     """Convert a state space whose inputs and outputs are the ports, in SI and in pairs.
 
     Rejects a model that is unstable, not reciprocal, not passive, or whose damping couples modes;
-    the
-    error names mode and ports.
+    the error names mode and ports.
 
     Parameters
     ----------
