@@ -238,7 +238,7 @@ def onto_axis(piece: Piece, axis: Vector) -> Mapping[str, Vector]:
 
 
 def between_samples(piece: Piece, axis: Vector) -> bool:
-    """True if samples of a piece are off the axis."""
+    """True if samples of a piece lie between those of the axis."""
     shift = (piece.start - axis[0]) / piece.step
     same = abs(piece.step / (axis[1] - axis[0]) - 1.0) * axis.size < _ON_AXIS
     return not (same and abs(shift - round(shift)) < _ON_AXIS)

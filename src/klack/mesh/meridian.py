@@ -37,8 +37,8 @@ class _Triangulation:
 def mesh_meridian(profiles: Mapping[str, Profile], sizing: MeshSizing) -> Mesh:
     """Mesh of six-node triangles of one body made of one or several solids.
 
-    Solids are joined at shared edges (or parts). Surfaces are the named outer edges off the axis,
-    faces ``line3`` with the outward normal to the right of the walk. Nodes of an inner edge
+    Solids are joined at shared edges (or parts). Surfaces are the named outer edges except on the
+    axis, faces ``line3`` with the outward normal to the right of the walk. Nodes of an inner edge
     between solids are the node set of the same name.
 
     Rejects solids that overlap or do not touch, and elements too coarse for an arc.
