@@ -1,0 +1,431 @@
+r"""A source at its mounts on a receiver: interface forces, powers and contributions by path.
+
+Lagrange multipliers on the free parts (LM-FBS: de Klerk, Rixen & Voormeeren 2008) give
+
+.. math:: g = (Y_S + Y_K + Y_R)^{-1} v_f, \qquad v_R = Y_R g, \qquad p = H g
+
+with the mobility :math:`Y_K = s / k` of elements without mass.  Elements with inertia are third
+bodies with the forces :math:`F_1` and :math:`g` at their ends (:mod:`klack.acoustics.isolator`):
+
+.. math:: \begin{pmatrix} s + k_{11} Y_S & k_t Y_R \\ k_t Y_S & s + k_{22} Y_R \end{pmatrix}
+          \begin{pmatrix} F_1 \\ g \end{pmatrix} = \begin{pmatrix} k_{11} v_f \\ k_t v_f
+          \end{pmatrix}
+
+The source mobility alone, nearly singular at the resonances of the free source, is never
+inverted.  The receiver is brought into the frame of the source first, :math:`v' = T v`, so
+:math:`Y' = T Y T^T` and :math:`H' = H T^T`.
+
+A freedom may take up power or give it back; only the sum over all is never negative.
+"""
+
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from klack.acoustics.interface import (
+    Complexes,
+    Freedom,
+    InterfacePoint,
+    Receiver,
+    ReceiverResponse,
+    SourceAtMounts,
+)
+from klack.acoustics.isolator import Isolator
+from klack.arrays import Matrix, Vector
+from klack.errors import AccuracyWarning, InputError, refuse_if
+
+__all__ = [
+    "Coupled",
+    "Junction",
+    "Missing",
+    "Placement",
+    "axes_of",
+    "couple",
+    "junction",
+]
+
+Missing = Literal["block", "free"]
+"""What a receiver does in a direction in which it is not known."""
+
+_ALONG = 1e-6
+_WORST_CONDITION = 1e10
+
+
+def axes_of(x: Sequence[float], y: Sequence[float]) -> Matrix:
+    """Three axes from the directions x and y, shape (3, 3); z follows.
+
+    Raises
+    ------
+    InputError
+        Unless x and y are at right angles within 0.1 degrees.
+    """
+    first, second = (np.asarray(a, dtype=float) / max(np.linalg.norm(a), 1e-300) for a in (x, y))
+    refuse_if(
+        not abs(first @ second) < 2e-3 or np.linalg.norm(first) < 0.5,
+        "axes",
+        got=f"x = {list(x)} and y = {list(y)}",
+        expected="two directions at right angles",
+        hint="give the source's x and y as vectors in the frame of the receiver.",
+    )
+    second = second - (first @ second) * first
+    second = second / np.linalg.norm(second)
+    return np.array([first, second, np.cross(first, second)])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Placement:
+    """Where a mount of the source stands on the receiver.
+
+    Parameters
+    ----------
+    point
+        Name of the receiver's point; that of the mount without.
+    axes (3, 3)
+        Rows are the x, y, z of the source's drawing in the frame of the receiver.
+    offset (3,) [m]
+        From the receiver's point to the mount, in the frame of the receiver; they move together
+        as one rigid body.
+    """
+
+    point: str | None = None
+    axes: Matrix = field(default_factory=lambda: np.eye(3))
+    offset: Vector = field(default_factory=lambda: np.zeros(3))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Coupled:
+    """Source and receiver as they vibrate together; spectra of one click.
+
+    Freedoms are those of the source that the receiver takes up, in the frame of the source.
+
+    Parameters
+    ----------
+    frequency (k,) [Hz]
+    freedoms
+        n of them.
+    ears
+    free_velocity (k, n) [m/s/Hz]
+        Of the source, as it came.
+    source_force (k, n) [N/Hz]
+        Of the source on the element below it; equal to ``force`` where that has no mass.
+    force (k, n) [N/Hz]
+        On the receiver.
+    source_velocity, velocity (k, n) [m/s/Hz]
+        Of the source's side, and of the receiver's.
+    contributions (k, ears, n) [Pa/Hz]
+        Of each path to the sound pressure; complex, their sum is the pressure.
+    shift [1/s]
+        Real part of ``s``.
+    notes
+        What was assumed, one sentence each.
+    """
+
+    frequency: Vector
+    freedoms: tuple[Freedom, ...]
+    ears: tuple[str, ...]
+    free_velocity: Complexes
+    source_force: Complexes
+    force: Complexes
+    source_velocity: Complexes
+    velocity: Complexes
+    contributions: Complexes
+    shift: float = 0.0
+    notes: tuple[str, ...] = ()
+
+    @property
+    def pressure(self) -> Complexes:
+        """Sound pressure at the ears [Pa/Hz], shape (k, ears)."""
+        return np.asarray(self.contributions.sum(axis=2))
+
+    @property
+    def power(self) -> Matrix:
+        r"""Power into the receiver by freedom, :math:`\tfrac12 \mathrm{Re}(g_i^* v_i)`, (k, n).
+
+        Of amplitudes; the energy density of a click is four times it [J/Hz].  Negative where a
+        freedom gives power back.
+        """
+        return 0.5 * np.real(np.conj(self.force) * self.velocity)
+
+    @property
+    def power_from_source(self) -> Matrix:
+        """Power that leaves the source by freedom, shape (k, n); elements lose the difference."""
+        return 0.5 * np.real(np.conj(self.source_force) * self.source_velocity)
+
+    def energy_density(self) -> Matrix:
+        r"""Energy into the receiver by freedom [J/Hz], shape (k, n), of one click.
+
+        Its integral over the frequencies above 0 is :math:`\int g_i v_i\,\mathrm dt`.
+        """
+        return 4.0 * self.power
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Junction:
+    """Source and receiver at the freedoms that they share, in the frame of the source.
+
+    Parameters
+    ----------
+    s (k,) [1/s]
+    freedoms
+        n of them.
+    free_velocity (k, n), mobility (k, n, n)
+        Of the source.
+    receiver
+        Mobility and transfers at the same freedoms.
+    places
+        Freedoms of the receiver in its own frame.
+    spread (k, places, n)
+        Their velocities per force at the n freedoms.
+    isolators
+        By mount.
+    """
+
+    s: Complexes
+    freedoms: tuple[Freedom, ...]
+    free_velocity: Complexes
+    mobility: Complexes
+    receiver: ReceiverResponse
+    places: tuple[Freedom, ...]
+    spread: Complexes
+    isolators: Mapping[str, Isolator]
+    notes: tuple[str, ...] = ()
+
+    def forces(self, free_velocity: Complexes) -> tuple[Complexes, Complexes]:
+        """Forces on the elements and on the receiver (k, n, r) for free velocities (k, n, r)."""
+        return _interface_forces(self, free_velocity)
+
+
+def junction(
+    source: SourceAtMounts,
+    receiver: Receiver,
+    *,
+    placements: Mapping[str, Placement] | None = None,
+    isolators: Mapping[str, Isolator] | None = None,
+    missing: Mapping[str, Missing] | None = None,
+) -> Junction:
+    """Bring source and receiver together; parameters and errors as of :func:`couple`."""
+    T, kept, notes = _transformation(source, receiver, placements or {}, missing or {})
+    unknown = set(isolators or {}) - {point.name for point in source.points}
+    refuse_if(
+        unknown,
+        "isolators",
+        got=f"the mount '{min(unknown, default='')}'",
+        expected=f"one of: {', '.join(point.name for point in source.points)}",
+        hint="name the mount of the source that the element is below.",
+    )
+    answer = receiver.at(source.s)
+    spread = answer.mobility @ T.T
+    return Junction(
+        s=source.s,
+        freedoms=tuple(source.freedoms[i] for i in kept),
+        free_velocity=source.free_velocity[:, kept],
+        mobility=source.mobility[:, kept][:, :, kept],
+        receiver=ReceiverResponse(mobility=T @ spread, transfers=answer.transfers @ T.T),
+        places=receiver.freedoms,
+        spread=spread,
+        isolators=isolators or {},
+        notes=notes,
+    )
+
+
+def couple(
+    source: SourceAtMounts,
+    receiver: Receiver,
+    *,
+    placements: Mapping[str, Placement] | None = None,
+    isolators: Mapping[str, Isolator] | None = None,
+    missing: Mapping[str, Missing] | None = None,
+) -> Coupled:
+    """Join a source and a receiver.
+
+    Parameters
+    ----------
+    source, receiver
+        The receiver is evaluated at the source's ``s``.
+    placements
+        Mount -> where it stands; a point of the same name, frame and place without.
+    isolators
+        Mount -> element below it; a rigid joint without.
+    missing
+        ``flange.rx`` or ``flange`` -> what the receiver does where it is not known: ``block`` (it
+        does not move) or ``free`` (it takes up no force).
+
+    Raises
+    ------
+    InputError
+        For freedoms of the source that the receiver does not have, all of them by name.
+    """
+    joint = junction(source, receiver, placements=placements, isolators=isolators, missing=missing)
+    vf = joint.free_velocity
+    F_1, g = (forces[..., 0] for forces in joint.forces(vf[..., None]))
+    return Coupled(
+        frequency=source.frequency,
+        freedoms=joint.freedoms,
+        ears=receiver.ears,
+        free_velocity=vf,
+        source_force=F_1,
+        force=g,
+        source_velocity=vf - (joint.mobility @ F_1[..., None])[..., 0],
+        velocity=(joint.receiver.mobility @ g[..., None])[..., 0],
+        contributions=joint.receiver.transfers * g[:, None, :],
+        shift=source.shift,
+        notes=joint.notes,
+    )
+
+
+# --------------------------------------------------------------------------- frames
+
+
+def _transformation(
+    source: SourceAtMounts,
+    receiver: Receiver,
+    placements: Mapping[str, Placement],
+    missing: Mapping[str, Missing],
+) -> tuple[Matrix, list[int], tuple[str, ...]]:
+    """Rows of ``v' = T v``, the freedoms of the source that are kept, and what was assumed."""
+    mounts = {point.name: point for point in source.points}
+    points = {point.name: point for point in receiver.points}
+    rows, kept, notes, open_ones = [], [], [], []
+    for i, freedom in enumerate(source.freedoms):
+        place = placements.get(freedom.point, Placement())
+        name = place.point or freedom.point
+        refuse_if(
+            name not in points,
+            f"mount '{freedom.point}'",
+            got=f"the point '{name}' of the receiver",
+            expected=f"one of: {', '.join(points) or '(none)'}",
+            hint="say where the mount stands (placement: point).",
+        )
+        row, rest = _row(freedom, mounts[freedom.point], points[name], receiver.freedoms, place)
+        if rest > _ALONG:
+            wanted = missing.get(str(freedom)) or missing.get(freedom.point)
+            if wanted is None:
+                open_ones.append(str(freedom))
+                continue
+            notes.append(f"{freedom}: the receiver is not known there; taken as {wanted}.")
+            if wanted == "free":
+                continue
+        rows.append(row)
+        kept.append(i)
+    _refuse_open(open_ones, receiver)
+    refuse_if(
+        not kept,
+        "coupling",
+        got="no freedom that source and receiver share",
+        expected="at least one",
+        hint="do not set them all free.",
+    )
+    return np.array(rows), kept, tuple(notes)
+
+
+def _row(
+    freedom: Freedom,
+    mount: InterfacePoint,
+    point: InterfacePoint,
+    known: tuple[Freedom, ...],
+    place: Placement,
+) -> tuple[Vector, float]:
+    """One row of T, and the share of the motion in directions that the receiver lacks."""
+    axis = freedom.sign * mount.axes[freedom.index % 3] @ place.axes
+    # translation of the mount: e . (v + w x d) = e . v + (d x e) . w
+    needed = np.zeros(6)
+    if freedom.is_rotation:
+        needed[3:] = axis
+    else:
+        needed[:3], needed[3:] = axis, np.cross(place.offset, axis)
+    row = np.zeros(len(known))
+    reached = np.zeros(6)
+    for j, other in enumerate(known):
+        if other.point != point.name:
+            continue
+        along = np.zeros(6)
+        start = 3 if other.is_rotation else 0
+        along[start : start + 3] = other.sign * point.axes[other.index % 3]
+        row[j] = needed @ along
+        reached += row[j] * along
+    return row, float(np.linalg.norm(needed - reached) / np.linalg.norm(needed))
+
+
+def _refuse_open(open_ones: list[str], receiver: Receiver) -> None:
+    if not open_ones:
+        return
+    raise InputError(
+        "coupling",
+        got=f"no response of the receiver at {', '.join(open_ones)}",
+        expected="the receiver's mobility at every freedom of the source; it has "
+        f"{', '.join(map(str, receiver.freedoms)) or 'none'}",
+        hint="measure them, or say for each what the receiver does: missing: "
+        f"{{{open_ones[0]}: block}} (does not move) or free (takes up no force).",
+    )
+
+
+# --------------------------------------------------------------------------- forces
+
+
+def _interface_forces(joint: Junction, vf: Complexes) -> tuple[Complexes, Complexes]:
+    """Forces of the source on the elements, and of the elements on the receiver, (k, n, r)."""
+    s, freedoms = joint.s, joint.freedoms
+    Y_S, Y_R = joint.mobility, joint.receiver.mobility
+    k, n = Y_S.shape[:2]
+    compliance = np.zeros((k, n), dtype=complex)
+    with_mass: dict[int, tuple[Complexes, Complexes, Complexes]] = {}
+    for i, freedom in enumerate(freedoms):
+        element, direction = joint.isolators.get(freedom.point), abs(freedom.direction)
+        if element is None or direction not in element.directions:
+            continue
+        stiffness = element.stiffness(direction, s)
+        if stiffness.driving is None or stiffness.receiving is None:
+            compliance[:, i] = s / stiffness.transfer
+        else:
+            with_mass[i] = stiffness.driving, stiffness.transfer, stiffness.receiving
+    place = np.arange(n)
+    light = Y_S.copy()
+    light[:, place, place] += compliance
+    if not with_mass:
+        g = _solved(light + Y_R, vf)
+        return g, g
+    # two rows for each freedom, all in velocity: v_1 - v_2 = Y_K F_1 and F_1 = g without mass
+    Z = np.zeros((k, 2 * n, 2 * n), dtype=complex)
+    right = np.concatenate([vf, np.zeros_like(vf)], axis=1)
+    Z[:, :n, :n], Z[:, :n, n:] = light, Y_R
+    size = np.abs(np.einsum("kii->ki", light + Y_R))
+    Z[:, n + place, place], Z[:, n + place, n + place] = size, -size
+    for i, parts in with_mass.items():
+        whole = 1.0 / sum(np.abs(part) for part in parts)
+        k_11, k_t, k_22 = (whole * part for part in parts)
+        Z[:, i, :n], Z[:, i, n:] = k_11[:, None] * Y_S[:, i], k_t[:, None] * Y_R[:, i]
+        Z[:, n + i, :n], Z[:, n + i, n:] = k_t[:, None] * Y_S[:, i], k_22[:, None] * Y_R[:, i]
+        Z[:, i, i] += s * whole
+        Z[:, n + i, n + i] += s * whole
+        right[:, i], right[:, n + i] = k_11[:, None] * vf[:, i], k_t[:, None] * vf[:, i]
+    both = _solved(Z, right)
+    return both[:, :n], both[:, n:]
+
+
+def _solved(Z: Complexes, right: Complexes) -> Complexes:
+    """Solve at every frequency; rows and columns are scaled, as their units differ."""
+    worst = np.inf
+    if np.all(np.isfinite(Z)) and np.all(np.isfinite(right)):
+        size = np.sqrt(np.abs(np.einsum("kii->ki", Z)))
+        row = 1.0 / np.where(size > 0.0, size, 1.0)
+        scaled = Z * row[:, :, None] * row[:, None, :]
+        with np.errstate(all="ignore"):
+            worst = float(np.max(np.linalg.cond(scaled, 1)))
+    refuse_if(
+        not worst < 1.0 / np.finfo(float).eps,
+        "coupling",
+        got="matrices that are singular or not finite",
+        expected="a source or a receiver that moves in every freedom",
+        hint="a freedom in which neither moves carries no defined force: leave it out.",
+    )
+    if worst > _WORST_CONDITION:
+        warnings.warn(
+            f"The interface forces lose {np.log10(worst):.0f} of 16 digits: two freedoms of the "
+            "mounts move alike. Take fewer freedoms.",
+            AccuracyWarning,
+            stacklevel=5,
+        )
+    return np.asarray(row[..., None] * np.linalg.solve(scaled, row[..., None] * right))

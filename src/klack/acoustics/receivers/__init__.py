@@ -1,0 +1,1 @@
+"""Receivers of structure-borne sound: plates, modes, and measured responses with their files."""

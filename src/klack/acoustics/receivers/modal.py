@@ -1,0 +1,94 @@
+r"""Receivers by their modes, also beside the axis of frequency.
+
+.. math:: Y(s) = s \left( \sum_i \frac{\varphi_i \varphi_i^T}
+          {\omega_i^2 + 2 \zeta_i \omega_i s + s^2} + R \right)
+
+with what the modes miss of the static compliance, ``R``.  Reciprocal, and passive for every
+``zeta >= 0`` and ``R`` without negative eigenvalues.  Modal damping is causal, so time signals
+may use it.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from klack.acoustics.interface import Complexes, Freedom, InterfacePoint, ReceiverResponse
+from klack.arrays import Matrix, Vector
+from klack.bodies.reduction.receptance import modal_sum
+from klack.bodies.reduction.reduced_body import ReducedBody
+from klack.errors import refuse_if
+
+__all__ = ["ModalReceiver", "body_receiver"]
+
+_BLOCK = 1 << 21  # denominators at once
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ModalReceiver:
+    """Modes at the freedoms of a receiver.
+
+    Parameters
+    ----------
+    omega, damping (m,) [rad/s], [-]
+        Rigid modes have ``omega = 0``; viscous ratios.
+    shapes (m, n) [1/sqrt(kg), 1/(m sqrt(kg)) for rotations]
+    residual (n, n) [m/N]
+        ``R``, in the units of the freedoms.
+    """
+
+    points: tuple[InterfacePoint, ...]
+    freedoms: tuple[Freedom, ...]
+    omega: Vector
+    damping: Vector
+    shapes: Matrix
+    residual: Matrix
+    ears: tuple[str, ...] = ()
+
+    def at(self, s: Complexes) -> ReceiverResponse:
+        """Return the mobility; a model of modes alone has no ears."""
+        n = len(self.freedoms)
+        rows = max(_BLOCK // max(self.omega.size, 1), 1)
+        parts = [np.zeros((0, n, n), dtype=complex)]
+        for first in range(0, s.size, rows):
+            at = s[first : first + rows, None]
+            denominator = self.omega**2 + 2.0 * self.damping * self.omega * at + at**2
+            parts.append(modal_sum(self.shapes, denominator))
+        compliance = np.concatenate(parts) + self.residual
+        return ReceiverResponse(
+            mobility=s[:, None, None] * compliance,
+            transfers=np.zeros((s.size, 0, n), dtype=complex),
+        )
+
+
+def body_receiver(
+    body: ReducedBody, ports: Mapping[str, Freedom], points: tuple[InterfacePoint, ...]
+) -> ModalReceiver:
+    """Take a reduced body as a receiver, with the static compliance that its modes miss.
+
+    Parameters
+    ----------
+    body
+        Whatever klack reads: from Craig-Bampton matrices, modal data, state space.
+    ports
+        Name of a port -> the freedom that it is; a reversed direction turns its sign.
+    points
+        Where the freedoms are.
+    """
+    for freedom in ports.values():
+        refuse_if(
+            freedom.point not in {point.name for point in points},
+            f"receiver '{body.name}'",
+            got=f"a port at the point '{freedom.point}'",
+            expected=f"one of: {', '.join(point.name for point in points) or '(none)'}",
+            hint="give the points of all freedoms.",
+        )
+    columns = [body.port_index(name) for name in ports]
+    return ModalReceiver(
+        points=points,
+        freedoms=tuple(ports.values()),
+        omega=body.omega,
+        damping=body.damping,
+        shapes=body.port_shapes[:, columns],
+        residual=body.residual_compliance[np.ix_(columns, columns)],
+    )
