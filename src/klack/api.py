@@ -227,7 +227,7 @@ class Result:
         return dict(self.analysis.to_json(self.record))
 
     def save(self, folder: str | Path, *, report: bool = False) -> Path:
-        """Store the record in a folder, and its report if wanted; return the folder."""
+        """Store the record, and its report if wanted; return the folder."""
         place = Path(folder)
         self.analysis.save(self.record, place)
         if report:

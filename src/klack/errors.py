@@ -49,7 +49,7 @@ class InputError(KlackError, ValueError):
 
 
 def _shortened(text: str) -> str:
-    """Text without its middle where it is too long for a message: a line of a megabyte."""
+    """Text without its middle, if too long for a message."""
     if len(text) <= _LONGEST:
         return text
     head, tail = text[: _LONGEST - 200].rsplit(" ", 1)[0], text[-150:].split(" ", 1)[-1]

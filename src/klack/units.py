@@ -87,7 +87,7 @@ _PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M
 
 
 def _with_prefixes(unit: str) -> dict[str, float]:
-    """Size of a unit under every prefix that :func:`format_si` writes."""
+    """Size of a unit under each prefix of :func:`format_si`."""
     return {prefix + unit: float(f"1e{power}") for power, prefix in _PREFIXES.items()}
 
 
@@ -123,7 +123,7 @@ class Kind:
     largest: float = 1e12
 
     def holds(self, value: float) -> bool:
-        """Whether a value in :attr:`unit` is zero, or of a size that this kind can have."""
+        """Whether a value is zero, or of a size that this kind can have."""
         return value == 0 or self.smallest <= abs(value) <= self.largest
 
 
@@ -318,7 +318,7 @@ def parse_quantity(value: object, kind: Kind, where: str = "quantity") -> float:
 
 
 def _of_expression(value: Computed, kind: Kind, where: str) -> float:
-    """Value of an expression whose dimension fits the kind, rounded as a written one is."""
+    """Value of an expression of fitting dimension, rounded like a written one."""
     if not value.dimension.fits(kind.unit):
         raise InputError(
             where,
@@ -331,7 +331,7 @@ def _of_expression(value: Computed, kind: Kind, where: str) -> float:
 
 
 def _number(value: float) -> float:
-    """Number as float; a whole one of 400 digits is infinite."""
+    """Float of a number; infinite for 400 digits."""
     try:
         return float(value)
     except OverflowError:
@@ -339,7 +339,7 @@ def _number(value: float) -> float:
 
 
 def _in_range(result: float, value: object, kind: Kind, where: str) -> float:
-    """Return the value, or raise with the range of its kind."""
+    """Value, or an error with the range of its kind."""
     if kind.holds(result):
         return result
     unit = "" if kind.unit == "-" else f" {kind.unit}"
@@ -496,19 +496,17 @@ _SIZES = {
     )
     for unit in units.split()
 }
-"""Sizes in SI of the units that an error proposes, to the last digit those of pint, which takes
-0.7 s to load: most cases have no other units.
-"""
+"""Sizes in SI of proposed units, to the last digit those of pint, which takes 0.7 s to load."""
 
 
 @lru_cache(maxsize=1000)
 def _in_si(unit: str, si: str) -> float:
-    """Size of one unit in another one; kept, since a calibration reads it often."""
+    """Size of a unit in another; cached, since a calibration reads it often."""
     return float(_registry().Quantity(1.0, unit).to(si).magnitude)
 
 
 def _came(unit: str) -> str:
-    """Name the kind that ``unit`` belongs to, as `` (a pressure)``."""
+    """Kind of ``unit``, as `` (a pressure)``."""
     plain = unit.replace(" ", "")
     for kind in KINDS:
         if plain in kind.factors:
@@ -526,7 +524,7 @@ def _came(unit: str) -> str:
 
 @cache
 def _registry() -> Any:
-    """Unit registry of pint, built when the first unit is read (0.4 s with its import)."""
+    """Registry of pint, built for the first unit (0.4 s with its import)."""
     import pint
 
     return pint.UnitRegistry()
@@ -546,7 +544,7 @@ def takes_prefix(unit: str) -> bool:
 
 
 def is_level(unit: str) -> bool:
-    """Whether a unit is that of a level, which is relative already: ``"dB"``, ``"dBA"``."""
+    """Whether a unit is that of a level, relative already: ``"dB"``, ``"dBA"``."""
     return unit.startswith("dB")
 
 
@@ -595,7 +593,7 @@ def format_si(value: float, unit: str, digits: int = 4) -> str:
 
 
 def typed(kind: Kind) -> tuple[BeforeValidator, WithJsonSchema]:
-    """Pydantic metadata of a field that takes this kind and holds SI."""
+    """Pydantic metadata for a field of this kind, in SI."""
     schema = {
         "type": ["string", "number"],
         "description": f"{kind.name}, e.g. {kind.example}",
@@ -606,14 +604,14 @@ def typed(kind: Kind) -> tuple[BeforeValidator, WithJsonSchema]:
 
 
 def _read(value: object, info: ValidationInfo, *, kind: Kind) -> float:
-    """In a file every number needs its unit; numbers given in Python (no context) are SI."""
+    """In files every number needs a unit; numbers from Python (no context) are SI."""
     if info.context is None and isinstance(value, int | float) and not isinstance(value, bool):
         return _number(value)
     return parse_quantity(value, kind)
 
 
 def _temperature() -> tuple[BeforeValidator, WithJsonSchema]:
-    """Metadata of a temperature in K; a file may also write ``20 degC``."""
+    """Metadata of a temperature in K; files may write ``20 degC``."""
     metadata = {
         "type": ["string", "number"],
         "description": "a temperature, e.g. 20 degC",
@@ -632,7 +630,7 @@ def _read_temperature(value: object, info: ValidationInfo, *, kind: Kind) -> flo
 
 
 def _celsius(value: object, kind: Kind) -> float | None:
-    """Temperature [K] of a text in degrees Celsius; None for anything else."""
+    """Temperature [K] of degrees Celsius; None for other texts."""
     if isinstance(value, str):
         match = re.fullmatch(rf"({_NUMBER}) ?(?:degC|°C)", " ".join(value.split()))
         if match:
@@ -656,7 +654,7 @@ def parse_temperature(value: str, where: str = "temperature") -> float:
 
 
 def _length_unit(value: object) -> float:
-    """Metres in the unit that a file or an outline is drawn in: ``mm`` -> 0.001."""
+    """Metres in the unit of a file or outline: ``mm`` -> 0.001."""
     if not isinstance(value, str) or not re.fullmatch(_ATOM, value):
         hint = "write the unit alone: mm."
         raise InputError("unit", got=f"'{value}'", expected="a unit of length", hint=hint)

@@ -1,1 +1,1 @@
-"""The local browser application: cases, runs, results and sliders of one folder."""
+"""Local browser application: cases, runs, results and sliders of one folder."""

@@ -1,4 +1,4 @@
-"""What the processes that compute tell the pages; light, for the server imports it."""
+"""What computing processes tell the pages; light, since the server imports it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -229,7 +229,7 @@ class Opened:
 
 @dataclass(frozen=True, kw_only=True)
 class MeasureOffer:
-    """A measure that a study of a case can have; ``is_first`` if it is ticked at first."""
+    """Measure for a study of a case; ``is_first`` if it is ticked at first."""
 
     name: str
     unit: str
@@ -239,7 +239,7 @@ class MeasureOffer:
 
 @dataclass(frozen=True, kw_only=True)
 class StudyOffer:
-    """What a new study of a case can be made of; ``designs`` come with what they are for."""
+    """Contents for a new study of a case; ``designs`` with their purposes."""
 
     title: str
     kind: str

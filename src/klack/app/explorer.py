@@ -85,7 +85,7 @@ _DRAWN = 700  # points of a curve; a chart is up to 800 pixels wide
 
 
 def drawn(x: Floats, y: Floats) -> tuple[Floats, Floats]:
-    """Points of a smooth curve in equal steps, with its ends and its highest and lowest point."""
+    """Points of a smooth curve in equal steps, with its ends and extremes."""
     steps = np.linspace(0, x.size - 1, min(x.size, _DRAWN)).round().astype(int)
     shown = np.union1d(steps, [y.argmin(), y.argmax()])
     return x[shown], y[shown]
@@ -101,7 +101,7 @@ def _travelled(history: ImpactHistory) -> tuple[Floats, Floats]:
 
 
 def _enveloped(force: TimeSeries) -> tuple[Floats, Floats]:
-    """Lowest and highest value of each stretch: no impact falls between two points."""
+    """Lowest and highest value of each stretch, so that no impact is lost."""
     count = _DRAWN // 2
     size = max(1, -(-force.values.size // count))
     padded = np.pad(force.values, (0, -force.values.size % size), mode="edge").reshape(-1, size)
@@ -119,7 +119,7 @@ def impact_curves(level: LevelResult) -> Curves:
 def stroke_curves(
     variant: StrokeVariant, channels: StrokeChannels, stops: Iterable[SourceStop]
 ) -> Curves:
-    """Of one variant, and of the stops that its noise comes from."""
+    """Of one variant, and of the stops of its noise."""
     force = tuple(Curve.scaled(stop.name, *_enveloped(stop.force), 1e3, 1.0) for stop in stops)
     channel = variant.channel(channels.lift)
     if channel is None:
@@ -129,7 +129,7 @@ def stroke_curves(
 
 
 def force_levels(bands: Sequence[ThirdOctaves]) -> Floats:
-    """Levels [dB] of the forces of all stops together."""
+    """Levels [dB] of all stop forces together."""
     energy = np.sum([band.energy for band in bands], axis=0)
     return np.asarray(10.0 * np.log10(np.maximum(energy, 1e-30) / ENERGY_REFERENCE))
 
@@ -144,13 +144,13 @@ def level_numbers(pressure: TimeSeries | None) -> tuple[Number, ...]:
 
 
 def common_scale(now: TimeSeries, base: TimeSeries | None) -> float:
-    """Full scale [Pa] of two clicks: that of the base with room above, or of the louder one."""
+    """Full scale [Pa] of two clicks: the base with room above, or the louder one."""
     louder = full_scale_of(now, headroom=0.1)
     return louder if base is None else max(full_scale_of(base, headroom=_HEADROOM), louder)
 
 
 def impact_numbers(level: LevelResult) -> tuple[Number, ...]:
-    """Of an impact; what a run that is cut off in contact does not have has no value."""
+    """Of an impact; missing ones of a cut-off run have no value."""
     return tuple(
         Number(
             key=measure.key,
@@ -169,7 +169,7 @@ def impact_numbers(level: LevelResult) -> tuple[Number, ...]:
 
 
 def stroke_numbers(variant: StrokeVariant, channels: StrokeChannels) -> tuple[Number, ...]:
-    """Of a stroke: its times, and the first impact on each stop."""
+    """Times of a stroke, and the first impact on each stop."""
     times = (
         ("opening", "opening time", variant.opening_time),
         ("closing", "closing time", variant.closing_time),
@@ -217,7 +217,7 @@ _STEPS = 200
 
 
 def sliders_of(case: AnyCase, tree: CaseTree) -> tuple[Slider, ...]:
-    """Quantities that the case has written, those that move first."""
+    """Quantities in the case, the movable ones first."""
     kind: Any = kind_of(case)
     found = []
     for place in _leaves(tree.data):
@@ -239,7 +239,7 @@ def sliders_of(case: AnyCase, tree: CaseTree) -> tuple[Slider, ...]:
 
 
 def _offered(case: Case, tree: CaseTree) -> Iterator[Slider]:
-    """What an impact has though its file does not name it: a closing force, damping of bodies."""
+    """Missing keys of an impact that may move: closing force, damping of bodies."""
     if written_at(tree.data, ("motion", "force")) is None:
         yield _from_zero(("motion", "force"), "closing force", "N", 100.0)
     for body in case.bodies:
@@ -312,7 +312,7 @@ def _rank(slider: Slider) -> tuple[int, str]:
 
 
 def _in_turns(sliders: Iterable[Slider]) -> list[Slider]:
-    """Two of each kind of number, then the next two of each, in the order of :data:`_FIRST`."""
+    """Two of each kind of number, then the next two, in the order of :data:`_FIRST`."""
     counted: dict[int, int] = {}
     keyed = []
     for slider in sorted(sliders, key=_rank):
@@ -344,8 +344,6 @@ _REFERENCE = 20e-6  # [Pa]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Computed:
-    """One position; ``bands`` are of the forces of its stops."""
-
     source: NoiseSource
     bands: tuple[ThirdOctaves, ...]
     pressure: TimeSeries | None
@@ -356,7 +354,7 @@ class _Computed:
 
 
 class Explorer:
-    """The object behind a slider page, in a process of its own."""
+    """Object behind a slider page, in its own process."""
 
     def __init__(self) -> None:
         self._text = ""
@@ -370,7 +368,7 @@ class Explorer:
         self._pools = ThreadpoolController()
 
     def open(self, text: str, path: str) -> Opened:
-        """Build the bodies of a case and compute it as it stands."""
+        """Build the bodies of a case and compute it."""
         if self._design is not None:
             self._design.close()
             self._design = None
@@ -423,14 +421,14 @@ class Explorer:
         )
 
     def judge(self, values: Values) -> Judgement:
-        """Estimate of the error at a position of the sliders: once they rest."""
+        """Estimated error, once the sliders rest."""
         design = self._require_open()
         with self._one_thread(), collected_warnings():  # the move has told them
             grade, words = design.judged(self._case_at(values))
         return Judgement(grade=grade, words=words)
 
     def listen(self, values: Values) -> Hearing | None:
-        """Loudness, spectrogram and drive pattern of a position: once the sliders rest."""
+        """Loudness, spectrogram and drive pattern, once the sliders rest."""
         with self._one_thread():
             found = self._computed(values)
             pressure, drive = found.pressure, found.source.noise.drive
@@ -448,7 +446,7 @@ class Explorer:
         )
 
     def text_at(self, values: Values) -> str:
-        """Text of the case with these values, everything else as its author wrote it."""
+        """Text of the case with these values, otherwise as written."""
         assert self._tree is not None
         places = {
             self._sliders[key].place: self._sliders[key].text(value)
@@ -457,7 +455,7 @@ class Explorer:
         return with_values(self._tree, places) if places else self._text
 
     def _computed(self, values: Values) -> _Computed:
-        """A position; the last one is kept, since what follows asks for it again."""
+        """A position; the last one is kept for what follows."""
         if self._last is None or self._last[0] != values:
             with collected_warnings() as notes:  # of reading it, too
                 found = self._require_open().at(self._case_at(values))
@@ -487,7 +485,7 @@ class Explorer:
         return case_at(kind, self._tree, self._tree, changes)
 
     def _hardest(self, sliders: Sequence[Slider]) -> Case | None:
-        """Case with all sliders of the motion at their upper ends, unless it is refused."""
+        """Case with all motion sliders at their upper ends, if valid."""
         highest = {
             slider.key: slider.high
             for slider in sliders

@@ -25,7 +25,7 @@ from klack.terminal.tables import printable
 __all__ = ["OWN", "RESULT_NAME", "Found", "OpenFolder", "replace_file", "result_names"]
 
 OWN = ".klack-app"
-"""Folder of the application itself, in the opened one."""
+"""Folder of the application, inside the opened one."""
 
 RESULT_NAME = "result.zarr"
 """Of :mod:`klack.analyses.store`, whose import takes seconds."""
@@ -127,7 +127,7 @@ class OpenFolder:
         )
 
     def require_plain(self, relative: str) -> None:
-        """Refuse a folder with a pipe, a socket or a device in it: reading them may never end."""
+        """Refuse a folder with pipes, sockets or devices: reading them may never end."""
         for place, _, names in os.walk(self.absolute(relative)):
             for path in (Path(place, name) for name in names):
                 try:
@@ -164,7 +164,7 @@ class OpenFolder:
             raise _refused(relative, "bytes that are no text in UTF-8") from None
 
     def write(self, relative: str, text: str) -> None:
-        """Replace a text file, or make a new one; it is whole at every moment."""
+        """Replace or make a text file, whole at every moment."""
         data = text.encode()
         if len(data) > LARGEST_CASE:
             raise _too_large(relative, len(data), LARGEST_CASE)
@@ -175,7 +175,7 @@ class OpenFolder:
             replace_file(held, name, data)
 
     def make_file(self, relative: str, text: str) -> None:
-        """Make a new text file, and the folder for it; what is there stays."""
+        """Make a new text file, and its folder; nothing is replaced."""
         parent, _, _ = relative.rpartition("/")
         if parent and not self.exists(parent):
             with self._parent(parent) as (held, name):
@@ -185,7 +185,7 @@ class OpenFolder:
         self.write(relative, text)
 
     def make_folder(self, name: str, files: Mapping[str, bytes]) -> None:
-        """Make a new folder with files in it, all of them or nothing."""
+        """Make a new folder with files, all or nothing."""
         if self.exists(name):
             raise _refused(name, "a file or folder that is there already", _RENAME)
         new = f".klack-{secrets.token_hex(8)}"
@@ -217,14 +217,14 @@ class OpenFolder:
             yield held
 
     def require_own(self, relative: str) -> None:
-        """Refuse to have a result written where a link leads out of the folder."""
+        """Refuse a result behind a link."""
         path = PurePosixPath(relative)
         for place in (path, *path.parents[:-1]):
             if (self.path / place).is_symlink():
                 raise _refused(str(place), "a link", "remove it, or move what it names here.")
 
     def keep(self, name: str, data: bytes | None) -> None:
-        """Replace a file of the application's own; None removes it."""
+        """Replace a file of the application; None removes it."""
         with self.own() as held:
             if data is None:
                 held.remove(name)
@@ -232,7 +232,7 @@ class OpenFolder:
                 replace_file(held, name, data)
 
     def own_json(self, *names: str) -> dict[str, Any]:
-        """What a file of the application's own holds; nothing if there is none, or a bad one."""
+        """Content of a file of the application; nothing if it is missing or bad."""
         try:
             found = json.loads(self.read("/".join((OWN, *names))))
         except (InputError, ValueError, RecursionError):
@@ -240,7 +240,7 @@ class OpenFolder:
         return found if isinstance(found, dict) else {}
 
     def absolute(self, relative: str) -> Path:
-        """Path of an entry below the folder that is there and no link."""
+        """Path of an existing entry below the folder, no link."""
         with self._parent(relative) as (held, name):
             state = held.state(name)
             if state is None or stat.S_ISLNK(state.st_mode):
@@ -257,7 +257,7 @@ class OpenFolder:
 
     @contextmanager
     def _parent(self, relative: str) -> Iterator[tuple[HeldFolder, str]]:
-        """Folder of an entry, held from the top without a link, and the name of the entry."""
+        """Folder of an entry, held without links, and its name."""
         parts = relative.split("/")
         is_odd = "\0" in relative or "\\" in relative or not _is_text(relative)
         if not relative or is_odd or {"", ".", ".."} & set(parts):
@@ -273,7 +273,7 @@ class OpenFolder:
                 raise _failed(relative, error) from None
 
     def require_here(self) -> None:
-        """Refuse to continue in a folder that was renamed or removed meanwhile."""
+        """Refuse to continue in a renamed or removed folder."""
         if not self.path.is_dir():
             raise InputError(
                 f"folder {self.path}",
@@ -306,7 +306,7 @@ def result_names(cases: Iterable[str]) -> dict[str, str]:
 
 
 def replace_file(held: HeldFolder, name: str, data: bytes) -> None:
-    """Replace a file by one rename, once the new one is on the disk."""
+    """Replace a file by one rename, after the new one is on the disk."""
     new = f".klack-{secrets.token_hex(8)}"
     try:
         with os.fdopen(held.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL), "wb") as file:
@@ -324,7 +324,7 @@ def replace_file(held: HeldFolder, name: str, data: bytes) -> None:
 
 
 def _is_text(name: str) -> bool:
-    """Whether a name of the system is text: other bytes stand in it as lone surrogates."""
+    """Whether a name is text: other bytes are lone surrogates."""
     try:
         name.encode()
     except UnicodeEncodeError:
@@ -333,7 +333,7 @@ def _is_text(name: str) -> bool:
 
 
 def _shown(name: str) -> str:
-    """A name in signs that can be shown, whatever bytes it has."""
+    """A name in printable signs, whatever its bytes."""
     return printable(os.fsencode(name).decode("utf-8", "backslashreplace"))
 
 
@@ -352,7 +352,7 @@ _MARKS = b"\xef\xbb\xbf\xff\xfe"  # that editors put in front of a text
 
 
 def _is_case(path: str) -> bool:
-    """Whether a file begins like a case: with its version, in the first lines."""
+    """Whether a file begins with the version of a case."""
     try:
         with os.fdopen(os.open(path, os.O_RDONLY | SAFELY), "rb") as file:
             is_file = stat.S_ISREG(os.fstat(file.fileno()).st_mode)  # it was one, as it was listed
@@ -373,7 +373,7 @@ def _too_large(relative: str, size: int, largest: int) -> InputError:
 
 
 def _failed(relative: str, error: OSError) -> InputError:
-    """Of a disk that is full, or a folder without the right to write."""
+    """Error of a full disk, or of a folder without the right to write."""
     if error.errno not in _NO_WRITING:
         return _refused(relative, error.strerror or str(error))
     return InputError(

@@ -44,7 +44,7 @@ _PAUSE = 1.0  # [s] after a wrong password, for everybody
 
 @dataclass
 class PasswordGate:
-    """A password, kept as its scrypt hash, checked at most once a second after a wrong one."""
+    """Password as scrypt hash, checked at most once a second after a wrong one."""
 
     _salt: bytes
     _hash: bytes
@@ -57,7 +57,7 @@ class PasswordGate:
         return cls(salt, _hashed(password, salt))
 
     def opens(self, password: str) -> bool:
-        """Whether this is the password; always False in the second after a wrong one."""
+        """Whether this is the password; False in the second after a wrong one."""
         now = time.monotonic()
         if now < self._closed_until:
             return False
@@ -94,21 +94,21 @@ class Access:
 
     @property
     def cookie(self) -> str:
-        """Name of the cookie, with the port: all ports of a host share their cookies."""
+        """Name of the cookie with the port: ports of a host share cookies."""
         return f"klack_{self.port}"
 
     @property
     def url(self) -> str:
-        """Address to open: with the token, or where a password is asked for without one."""
+        """Address to open, with the token unless a password is used."""
         start = f"http://{_with_port(self.names[0], self.port)}/"
         return start if self.gate is not None else f"{start}?token={self.token}"
 
     def is_own_host(self, header: str) -> bool:
-        """Whether a ``Host`` header names this server, and not a name that was pointed at it."""
+        """Whether a ``Host`` header names this server, not a name pointed at it."""
         return header.lower() in {_with_port(name, self.port) for name in self.names}
 
     def is_own_origin(self, header: str) -> bool:
-        """Whether an ``Origin`` header is one of this server's own pages."""
+        """Whether an ``Origin`` header is one of our pages."""
         return header.lower() in {f"http://{_with_port(name, self.port)}" for name in self.names}
 
 
@@ -142,7 +142,7 @@ def access_for(host: str, port: int, password: str | None) -> Access:
 
 
 def _names_of(host: str) -> tuple[str, ...]:
-    """Names by which other machines may call a server that listens on ``host``."""
+    """Names by which other machines may call this server."""
     import socket
 
     if host not in ("0.0.0.0", "::"):
@@ -201,7 +201,7 @@ class _TooLarge(Exception):
 
 
 class Guard:
-    """ASGI application around another one; bodies of requests end at ``largest`` [byte]."""
+    """ASGI application around another; ``largest`` [byte] limits bodies."""
 
     def __init__(self, app: App, access: Access, *, largest: int = LARGEST_BODY) -> None:
         self.app, self._access, self._largest = app, access, largest
@@ -229,7 +229,7 @@ class Guard:
             await self._hand_on(scope, receive, send)
 
     def _refusal(self, scope: Scope) -> tuple[int, str] | None:
-        """Status and words for a request that is refused whatever else it shows."""
+        """Status and words of a refusal, whatever else is shown."""
         host = _headers(scope, b"host")
         if len(host) != 1 or not self._access.is_own_host(host[0]):
             return 421, "This server is not called by that name."
@@ -254,7 +254,7 @@ class Guard:
         return compare_digest(found.encode(), self._access.session.encode())
 
     def _exchange(self, scope: Scope) -> str | None:
-        """Path that a right token in the URL leads to; the token leaves the address."""
+        """Path for a right token in the URL, without the token."""
         if scope["method"] != "GET" or self._access.gate is not None:
             return None
         query = scope.get("query_string", b"").decode("latin-1")
@@ -265,7 +265,7 @@ class Guard:
         return _local(scope["path"]) + (f"?{urlencode(rest)}" if rest else "")
 
     async def _enter(self, send: Send, target: str) -> None:
-        """Set the cookie, on a page that leads to the target: a redirect would not send it."""
+        """Set the cookie on a page that leads on: a redirect would not send it."""
         cookie = f"{self._access.cookie}={self._access.session}; Path=/; HttpOnly; SameSite=Strict"
         page = _ENTERED.format(target=escape(target))
         await _answer(
@@ -341,7 +341,7 @@ h1,p{{margin:0}}input,button{{font:inherit;padding:.55rem .7rem}}</style>
 
 
 def _local(path: str) -> str:
-    """A path of this server: two slashes at the beginning would name another one."""
+    """A path of this server: two slashes at the start would name another."""
     return "/" + quote(path.lstrip("/\\"), safe="/-._~")
 
 
@@ -373,7 +373,7 @@ async def _body(receive: Receive, largest: int) -> bytes:
 
 
 def _with_headers(headers: Iterable[tuple[bytes, bytes]]) -> list[tuple[bytes, bytes]]:
-    """Headers of an answer with ours, unless it brings its own policy."""
+    """Headers with ours, unless the answer has its own policy."""
     own = list(headers)
     present = {key.lower() for key, _ in own}
     added = (*_HEADERS, (b"content-security-policy", POLICY.encode()))
@@ -385,7 +385,7 @@ async def _redirect(send: Send, target: str) -> None:
 
 
 async def _ask_password(send: Send, status: int, told: str) -> None:
-    """The form; with no referrer at all, browsers would send it without its origin."""
+    """The form; without any referrer, browsers would send no origin."""
     policy = (b"referrer-policy", b"same-origin")
     page = _LOGIN_PAGE.format(told=told)
     await _answer(send, status, page, b"text/html; charset=utf-8", policy)

@@ -119,12 +119,12 @@ class Jobs:
             return self._started(command, case, path, out, options, study)
 
     def start_case(self, command: str, case: str) -> Job:
-        """Run a saved case; its result has the name of the case, in ``klack-results``."""
+        """Run a saved case; its result has its name, in ``klack-results``."""
         names = result_names({*self._folder.look().cases, case})
         return self.start(command, case, f"klack-results/{names[case]}")
 
     def resume(self, job: Job) -> Job:
-        """Start a study again that was stopped: its points are kept."""
+        """Start a stopped study again, with its points."""
         return self.start(job.command, job.case, job.out, (), job.study)
 
     def _started(
@@ -165,7 +165,7 @@ class Jobs:
             held.remove(name)
 
     def _launch(self, name: str, held: HeldFolder, arguments: list[str]) -> None:
-        """Start the process of a run, and store which one it is."""
+        """Start the process of a run, and note which it is."""
         # by its handle where the system can: nothing is written behind a link in its place
         place, new = held.steady_path, os.O_WRONLY | os.O_CREAT | os.O_EXCL
         with (
@@ -197,23 +197,23 @@ class Jobs:
         return [job for job in found if job is not None]
 
     def live(self, name: str) -> Path:
-        """Folder of the record of a study that runs or was stopped."""
+        """Record folder of a running or stopped study."""
         return self._place / _require_name(name) / LIVE
 
     def of_result(self, out: str) -> Job | None:
-        """The latest run that writes, or wrote, a result of a study."""
+        """Latest run for a result of a study."""
         return next(
             (job for job in self.all() if job.out == out and job.command in OF_STUDIES), None
         )
 
     def cancel(self, name: str) -> None:
-        """Ask a run to stop; it leaves nothing half written."""
+        """Ask a run to stop; nothing is left half written."""
         process = self._process(_require_name(name))
         if process is not None:
             self._ask_to_stop(name, process)
 
     def forget(self, name: str) -> None:
-        """Remove what is known of a run that has ended; its result stays."""
+        """Remove an ended run, not its result."""
         job = self._job(_require_name(name))
         if job is not None and job.state != "running":
             self._remove(name)
@@ -248,7 +248,7 @@ class Jobs:
             return None
 
     def _process(self, name: str) -> psutil.Process | None:
-        """Its process, if that runs: the same number may be another one's by now."""
+        """Its process, if running; the number may be another's by now."""
         told = self._read(name, "process.json")
         try:
             process = psutil.Process(int(told["pid"]))

@@ -1,4 +1,4 @@
-"""A part of a new valve: from a STEP file or a drawing, as half section where it has one."""
+"""Part of a new valve, from STEP or a drawing, as half section if it has one."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -213,7 +213,7 @@ class Part:
         )
 
     def picture_mesh(self, model: str) -> Mesh:
-        """A coarse mesh, for a picture and for where the bodies touch."""
+        """Coarse mesh, for a picture and the place of touch."""
         if self.is_half(model):
             return self._half_mesh
         return self._solid_mesh
@@ -246,7 +246,7 @@ class Part:
 
 
 def part_of_step(name: str, path: Path) -> Part:
-    """Read a STEP file; InputError also for one without a solid, or with solids that overlap."""
+    """Read a STEP file with solids that do not overlap."""
     content = step_content(path)
     profiles, why = None, ""
     try:
@@ -259,7 +259,7 @@ def part_of_step(name: str, path: Path) -> Part:
 
 
 def part_of_table(name: str, text: str) -> Part:
-    """Read the rows of a drawing; InputError also for an outline that crosses itself or is open."""
+    """Read the rows of a drawing, whose outline is closed and does not cross itself."""
     outline = Outline.model_validate(outline_of_table(name, text))
     try:
         profile = outline.profile(1.0 / MM)
@@ -271,7 +271,7 @@ def part_of_table(name: str, text: str) -> Part:
 
 
 def _plainly_named(profiles: Mapping[str, Profile]) -> dict[str, Profile]:
-    """Profiles whose solids and edges have names that a case can hold."""
+    """Profiles with solid and edge names for a case."""
     names: dict[str, str] = {}
 
     def plain(name: str) -> str:

@@ -211,7 +211,7 @@ class _Meeting:
 
 
 def review(plan: ValvePlan, parts: Mapping[str, Part], place: Path) -> Review:
-    """Check a plan, and write its case for a file at ``place``, which need not be there."""
+    """Check a plan, and write its case for a file at ``place``, which need not exist."""
     findings = list(_sizes_of_parts(parts))
     missing = _missing(plan)
     if missing:
@@ -284,7 +284,7 @@ _Numbers = dict[str, float]
 
 
 def _numbers(plan: ValvePlan) -> _Numbers | tuple[Finding, ...]:
-    """Speed, force and gap in SI, or what is wrong with them."""
+    """Speed, force and gap in SI, or their errors."""
     found, wrong = {}, []
     kinds = {"speed": SPEED, "force": FORCE, "gap": LENGTH}
     for name, kind in kinds.items():
@@ -372,7 +372,7 @@ def _half_width(force: float, curvature: float, radius: float, modulus: float) -
 def _at_touch(
     profiles: list[Mapping[str, Profile] | None], faces: list[str], touch: Touch
 ) -> tuple[float, str]:
-    """Relative curvature [1/m] where two half sections touch, and a sharp edge that does."""
+    """Relative curvature [1/m] at the touch of two half sections, and a sharp edge there."""
     total, sharp = 0.0, ""
     for body, found, face, place in zip(
         BODIES, profiles, faces, (touch.upper, touch.lower), strict=True
@@ -392,7 +392,7 @@ def _at_touch(
 
 
 def _is_corner(profile: Profile, at: np.ndarray) -> bool:
-    """Whether the outline has a convex corner there, away from r = 0."""
+    """Whether the outline has a convex corner there, off the axis."""
     near = 1e-6 * max(curve.length for curve in profile.curves)
     for before, after in zip(profile.curves[-1:] + profile.curves, profile.curves, strict=False):
         if np.hypot(*(np.array(after.start) - at)) > near or at[0] <= near:
@@ -453,7 +453,7 @@ def _first_touch(meeting: _Meeting) -> Finding:
 
 
 def _overlap(plan: ValvePlan, parts: Mapping[str, Part], shift: float) -> str:
-    """What both bodies share with the needle shifted along z, in words; empty for nothing."""
+    """Overlap of both bodies with a shifted needle, in words; empty for none."""
     from netgen.occ import gp_Vec
 
     shape = parts["needle"].shape.Move(gp_Vec(0.0, 0.0, shift * MM))

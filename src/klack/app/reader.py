@@ -1,4 +1,4 @@
-"""What the pages read of cases and results, in a process of its own."""
+"""What pages read of cases and results, in its own process."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -43,7 +43,7 @@ _MOST_NUMBERS = 5
 
 
 class Reader:
-    """Checks texts, tells cases and results in short, compares two results, reads studies."""
+    """Checks texts, summarises cases and results, compares results, reads studies."""
 
     def __init__(self) -> None:
         self._points = StudyPoints()
@@ -91,11 +91,11 @@ class Reader:
         return points_json(self._points.record(folder))
 
     def point_case(self, folder: str, point: int, near: str, study: str) -> tuple[str, str]:
-        """Name and text of the case of a point, see :func:`case_of_point`."""
+        """Name and text of the case of a point."""
         return case_of_point(self._points.record(folder), point, Path(near), study)
 
     def study_of(self, folder: str) -> tuple[str, str]:
-        """Name and text of the case that a study was made of."""
+        """Name and text of the case of a study."""
         record = self._points.record(folder)
         return record.case, record.case_text
 
@@ -152,7 +152,7 @@ def _numbers(record: Any) -> tuple[Number, ...]:
 
 
 def _answer(record: ImpactStudy | StrokeStudy) -> tuple[Answer, TimeSeries | None]:
-    """Curves, numbers and click of the answer of a result."""
+    """Curves, numbers and click of a result."""
     doubts = list(_doubts(record))
     pressure, bands, levels = None, np.zeros(0), np.zeros(0)
     try:

@@ -1,4 +1,4 @@
-"""The server of ``klack app``: pages, sounds and reports of one folder, behind the guard."""
+"""Server of ``klack app``: pages, sounds and reports, behind the guard."""
 
 import asyncio
 import socket
@@ -149,7 +149,7 @@ def _add_page(state: State, path: str, page: Callable[[State, dict[str, str]], A
 
 
 def _add_refusal(state: State) -> None:
-    """Show addresses without a page in the way of the others."""
+    """Show missing addresses like the others."""
 
     @pages_app.exception_handler(404)
     async def refused(request: Request, _: Exception) -> Response:

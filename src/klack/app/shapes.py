@@ -1,4 +1,4 @@
-"""Bodies for the pages, in a process of its own: scenes of cases, results and STEP files."""
+"""Bodies for the pages, in their own process: scenes of cases, results, STEP files."""
 
 import gzip
 import json
@@ -22,17 +22,17 @@ from klack.viewer.view import View, payload_of
 __all__ = ["LARGEST_SCENE", "Shapes", "packed_scene"]
 
 LARGEST_SCENE = 48_000_000
-"""Characters of a payload; about a million triangles, which a browser draws slowly."""
+"""Characters of a payload: about a million triangles, slow in a browser."""
 
 
 _MOST_PARTS = 8  # in memory
 
 Sources = Mapping[str, tuple[str, str]]
-"""Of each body: ``"step"`` and a path, or ``"table"`` and the rows of a drawing."""
+"""By body: ``"step"`` and a path, or ``"table"`` and the rows of a drawing."""
 
 
 class Shapes:
-    """Scenes as gzipped JSON, which the browser unpacks; parts of a new valve, and their checks."""
+    """Scenes as gzipped JSON; parts of a new valve, and their checks."""
 
     def __init__(self) -> None:
         self._parts: dict[tuple[object, ...], Part] = {}
@@ -48,7 +48,7 @@ class Shapes:
         return self._part(name, source).facts
 
     def parts_scene(self, sources: Sources, model: str) -> bytes:
-        """Both parts of a new valve, as they are drawn, in coarse meshes."""
+        """Both parts of a new valve, as drawn, in coarse meshes."""
         none = np.empty(0, dtype=np.int64)
         parts = {name: self._part(name, source) for name, source in sources.items()}
         bodies = tuple(
@@ -72,7 +72,7 @@ class Shapes:
         return review(plan, parts, Path(place))
 
     def _part(self, name: str, source: tuple[str, str]) -> Part:
-        """A part, read once as long as its file stays."""
+        """A part, kept as long as its file stays."""
         kind, value = source
         key: tuple[object, ...] = (name, kind, value)
         if kind == "step":
@@ -87,16 +87,16 @@ class Shapes:
         return found
 
     def case_scene(self, text: str, path: str) -> bytes:
-        """Bodies of a case; a text that is not saved yet counts as well."""
+        """Bodies of a case, also of an unsaved text."""
         return packed_scene(view_of_case(tree_of(text, Path(path)).any_case()))
 
     def result_scene(self, folder: str) -> bytes:
-        """Bodies of a stored result, with mode shapes and motion where it has them."""
+        """Bodies of a result, with its mode shapes and motion."""
         return packed_scene(view_of_source(Path(folder)))
 
 
 def packed_scene(view: View) -> bytes:
-    """Payload of a view; InputError if it is larger than a browser should get."""
+    """Payload of a view; InputError if it is too large for a browser."""
     histories = tuple(
         replace(line, x_unit=typed(line.x_unit), y_unit=typed(line.y_unit))
         for line in view.histories

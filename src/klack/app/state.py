@@ -1,4 +1,4 @@
-"""What all pages share: the folder, its runs, the reading process, sounds that were made."""
+"""Shared by all pages: the folder, its runs, the reading process, sounds."""
 
 import json
 import os
@@ -31,7 +31,7 @@ _START = b"ISO-10303-21"
 
 
 class Uploads:
-    """Files under names that cannot be guessed; their own names are never used as names."""
+    """Files under random names; their own names are never used."""
 
     def __init__(self, folder: OpenFolder) -> None:
         self._folder = folder
@@ -66,7 +66,7 @@ async def _fill(held: HeldFolder, name: str, parts: AsyncIterator[bytes]) -> Non
 
 
 def _tidy(held: HeldFolder) -> None:
-    """Remove the oldest uploads beyond the most that are kept; files of other names stay."""
+    """Remove the oldest uploads above the limit, nothing else."""
     found = {name: held.state(name) for name in held.names() if _NAME.fullmatch(name)}
     ages = {name: of.st_mtime_ns for name, of in found.items() if of and stat.S_ISREG(of.st_mode)}
     for name in sorted(ages, key=ages.__getitem__)[:-_MOST]:
@@ -74,7 +74,7 @@ def _tidy(held: HeldFolder) -> None:
 
 
 def _words(head: bytes) -> str:
-    """Beginning of a file that was no STEP file, to be recognised by its sender."""
+    """Beginning of a file that is not STEP, for its sender."""
     text = head[:24].decode("utf-8", errors="replace").split("\n")[0]
     return repr(text) if text.isprintable() else "bytes that are no text"
 
@@ -123,7 +123,7 @@ class Sounds:
 
 
 class Notes:
-    """Notes on cases and results, and texts that are not saved yet; all in ``.klack-app``."""
+    """Notes on cases and results, and drafts; in ``.klack-app``."""
 
     def __init__(self, folder: OpenFolder) -> None:
         self._folder = folder
@@ -149,7 +149,7 @@ class Notes:
         return found if isinstance(found, str) else None
 
     def set_draft(self, of: str, text: str | None) -> None:
-        """Keep a text that is not saved yet; None once it is."""
+        """Keep an unsaved text; None once it is saved."""
         self._change(self._draft_name(of), of, text or "")
 
     def exchange_draft(self, of: str, known: str | None, text: str | None) -> bool:
@@ -195,7 +195,7 @@ class State:
         self.reader.start()
 
     def start_spare(self) -> None:
-        """Start the processes of the next pages ahead: their imports take seconds."""
+        """Start the next processes ahead: their imports take seconds."""
         self._spare.start()
         self.shapes.start()
 
@@ -220,7 +220,7 @@ class State:
         return found
 
     def mark_left(self, explorer: Worker, *, is_left: bool) -> None:
-        """Note that the browser has left the page of a process, or has come back to it."""
+        """Note that the browser has left the page, or is back."""
         if explorer in self._explorers:
             self._explorers[explorer] = is_left
 

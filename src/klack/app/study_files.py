@@ -1,4 +1,4 @@
-"""Which case a study belongs to, and where its results go; paths from the opened folder."""
+"""Case and result folder of a study; paths from the opened folder."""
 
 import asyncio
 import json
@@ -32,7 +32,7 @@ _LONGEST_NAME = 100  # bytes
 
 
 def case_of_study(folder: OpenFolder, study: str, named: str) -> str:
-    """Path of the case that a study names, relative to its own file."""
+    """Path of a study's case, relative to its file."""
     parts: list[str] = list(PurePosixPath(study).parent.parts)
     asked = PurePosixPath(named)
     for part in asked.parts:
@@ -117,7 +117,7 @@ def _parent(path: str) -> str:
 
 
 def free_name(folder: OpenFolder, parent: str, name: str, otherwise: str) -> str:
-    """Path of a new file: a name that is plain, and not there yet."""
+    """Plain, unused path for a new file."""
     stem, _, ending = (name if _PLAIN.fullmatch(name) else otherwise).rpartition(".")
     head = f"{parent}/" if parent else ""
     found = f"{head}{stem}.{ending}"
@@ -154,7 +154,7 @@ class PointsSource:
 
 
 def points_source(state: State, out: str) -> PointsSource:
-    """Record of a study that runs, of its result, or of one that was stopped."""
+    """Record of a running or stopped study, or of a result."""
     job = state.jobs.of_result(out)
     places = [out]
     if job is not None:
@@ -186,7 +186,7 @@ def points_source(state: State, out: str) -> PointsSource:
 
 
 def _mark(state: State, place: str) -> str:
-    """What tells this very record from later ones; empty without one."""
+    """Identity of a record; empty without one."""
     try:
         found = (state.folder.absolute(f"{place}/{RESULT_NAME}") / "zarr.json").stat()
     except (OSError, KlackError):
@@ -195,7 +195,7 @@ def _mark(state: State, place: str) -> str:
 
 
 async def points_answer(state: State, out: str, known: str) -> bytes:
-    """JSON: ``job``, ``mark`` and, unless its mark is known already, ``study``."""
+    """JSON: ``job``, ``mark`` and, for another mark, ``study``."""
     try:
         source = await asyncio.to_thread(points_source, state, out)
         told: dict[str, Any] = {

@@ -1,4 +1,4 @@
-"""The points of a study: one JSON text of bounded size, as a page draws them, and their clicks."""
+"""Points of a study as bounded JSON for a page, and their clicks."""
 
 import json
 import os
@@ -40,9 +40,9 @@ __all__ = ["MOST_DRAWN", "Front", "Listener", "StudyPoints", "front_of", "points
 
 
 MOST_DRAWN = 10_000
-"""Points that a page gets; of more, those of the front and an even choice of the others."""
+"""Points on a page; of more, the front and an even choice."""
 LARGEST_STORE = 400_000_000
-"""Bytes of the arrays, and of the files, of a study that is shown."""
+"""Bytes of arrays, and of files, of a study on a page."""
 _MOST_NUMBERS = 1_000_000
 """Of all columns together."""
 _LISTED, _LONGEST = 300, 1500  # failed points and kinds of doubts; characters of one
@@ -75,13 +75,13 @@ class Front:
 
 
 class StudyPoints:
-    """The record of a study that was looked at last; it is read again once it was replaced."""
+    """The latest record, read again when replaced."""
 
     def __init__(self) -> None:
         self._known: tuple[object, StudyRecord] | None = None
 
     def record(self, folder: str) -> StudyRecord:
-        """Record of a folder, unless it is damaged, no study, or larger than is shown."""
+        """Record of a folder, if it is a good study and not too large."""
         place = Path(folder)
         mark = (folder, _mark(place))
         if self._known is None or self._known[0] != mark or mark[1] is None:
@@ -118,7 +118,7 @@ def _require_small(place: Path) -> None:
 
 
 def _require_even(record: StudyRecord, place: Path) -> None:
-    """All columns have a value for every point: a store may come from anywhere."""
+    """Require a value per point in every column: a store may be foreign."""
     lengths = {item.values.shape for item in record.columns} | {(len(record.notes),)}
     found = record.optimum
     inside = found is None or (
@@ -136,7 +136,7 @@ def _require_even(record: StudyRecord, place: Path) -> None:
 
 
 def front_of(record: StudyRecord) -> Front:
-    """Front of a search, or of the points of a study that has objectives."""
+    """Front of a search, or of a study with objectives."""
     found = record.optimum
     if found is not None:
         return Front(
@@ -171,7 +171,7 @@ def front_of(record: StudyRecord) -> Front:
 
 
 def _goals(record: StudyRecord) -> Goals | None:
-    """Objectives and bounds of the text of the study, if all of them were computed."""
+    """Objectives and bounds of the study, if all were computed."""
     path = Path("study.yaml")
     text = record.study_text or record.case_text
     data, lines = parse(text, path)
@@ -278,7 +278,7 @@ def _number(value: float) -> float | None:
 def _doubts(
     notes: Sequence[str], drawn: NDArray[np.int64]
 ) -> tuple[list[str], list[tuple[int, int]]]:
-    """Different texts, and which of the drawn points (by their place) has which of them."""
+    """Different texts, and pairs: place of a drawn point, its text."""
     kinds: dict[str, int] = {}
     found = []
     for place, point in enumerate(drawn.tolist()):
@@ -291,7 +291,7 @@ def _doubts(
 
 
 def _failures(failures: Sequence[str], failed: NDArray[np.bool_]) -> dict[str, Any]:
-    """How often each reason came, and the reason of the first points."""
+    """Counts of reasons, and reasons of the first points."""
     places = np.flatnonzero(failed)
     reasons = Counter(failures[place].partition("\n")[0][:_LONGEST] for place in places.tolist())
     return {
@@ -357,7 +357,7 @@ class Listener:
 
 
 def _same_points(one: StudyRecord, other: StudyRecord) -> bool:
-    """Whether a number means the same point in both: in the record of a study that runs, too."""
+    """Whether a number means the same point in both, also in a running study."""
 
     def told(record: StudyRecord) -> tuple[str, ...]:
         return record.case_text, record.study_text, record.variant, record.design
@@ -372,7 +372,7 @@ def _asked(record: StudyRecord, near: str, point: int) -> AskedPoints:
 
 
 def _variant(record: StudyRecord) -> str | None:
-    """Variant of a stroke, or level of an impact; shots are judged by their level of its own."""
+    """Variant, or level of an impact; shots have their own."""
     if not record.model:
         return record.variant
     level = record.variant.partition(" + ")[0]

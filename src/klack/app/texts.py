@@ -1,4 +1,4 @@
-"""Study files as text: checked with their case, and made from choices on a page."""
+"""Study files as text: checked with their case, and made from choices."""
 
 import json
 import re
@@ -53,7 +53,7 @@ _OF_THE_SOLVER = (
     "setup_time",
     "real_time_factor",
 )
-"""Numbers of a run that say nothing about the valve."""
+"""Numbers of a run, not of the valve."""
 _PLAIN = re.compile(r"[A-Za-z0-9_.+-]+(?: [A-Za-z0-9_.+*/^%()°-]+)*")
 _TAKEN = ("true", "false", "null", "yes", "no", "on", "off", "nan", "inf")
 _WORDS = {"minimise", "maximise"}
@@ -66,7 +66,7 @@ _DESIGNS = {
 
 
 def is_study(data: Any) -> bool:
-    """Whether the plain data of a file are a study, and no case."""
+    """Whether plain data are a study, not a case."""
     return "study" in data and not {"bodies", "network"} & set(data)
 
 
@@ -117,7 +117,7 @@ def study_problem(text: str, path: str, case_text: str, case_path: str) -> Check
 
 
 def study_offer(text: str, path: str) -> StudyOffer:
-    """What can vary in a case, and what can be computed."""
+    """Parameters and measures for a study of a case."""
     tree = tree_of(text, Path(path))
     case = tree.any_case()
     kind = "stroke" if "network" in tree.data else "impact"
@@ -143,7 +143,7 @@ def study_offer(text: str, path: str) -> StudyOffer:
 
 
 def _rank(name: str, first: tuple[str, ...]) -> int:
-    """Place of a measure in the list; those of one rank stay as the reference has them."""
+    """Rank of a measure; equal ones keep their order."""
     if name in first:
         return 0
     return next((k for k, end in enumerate(_NEXT, 1) if name.endswith(end)), len(_NEXT) + 1)
@@ -212,7 +212,7 @@ def study_text(choice: StudyChoice, case_text: str, case_path: str) -> str:
 
 
 def _as_yaml(text: str) -> str:
-    """Text as YAML has it: plain where that is the same text, else in quotes."""
+    """YAML of a text: plain if that is the same, else in quotes."""
     plain = text.strip()
     if _PLAIN.fullmatch(plain) and not _is_number_like_word(plain):
         return plain
@@ -220,7 +220,7 @@ def _as_yaml(text: str) -> str:
 
 
 def _is_number_like_word(text: str) -> bool:
-    """Words that YAML takes for something else than text or a finite number."""
+    """Whether YAML takes a word for neither text nor a finite number."""
     if text.lower().lstrip("+-.") in _TAKEN:
         return True
     try:
@@ -230,7 +230,7 @@ def _is_number_like_word(text: str) -> bool:
 
 
 def _comment(text: str) -> str:
-    """Text as a comment has it: one line of printable characters."""
+    """Text as a comment: one printable line."""
     line = " ".join(text.split())
     return "".join(sign for sign in line if sign.isprintable())[:160]
 
@@ -245,7 +245,7 @@ _LONGEST_NUMBER = 40  # characters
 
 
 def checked_text(text: str, path: str, has_form: bool = True) -> Checked:
-    """Check the text of a case as every command does, and make its form where it is asked for."""
+    """Check a case like every command, and make its form if asked for."""
     try:
         tree = tree_of(text, Path(path))
         if is_study(tree.data):
@@ -263,7 +263,7 @@ def checked_text(text: str, path: str, has_form: bool = True) -> Checked:
 
 
 def _checked_study(text: str, path: str) -> Checked:
-    """Check the text of a study by itself; with its case that is more than a form can wait for."""
+    """Check a study by itself; its case would take too long."""
     file, _, tree = study_source(text, Path(path))
     return Checked(
         title=study_words(file.study),
@@ -285,7 +285,7 @@ def exchanged_text(text: str, path: str, place: Key, written: str) -> str:
 
 
 def form_of(case: Section, tree: CaseTree) -> Iterator[FormField]:
-    """Fields of what the file has, then single values that it could have in the same sections."""
+    """Fields in the file, then further single values for its sections."""
     written = dict(_leaves(tree.data))
     count = 0
     for place in (*written, *_further(case, tree.data)):
@@ -314,7 +314,7 @@ def form_of(case: Section, tree: CaseTree) -> Iterator[FormField]:
 
 
 def _leaves(data: Any, above: Key = ()) -> Iterator[tuple[Key, Any]]:
-    """Single values of the file; coordinates of profiles stay in the YAML."""
+    """Single values of the file, without coordinates of profiles."""
     if "edges" in above or "start" in above[-2:]:
         return
     if isinstance(data, dict):
@@ -328,7 +328,7 @@ def _leaves(data: Any, above: Key = ()) -> Iterator[tuple[Key, Any]]:
 
 
 def _further(case: Section, data: Any, above: Key = ()) -> Iterator[Key]:
-    """Keys with one quantity, one word or one number that the sections of the file could have."""
+    """Further keys for one quantity, word or number."""
     if isinstance(data, Mapping):
         try:
             node = node_at(case, above)[0] if above else case
@@ -391,7 +391,7 @@ def _takes_text(tree: CaseTree, place: Key) -> bool:
 
 
 def _scalar(text: str, *, is_text: bool) -> str:
-    """YAML of what was typed: a number and true or false stay what they are where they may."""
+    """YAML of typed text: numbers, true and false stay, if allowed."""
     import json
 
     plain = text.strip()

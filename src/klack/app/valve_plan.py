@@ -1,4 +1,4 @@
-"""What the guide for a new valve has been given so far; kept in the folder until it is a case."""
+"""State of the guide for a new valve, kept until it is a case."""
 
 import json
 import re
@@ -12,7 +12,7 @@ from klack.errors import InputError
 __all__ = ["BODIES", "EXAMPLES", "STEPS", "Plans", "ValvePlan"]
 
 BODIES = ("needle", "housing")
-"""The moving body, and the one that it hits."""
+"""Moving body, and the one that it hits."""
 
 STEPS = ("Parts", "Faces", "Materials", "Motion", "Check", "Case")
 
@@ -42,7 +42,7 @@ EXAMPLES = {
 0.24, -1.8, bore
 """,
 }
-"""Illustrative parts of the size of a small solenoid valve: those of the demo valve."""
+"""Parts of the demo valve, a small solenoid valve."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,7 +103,7 @@ class ValvePlan:
         return str(getattr(self, f"{body}_{what}"))
 
     def given(self, body: str) -> str:
-        """File or drawing of a body; empty where nothing is given."""
+        """File or drawing of a body; empty without one."""
         return self.of(body, "file" if self.source == "step" else "table")
 
     def with_body(self, body: str, what: str, value: str) -> "ValvePlan":
@@ -113,7 +113,7 @@ class ValvePlan:
 
     @property
     def roles(self) -> dict[str, str]:
-        """``"contact"``, ``"held"`` or ``"radiating"`` by the name of a face, ``needle.tip``."""
+        """``"contact"``, ``"held"`` or ``"radiating"`` by face, ``needle.tip``."""
         found = {f"housing.{face}": "radiating" for face in self.radiating}
         found |= {f"housing.{face}": "held" for face in self.held}
         found |= {
@@ -124,7 +124,7 @@ class ValvePlan:
         return found
 
     def with_role(self, body: str, face: str, role: str) -> "ValvePlan":
-        """The same with another role of one face, or none if empty; a body has one contact face."""
+        """The same with a face in another role, or none; a body has one contact face."""
         plan = self
         if plan.of(body, "contact") == face:
             plan = plan.with_body(body, "contact", "")
@@ -141,7 +141,7 @@ class ValvePlan:
         )
 
     def with_faces(self, known: Mapping[str, tuple[str, ...]]) -> "ValvePlan":
-        """The same without faces that the bodies do not have."""
+        """The same without unknown faces."""
         plan = self
         for body in BODIES:
             if plan.of(body, "contact") not in known.get(body, ()):
@@ -165,13 +165,13 @@ class ValvePlan:
 
 
 class Plans:
-    """The plan of a folder, in ``.klack-app``; whole at every moment."""
+    """Plan of a folder, in ``.klack-app``; whole at every moment."""
 
     def __init__(self, folder: OpenFolder) -> None:
         self._folder = folder
 
     def load(self) -> ValvePlan:
-        """The plan as it was left; a new one where there is none, or one that is damaged."""
+        """The last plan; a new one if it is missing or damaged."""
         return _plan_of(self._folder.own_json(_FILE))
 
     def keep(self, plan: ValvePlan) -> None:
@@ -192,7 +192,7 @@ class Plans:
 
 
 def _plan_of(found: Mapping[str, Any]) -> ValvePlan:
-    """A plan of what fits; a key of another kind keeps its default."""
+    """Plan of valid keys; others keep their default."""
     plan = ValvePlan()
     values: dict[str, Any] = {}
     for item in fields(plan):

@@ -45,14 +45,14 @@ class Worker:
         )
 
     async def call(self, method: str, *arguments: Any) -> Any:
-        """Result of a method of the object; KlackError also where the process died or was ended."""
+        """Result of a method; KlackError also if the process died or was ended."""
         if self._is_closed:
             raise _closed()
         loop = asyncio.get_running_loop()
         return await loop.run_in_executor(self._thread, self._exchange, method, arguments)
 
     def close(self) -> None:
-        """End the process, also in the middle of a request."""
+        """End the process, even within a request."""
         self._is_closed = True
         process, self._process = self._process, None
         if process is not None:
@@ -120,7 +120,7 @@ def serve(make: Callable[[], Any]) -> None:
 
 
 def _plain(error: KlackError) -> KlackError:
-    """An error that can be pickled: those of klack take several arguments."""
+    """Error that can be pickled: klack's take several arguments."""
     with contextlib.suppress(Exception):
         pickle.loads(pickle.dumps(error))
         return error

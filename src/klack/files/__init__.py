@@ -1,1 +1,1 @@
-"""Files and folders that are whole or not there, held and locked, and the caller's own."""
+"""Whole files and folders, held and locked, and the caller's own."""

@@ -19,7 +19,7 @@ from klack.files.swapped_names import swap_names
 __all__ = ["HeldFolder", "Mark", "synchronise"]
 
 Mark = tuple[int, int]
-"""Number of a file or folder, and when it changed [ns]: the number alone is given out again."""
+"""Number of a file or folder, and its change [ns]: numbers are reused."""
 
 _BY_HANDLE = os.open in os.supports_dir_fd  # not on Windows
 _FOLDER = os.O_RDONLY | getattr(os, "O_DIRECTORY", 0) | getattr(os, "O_CLOEXEC", 0)
@@ -47,7 +47,7 @@ class HeldFolder(Closing):
             self.handle = None
 
     def inner(self, name: str) -> "HeldFolder":
-        """A folder in it, held as well; not one behind a link."""
+        """A folder in it, held; not behind a link."""
         found = HeldFolder.__new__(HeldFolder)
         found.path = self.path / name
         found.handle = None
@@ -57,7 +57,7 @@ class HeldFolder(Closing):
 
     @property
     def steady_path(self) -> Path:
-        """Path for this process that stays valid if the folder is renamed."""
+        """Path that stays valid for this process if the folder is renamed."""
         if self.handle is not None:
             path = Path(f"/proc/self/fd/{self.handle}")
             with suppress(OSError):
@@ -70,7 +70,7 @@ class HeldFolder(Closing):
         return self.path.lstat() if self.handle is None else os.fstat(self.handle)
 
     def state(self, name: str) -> os.stat_result | None:
-        """State of an entry, of the link itself if it is one."""
+        """State of an entry, of the link itself for one."""
         try:
             return os.stat(self._at(name), dir_fd=self.handle, follow_symlinks=False)
         except FileNotFoundError:
@@ -86,7 +86,7 @@ class HeldFolder(Closing):
         return sorted(os.listdir(self.path if self.handle is None else self.handle))
 
     def has_folder(self, name: str) -> bool:
-        """Whether there is a folder of this name, not a link to one."""
+        """Whether a folder, no link, has this name."""
         state = self.state(name)
         return state is not None and stat.S_ISDIR(state.st_mode)
 
@@ -103,7 +103,7 @@ class HeldFolder(Closing):
         os.rename(self._at(name), self._at(new), src_dir_fd=self.handle, dst_dir_fd=self.handle)
 
     def link(self, name: str, to: "HeldFolder") -> None:
-        """Hard-link a file into another folder; of a link itself, not of its target."""
+        """Hard-link a file into another folder; a link itself, not its target."""
         os.link(
             self._at(name),
             to._at(name),
@@ -113,13 +113,13 @@ class HeldFolder(Closing):
         )
 
     def swap(self, name: str, other: "HeldFolder") -> bool:
-        """Exchange the entries of a name in two folders; False where the system cannot."""
+        """Exchange entries of one name; False where the system cannot."""
         if self.handle is None or other.handle is None:
             return False
         return swap_names(self.handle, name, other.handle, name)
 
     def remove(self, name: str) -> None:
-        """Remove a file, or a folder with all that is in it; links are not followed."""
+        """Remove a file, or a folder with its content; follow no links."""
         state = self.state(name)
         if state is None:
             return
@@ -133,11 +133,11 @@ class HeldFolder(Closing):
         os.rmdir(self._at(name), dir_fd=self.handle)
 
     def open(self, name: str, flags: int) -> int:
-        """Handle of a file in it, never behind a link; made readable by the caller alone."""
+        """Handle of a file, not behind a link; made readable for the caller alone."""
         return os.open(self._at(name), flags | SAFELY, 0o600, dir_fd=self.handle)
 
     def open_own_file(self, name: str, flags: int) -> int:
-        """Handle of a regular file of the caller in it; see :func:`open_own_file`."""
+        """Handle by :func:`open_own_file`."""
         return open_own_file(self._at(name), flags, folder=self.handle)
 
     def synchronise(self) -> None:
@@ -150,7 +150,7 @@ class HeldFolder(Closing):
 
 
 def synchronise(handle: int) -> None:
-    """Write an open file or folder to the disk, where the file system can."""
+    """Write an open file or folder to the disk, if possible."""
     try:
         os.fsync(handle)
     except OSError as error:

@@ -18,12 +18,12 @@ SAFELY = (
     | getattr(os, "O_CLOEXEC", 0)
     | getattr(os, "O_BINARY", 0)
 )
-"""Flags for opening without following links or waiting for pipes."""
+"""Flags against following links and waiting for pipes."""
 _PRIVATE = 0o600
 
 
 def caller() -> int | None:
-    """User whose rights this process has; None on systems without user numbers."""
+    """User of this process; None without user numbers."""
     return os.geteuid() if hasattr(os, "geteuid") else None
 
 

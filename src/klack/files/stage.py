@@ -78,7 +78,7 @@ class Stage(Closing):
 
     @property
     def content(self) -> Path:
-        """Folder of the new files; no other user can replace it."""
+        """Folder of the new files, safe from other users."""
         return self.held.steady_path / NEW
 
     # ------------------------------------------------------------------ making and removing
@@ -113,7 +113,7 @@ class Stage(Closing):
         return True
 
     def remove(self) -> None:
-        """Remove all of it; what cannot be removed stays."""
+        """Remove all of it that can be removed."""
         for _ in range(_TRIES):
             with suppress(OSError):
                 # the seal last: what is left after a crash is known again
@@ -150,7 +150,7 @@ class Stage(Closing):
         )
 
     def _barely_begun(self, names: list[str]) -> bool:
-        """Whether its process was killed before the seal was complete: it counts as empty."""
+        """Whether it was killed before its seal was complete: it counts as empty."""
         found = {name: self.held.state(name) for name in names}
         return found.keys() <= {_SEAL, _MANIFEST} and all(
             state is not None and stat.S_ISREG(state.st_mode) and state.st_size <= 200
@@ -192,7 +192,7 @@ class Stage(Closing):
         self.folder.synchronise()
 
     def finish(self) -> None:
-        """Complete what a killed process had made ready, unless a file has been replaced since."""
+        """Complete a killed process's ready files, unless one was replaced since."""
         moves = self._read_moves()
         if moves is not None and self.held.has_folder(_READY) and self.held.has_folder(_OLD):
             self._move(moves)
@@ -218,7 +218,7 @@ class Stage(Closing):
                 raise
 
     def _as_expected(self, moves: _Moves, old: HeldFolder) -> bool:
-        """Whether everything is as it was when the new files were made ready."""
+        """Whether all is as when the new files became ready."""
         there = self.folder.mark
         if any(there(name) != mark for name, mark in moves.beside.items()):
             return False
@@ -247,7 +247,7 @@ class Stage(Closing):
                 ready.move(name, self.folder)
 
     def _second_name(self, name: str, old: HeldFolder) -> None:
-        """Keep a file under ``old`` as well: its name is never without a file."""
+        """Keep a file under ``old`` too: its name always has a file."""
         old.remove(name)
         try:
             self.folder.link(name, old)
@@ -288,7 +288,7 @@ class Stage(Closing):
 
 
 def dead_stage(folder: HeldFolder, name: str) -> Stage | str | None:
-    """Stage of a dead process of the caller; why it is none; None while its process lives."""
+    """Stage of a dead process; why it is none; None while the process lives."""
     state = folder.state(name)
     if state is None:
         return None
@@ -312,12 +312,12 @@ def dead_stage(folder: HeldFolder, name: str) -> Stage | str | None:
 
 
 def is_stage_content(folder: Path) -> bool:
-    """Whether files written to this folder are already in a stage."""
+    """Whether files in this folder are already in a stage."""
     return folder.name == NEW and (folder.parent / _SEAL).is_file()
 
 
 def name_outdated(content: Path, names: Iterable[str]) -> None:
-    """Note files to delete when the content of a stage is moved."""
+    """Names to delete when a stage moves."""
     handle = os.open(content.parent / _GONE, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
     with os.fdopen(handle, "w", encoding="utf-8") as file:
         json.dump(list(names), file)

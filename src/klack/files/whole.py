@@ -100,7 +100,7 @@ def whole_files(
 
 
 def outdated(stage: Path, names: Iterable[str]) -> None:
-    """Delete files of these names from the folder when the stage is moved."""
+    """Delete these names when the stage moves."""
     gone = tuple(names)
     for name in gone:
         (stage / name).unlink(missing_ok=True)
@@ -108,7 +108,7 @@ def outdated(stage: Path, names: Iterable[str]) -> None:
 
 
 def completed(folder: Path) -> Path:
-    """The folder, once files that a killed klack of this user had ready are in their place."""
+    """The folder, with ready files of a killed klack in place."""
     try:
         with HeldFolder(folder) as held, uninterrupted():
             _complete(held)
@@ -127,7 +127,7 @@ def mark_of(path: Path) -> Mark | None:
 
 
 def in_exchange(folder: Path) -> bool:
-    """Whether a process writes to a folder now, or was killed while doing so."""
+    """Whether a process writes to a folder, or was killed doing so."""
     try:
         return any(True for _ in folder.glob(f"{PREFIX}*"))
     except OSError:
@@ -135,7 +135,7 @@ def in_exchange(folder: Path) -> bool:
 
 
 def _complete(folder: HeldFolder) -> None:
-    """Complete what killed processes of this user left; name what looks like it."""
+    """Complete what killed processes left; name what looks like it."""
     if not _stage_names(folder):
         return
     with locked(folder):
@@ -160,7 +160,7 @@ def _stage_names(folder: HeldFolder) -> list[str]:
 
 
 def _brought_to_end(folder: HeldFolder, name: str) -> str | None:
-    """Finish and remove a stage whose process is dead; else return why it is left alone."""
+    """Finish and remove a dead stage, or say why it is left alone."""
     try:
         found = dead_stage(folder, name)
         if not isinstance(found, Stage):

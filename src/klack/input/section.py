@@ -148,7 +148,7 @@ class Section(BaseModel):
         return given[0]
 
     def _refuse_with(self, names: tuple[str, ...], chosen: str, why: str) -> Self:
-        """Raise if one of the keys ``names`` is given although ``chosen`` has no use for it."""
+        """Raise if one of ``names`` is given, for which ``chosen`` has no use."""
         for name in names:
             if getattr(self, name) is not None:
                 raise CaseProblem(
@@ -177,7 +177,7 @@ def _no_mapping(value: Any, known: Mapping[str, FieldInfo]) -> tuple[str, str]:
 
 
 class NamedSection(Section):
-    """A section with a key ``name``, for which that name alone is short: ``fluid: n-heptane``."""
+    """Section with a ``name``, which alone is short for it: ``fluid: n-heptane``."""
 
     @model_validator(mode="before")
     @classmethod
@@ -188,7 +188,7 @@ class NamedSection(Section):
     def __get_pydantic_json_schema__(
         cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler, /
     ) -> JsonSchemaValue:
-        """Schema of the mapping or a text; the name can stand for the required keys."""
+        """Schema of the mapping or a text; the name replaces required keys."""
         schema = handler.resolve_ref_schema(handler(core_schema))
         required = schema.get("required", ["name"])
         if "name" not in required:
@@ -203,7 +203,7 @@ _LFS_POINTER = b"version https://git-lfs.github.com/spec/"
 
 
 def refuse_lfs_pointer(path: Path) -> None:
-    """Raise for the short text that git leaves in place of a large file."""
+    """Raise for git's placeholder of a large file."""
     try:
         with path.open("rb") as stream:
             start = stream.read(len(_LFS_POINTER))
@@ -235,7 +235,7 @@ def instead_of_file(path: Path) -> str:
 
 
 def _existing_file(value: Any, info: ValidationInfo) -> Path:
-    """Resolve a path relative to the folder of the case; it must be a file."""
+    """Resolve a path from the folder of the case; it must be a file."""
     if isinstance(value, Path):
         value = str(value)
     if not isinstance(value, str) or not value.strip():

@@ -95,4 +95,4 @@ UnitSystemName = Annotated[
     BeforeValidator(_read),
     WithJsonSchema({"type": "string", "enum": list(UNIT_SYSTEMS)}),
 ]
-"""Field of a case with the name of a unit system."""
+"""Field with the name of a unit system."""

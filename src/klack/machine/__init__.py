@@ -1,1 +1,1 @@
-"""What long work asks of the machine: cores, memory, stored results, compiled code, progress."""
+"""Needs of long work: cores, memory, stored results, compiled code, progress."""

@@ -20,7 +20,7 @@ _OWN_CGROUPS = Path("/proc/self/cgroup")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AvailableMemory:
-    """Available memory [byte], and the origin of the limit."""
+    """Available memory [byte], and what limits it."""
 
     size: float
     bound: str
@@ -41,7 +41,7 @@ def available_memory() -> AvailableMemory:
 
 
 def fits(needed: float) -> bool:
-    """Whether so much memory [byte] can be taken on top of what is taken now."""
+    """Whether so much more memory [byte] can be taken."""
     return needed < _WORTH_A_LOOK or needed <= _SHARE * available_memory().size
 
 

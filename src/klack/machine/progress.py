@@ -6,11 +6,11 @@ from dataclasses import dataclass
 __all__ = ["PointCount", "Progress", "counted", "remark", "silent"]
 
 Progress = Callable[[str, float], None]
-"""Called with the name of a stage and the completed fraction, 0 to 1."""
+"""Called with stage and fraction, 0 to 1."""
 
 
 def remark(progress: Progress, line: str) -> None:
-    """Show a line of text where progress is shown, if the reporter has a method ``remark``."""
+    """Show a line with the progress, if the reporter has ``remark``."""
     show = getattr(progress, "remark", None)
     if show is not None:
         show(line)
@@ -35,7 +35,7 @@ class PointCount:
 
 
 def counted(progress: Progress, count: PointCount) -> None:
-    """Show how many points are done, if the reporter has a method ``counted``."""
+    """Show done points, if the reporter has ``counted``."""
     show = getattr(progress, "counted", None)
     if show is not None:
         show(count)

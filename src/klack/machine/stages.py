@@ -30,18 +30,18 @@ FAILURES = (KlackError, np.linalg.LinAlgError, MemoryError)
 """Errors of a calculation that are not internal errors."""
 
 WITH_CACHED = ", with cached results"
-"""Suffix of the name of a stage that used results of earlier runs."""
+"""Suffix of a stage that used earlier results."""
 
 
 def stages_with_cached(stage_times: Mapping[str, float]) -> tuple[str, ...]:
-    """Stages of a run that took results of earlier runs from the cache."""
+    """Stages that used the cache."""
     return tuple(
         name.removesuffix(WITH_CACHED) for name in stage_times if name.endswith(WITH_CACHED)
     )
 
 
 class StageClock:
-    """Passes progress on; measures how long each stage takes and what it took from the cache."""
+    """Passes progress on; measures times and cached results of stages."""
 
     def __init__(self, progress: Progress, cache: ResultCache | None = None) -> None:
         self._progress, self._cache = progress, cache
@@ -83,7 +83,7 @@ class StageClock:
         return sum(self._times.get(stage, 0.0) for stage in stages)
 
     def times(self) -> dict[str, float]:
-        """Seconds per stage; the name shows the use of cached results."""
+        """Seconds per stage; names show cached results."""
         self._book()
         return {
             f"{stage}{WITH_CACHED if stage in self._helped else ''}": time
@@ -93,7 +93,7 @@ class StageClock:
 
 @contextmanager
 def collected_warnings() -> Iterator[list[str]]:
-    """Collect accuracy warnings as notes of the study, each once; show all others as usual."""
+    """Collect accuracy warnings as notes, each once; show others as usual."""
     notes: list[str] = []
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -109,7 +109,7 @@ def collected_warnings() -> Iterator[list[str]]:
 
 @contextmanager
 def trial() -> Iterator[list[warnings.WarningMessage]]:
-    """Keep the warnings of a trial to itself; :func:`show` shows those of the one that counts."""
+    """Keep the warnings of a trial; :func:`show` shows those that count."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         yield caught
@@ -142,7 +142,7 @@ def for_comparison(what: str, compute: Callable[[], Found]) -> Found | None:
 
 @contextmanager
 def warnings_of(run: str) -> Iterator[None]:
-    """Begin every accuracy warning with the run that it belongs to."""
+    """Begin accuracy warnings with their run."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         yield

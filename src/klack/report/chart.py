@@ -92,7 +92,7 @@ class RingFrames:
 
 
 def squeezed(chart: RingFrames, values: Floats) -> Floats:
-    """Place of values on the scale of colours: ``asinh(v / linear)``."""
+    """Place on the colour scale: ``asinh(v / linear)``."""
     return np.asarray(np.arcsinh(values / chart.linear))
 
 
@@ -138,12 +138,12 @@ DASHES: dict[Style, tuple[float, ...]] = {
 AREA_OPACITY = 0.3
 
 LABEL_STEP = 0.13
-"""Labels of vertical marks are this share of the panel below each other."""
+"""Share of the panel between labels of vertical marks."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AxisSpec:
-    """One axis: label, unit as printed, logarithmic or not, range in printed units."""
+    """An axis; ``range`` in printed units."""
 
     label: str
     unit: str = ""
@@ -228,7 +228,7 @@ class Mark:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Panel:
-    """One plot area; ``share`` is its height relative to the other panels of the chart."""
+    """One plot area; ``share`` is its relative height."""
 
     y: AxisSpec
     curves: tuple[Curve, ...]
@@ -258,7 +258,7 @@ class Chart:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BarPart:
-    r"""One share of every bar, in the unit of the axis; ``hatch`` is one of ``/ \ x . - | +``."""
+    r"""One share of every bar; ``hatch`` is one of ``/ \ x . - | +``."""
 
     label: str
     values: tuple[float, ...]
@@ -268,7 +268,7 @@ class BarPart:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BarChart:
-    """Horizontal stacked bars, one per row, from top to bottom."""
+    """Horizontal stacked bars, from top to bottom."""
 
     name: str
     title: str
@@ -280,7 +280,7 @@ class BarChart:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ParallelAxis:
-    """One upright axis: a value for every line, of words which of them; nan leaves the line out."""
+    """Upright axis: a value per line, of words which; nan leaves a line out."""
 
     spec: AxisSpec
     values: NDArray[np.float64]
@@ -288,7 +288,7 @@ class ParallelAxis:
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Lowest and highest value; apart also where all are the same."""
+        """Lowest and highest value, apart also where equal."""
         known = self.values[np.isfinite(self.values)]
         if not known.size:
             return 0.0, 1.0
@@ -314,12 +314,12 @@ class ParallelChart:
 
     @property
     def lines(self) -> NDArray[np.float64]:
-        """Values (lines, axes) of the lines that have one on every axis."""
+        """Values (lines, axes) of complete lines."""
         return self._table[self.places]
 
     @property
     def places(self) -> NDArray[np.int64]:
-        """Number of each of these lines among all points."""
+        """Places of these lines among all points."""
         return np.flatnonzero(np.isfinite(self._table).all(axis=1))
 
     @property
@@ -333,7 +333,7 @@ AnyChart = Chart | BarChart | ParallelChart | RingFrames
 def dots(
     x: ArrayLike, y: ArrayLike, label: str, colour: Colour, width: float, names: Iterable[str]
 ) -> Curve:
-    """Points, also a single one, each with its name under the pointer."""
+    """Points, each with its name under the pointer."""
     return Curve(
         x=np.atleast_1d(np.asarray(x, dtype=float)),
         y=np.atleast_1d(np.asarray(y, dtype=float)),

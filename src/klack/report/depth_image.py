@@ -23,22 +23,22 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _GRAZING = 1e-9
-"""Share of a triangle's area below which its projection is a line."""
+"""Share of a triangle's area whose projection is a line."""
 
 _ON_CUT = 1e-6
-"""Surfaces so near the cut [size of the window] belong to what is cut away."""
+"""Distance from the cut [window size] that belongs to what is cut away."""
 
 
 @dataclass(frozen=True, slots=True)
 class Camera:
-    """Direction [rad] of the viewer of a parallel projection, from the bodies; z is upwards."""
+    """Viewing direction [rad] of a parallel projection, from the bodies; z is up."""
 
     azimuth: float
     elevation: float
 
     @property
     def axes(self) -> Floats:
-        """Unit vectors to the right, upwards, and away from the viewer, as rows."""
+        """Unit vectors right, up, and away from the viewer, as rows."""
         c, s = np.cos(self.azimuth), np.sin(self.azimuth)
         right = np.array([-s, c, 0.0])
         away = -np.array([np.cos(self.elevation) * c, np.cos(self.elevation) * s, 0.0])
@@ -48,7 +48,7 @@ class Camera:
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """Part of the picture plane, from its lower left corner; ``pixel`` is the side of one [m]."""
+    """Part of the picture plane, from lower left; ``pixel`` is its side [m]."""
 
     left: float
     bottom: float
@@ -100,7 +100,7 @@ def seen_of(
     window: Window,
     quarter: Quarter | None = None,
 ) -> Seen:
-    """Look at bodies, each given as points (v, 3) [m] and triangles (t, 3)."""
+    """Look at bodies of points (v, 3) [m] and triangles (t, 3)."""
     shape = (window.rows, window.columns)
     count = window.rows * window.columns
     exits, plane = _exits(camera, window, quarter)
@@ -164,7 +164,7 @@ def outlines(surface: Ints, depth: Floats, slope: Floats) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Fragments:
-    """Pixels that triangles cover, and at which depth; ``facing`` is 1, or -1 for away."""
+    """Pixels of triangles, with depth; ``facing`` is 1, or -1 for away."""
 
     pixel: Ints
     triangle: Ints
@@ -181,7 +181,7 @@ def _project(points: Floats, camera: Camera, window: Window) -> Floats:
 
 
 def _exits(camera: Camera, window: Window, quarter: Quarter | None) -> tuple[Floats, Ints]:
-    """Depth at which each line of sight leaves the quarter, and through which plane."""
+    """Depth where each line of sight leaves the quarter, and the plane."""
     count = window.rows * window.columns
     if quarter is None:
         return np.full(count, -np.inf), np.full(count, -1)
@@ -233,7 +233,7 @@ def _fragments(own: Floats, triangles: Ints, window: Window) -> _Fragments:
 
 
 def _expanded(keys: Ints, first: Ints, end: Ints) -> tuple[Ints, Ints]:
-    """Each key once for all whole numbers from ``first`` to before ``end``, and these."""
+    """Each key once for all whole numbers in its half-open range, and these."""
     lengths = end - first
     before = np.cumsum(lengths) - lengths
     steps = np.arange(int(lengths.sum())) - np.repeat(before - first, lengths)
@@ -241,7 +241,7 @@ def _expanded(keys: Ints, first: Ints, end: Ints) -> tuple[Ints, Ints]:
 
 
 def _spans(flat: Floats, number: Ints, row: Ints) -> tuple[Ints, Ints]:
-    """Columns from first to before last whose centres lie in each triangle, row by row."""
+    """Half-open column ranges with centres in each triangle, row by row."""
     height = row + 0.5
     left, right = np.full(len(row), np.inf), np.full(len(row), -np.inf)
     for k in range(3):

@@ -26,7 +26,7 @@ __all__ = ["render_html", "write_report"]
 
 
 def write_report(content: Content, path: Path) -> None:
-    """Write the report as one HTML file that opens in any browser, also offline."""
+    """Write the report as one HTML file for any browser, offline."""
     with whole_file(path) as new:
         new.write_bytes(render_html(content).encode())
 
@@ -49,7 +49,7 @@ def render_html(content: Content) -> str:
 
 @cache
 def _plotly() -> dict[str, str]:
-    """Version and packed text of the library, the same every time."""
+    """Version and packed library, always the same."""
     version = get_plotlyjs_version()
     packed = remembered(
         result_cache(),

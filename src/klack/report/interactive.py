@@ -1,4 +1,4 @@
-"""Charts for the browser: the plain data that plotly.js draws."""
+"""Charts for the browser, as data for plotly.js."""
 
 from html import escape
 from math import log10
@@ -154,7 +154,7 @@ _PANEL_GAP = 0.06
 
 
 def figure_of(chart: AnyChart) -> dict[str, Any]:
-    """What the page draws: arguments of ``Plotly.newPlot``, or parallel ``axes``."""
+    """Arguments of ``Plotly.newPlot``, or parallel ``axes``."""
     if isinstance(chart, ParallelChart):
         return parallel_axes(chart)
     if isinstance(chart, RingFrames):
@@ -263,7 +263,7 @@ def _has_names(chart: Chart) -> bool:
 
 
 def _numbers(values: ArrayLike) -> list[float | None]:
-    """Six digits are more than a picture can show; gaps become null."""
+    """Six digits, enough for a picture; gaps become null."""
     array = np.asarray(values)
     finite = np.isfinite(array).tolist()
     return [

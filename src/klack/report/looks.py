@@ -1,4 +1,4 @@
-"""How curves and parts of bars look: different by style or hatch as well as by colour."""
+"""Looks of curves and bars: style or hatch beside colour."""
 
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -31,7 +31,7 @@ class Look(NamedTuple):
     def curve(
         self, x: NDArray[np.float64], y: NDArray[np.float64], label: str = "", **more: Any
     ) -> Curve:
-        """A curve that looks so; ``more`` are other fields of the curve."""
+        """Curve of this look; ``more`` are its other fields."""
         return Curve(
             x=x, y=y, label=label, colour=self.colour, style=self.style, width=self.width, **more
         )
@@ -46,7 +46,7 @@ LOOKS: tuple[Look, ...] = (
     Look("pink", "sparse", 2.1),
     Look("sky", "dashed", 1.6),
 )
-"""Of curves without a look of their own, in their order."""
+"""Of curves without looks of their own."""
 
 OTHER = Look("grey", "dashed", 1.9)
 """Of anything with an unknown name."""

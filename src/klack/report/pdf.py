@@ -91,7 +91,7 @@ def _section(section: Section, name: str, work: Path) -> dict[str, Any]:
 
 
 def _drawn(chart: AnyChart) -> bytes:
-    """SVG of a chart; one that was drawn before comes from the cache in a hundredth of the time."""
+    """SVG of a chart, from the cache a hundred times faster."""
 
     def draw() -> bytes:
         from klack.report.printed import svg_chart  # with matplotlib, which takes long to import
@@ -110,7 +110,7 @@ def _drawn(chart: AnyChart) -> bytes:
 
 @cache
 def _drawing() -> str:
-    """Key of what draws a chart: klack's own sources for it, and the release of matplotlib."""
+    """Key for drawing: klack's sources for it, and matplotlib's release."""
     digest = hashlib.sha256(distribution("matplotlib").version.encode())
     for path in sorted(Path(__file__).parent.glob("*.py")):
         digest.update(path.read_bytes())

@@ -70,7 +70,7 @@ def printed_ring(chart: RingFrames, width: float) -> Figure:
 
 
 def _shown(chart: RingFrames) -> list[int]:
-    """Moments at even distances; the nearest ones make way for the highest value and for grey."""
+    """Moments at even distances; the nearest yield to the highest value and to grey."""
     count = len(chart.time)
     found = {round(k) for k in np.linspace(0, count - 1, min(_SHOWN, count))}
     wanted = [int(np.argmax(chart.values.max(axis=1)))]
@@ -110,10 +110,10 @@ def _draw(axes: Any, chart: RingFrames, k: int, norm: Normalize) -> PatchCollect
 
 
 _WIDTH = 6.7
-"""Width of the text of an A4 page [in]."""
+"""Text width of an A4 page [in]."""
 
 _NEAR_END = 0.88
-"""Share of the axis beyond which the label of a line stands to its left."""
+"""Share of the axis beyond which labels stand left of their lines."""
 
 STYLE: dict[str, Any] = {
     "font.family": "DejaVu Sans",
@@ -151,13 +151,13 @@ def svg(figure: Figure, *, dpi: float = 200.0) -> bytes:
 
 
 def svg_chart(chart: AnyChart, *, width: float = _WIDTH) -> bytes:
-    """Draw a chart with its legend above it; ``width`` in inches, letters keep their size."""
+    """Draw a chart, legend above; ``width`` in inches, letters keep their size."""
     with rc_context(STYLE):
         return svg(_drawn(chart, width))
 
 
 def png_chart(chart: AnyChart) -> bytes:
-    """Draw a chart as pixels, for notebooks: curves of many points stay small."""
+    """Draw a chart as pixels, for notebooks: many points stay small."""
     with rc_context(STYLE):
         figure = _drawn(chart, _WIDTH)
         FigureCanvasAgg(figure)
@@ -167,7 +167,7 @@ def png_chart(chart: AnyChart) -> bytes:
 
 
 def write_charts(charts: Iterable[AnyChart], folder: Path) -> tuple[str, ...]:
-    """Write each chart as SVG and as pixels into a folder; return the names of the files."""
+    """Write charts as SVG and pixels; return the file names."""
     names = []
     for chart in charts:
         for end, draw in (("svg", svg_chart), ("png", png_chart)):
@@ -290,7 +290,7 @@ def _draw_panel(axes: Any, panel: Panel, x: AxisSpec) -> None:
 
 
 def _share_of_axis(x: AxisSpec, value: float) -> float:
-    """Place of a value on an axis, 0 to 1; 0 where the axis has no range."""
+    """Place on an axis, 0 to 1; 0 without a range."""
     if x.range is None:
         return 0.0
     low, high = x.range

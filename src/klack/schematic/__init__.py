@@ -1,1 +1,1 @@
-"""Schematics of valve networks: symbols, their placement, wires, and the picture as SVG."""
+"""Schematics of valve networks: symbols, placement, wires, SVG."""

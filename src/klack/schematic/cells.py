@@ -46,7 +46,7 @@ class PlannedPort:
 
 @dataclass(frozen=True, slots=True)
 class Pin:
-    """Place at the edge of a cell where a wire begins; ``y`` from its top."""
+    """Begin of a wire at a cell's edge; ``y`` from the top."""
 
     port: str
     node: int
@@ -77,7 +77,7 @@ def passage(node: int) -> Cell:
 
 
 def cell_of(name: str, part: Component, ports: Sequence[PlannedPort]) -> Cell:
-    """Draw one component; its ports come in the order from top to bottom on each side."""
+    """Draw one component; ports in order from top to bottom on each side."""
     if any(kind.role is Role.MOTION for kind in part.port_kinds().values()):
         return _body(name, part, ports)
     strokes = two_ended_strokes(part)
@@ -108,7 +108,7 @@ def _port_text(port: PlannedPort) -> str:
 
 
 def _lead_width(ports: Sequence[PlannedPort]) -> float:
-    """Length that the lines of one side need for the names above them."""
+    """Length of the lines of one side for their names."""
     if not ports:
         return 0.0
     marks = _MARK if any(port.mark for port in ports) else 0.0
@@ -118,7 +118,7 @@ def _lead_width(ports: Sequence[PlannedPort]) -> float:
 def _lead(
     component: str, port: PlannedPort, side: Side, edge: float, inner: float, y: float
 ) -> "_Drawn":
-    """Line, name, pin and mark of a port, from the ``edge`` to the symbol at ``inner``."""
+    """Line, name, pin and mark of a port, from ``edge`` to ``inner``."""
     way = 1.0 if side == "left" else -1.0
     start = edge + way * _MARK if port.mark else edge
     text, joint = _port_text(port), f"{component}.{port.name}"
@@ -194,7 +194,7 @@ def _up(height: float) -> float:
 
 
 def _body(name: str, part: Component, ports: Sequence[PlannedPort]) -> Cell:
-    """Box of a body with its points in rows; a point may be joined on both sides."""
+    """Box of a body with points in rows; a point may be joined on both sides."""
     texts = _texts(name, part)
     wide, high = _text_size(texts)
     names = [f"{cut(port.name, 24)} (open)" if port.mark else cut(port.name, 24) for port in ports]
@@ -280,7 +280,7 @@ def _level(
     strokes: tuple[Stroke, ...],
     turned: bool,
 ) -> Cell:
-    """Symbol that lies between its ports, the texts below it."""
+    """Symbol between its ports, texts below."""
     before, after = _lead_width([left]), _lead_width([right])
     wide, high = _text_size(texts)
     width = max(before + LENGTH + after, wide + 2 * _GAP)
@@ -350,7 +350,7 @@ def _framed(name: str, part: Component, ports: Sequence[PlannedPort]) -> Cell:
 
 
 def _within(labels: tuple[Label, ...], width: float) -> tuple[tuple[Label, ...], float, float]:
-    """Move labels to the right and widen the cell until all are inside."""
+    """Move labels right and widen the cell until all fit."""
     left = min(label.box.x for label in labels)
     shift = max(0.0, _GAP - left)
     moved = tuple(label.moved(shift, 0.0) for label in labels)

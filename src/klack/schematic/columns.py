@@ -51,7 +51,7 @@ class Plan:
 
 
 def plan_of(network: Network) -> Plan:
-    """Column of every component, and sides on which every port is joined."""
+    """Columns of components, and sides of joined ports."""
     nodes = {node.index: node for node in network.nodes if not node.word}
     words = {str(joint): node.word for node in network.nodes for joint in node.joints if node.word}
     at = {str(joint): index for index, node in nodes.items() for joint in node.joints}
@@ -87,7 +87,7 @@ def plan_of(network: Network) -> Plan:
 
 
 def _sides(column: int, ends: Iterable[int]) -> tuple[Side, ...]:
-    """Sides on which a ruler meets the others; left as well for those of its own column."""
+    """Sides of a ruler towards the others; left for its own column."""
     ends = tuple(ends)
     found: list[Side] = []
     if any(end < column for end in ends) or not ends:
@@ -100,7 +100,7 @@ def _sides(column: int, ends: Iterable[int]) -> tuple[Side, ...]:
 
 
 def _ruler(node: Node) -> Joint | None:
-    """The port that the node is about: of a body, volume, source or driver."""
+    """Main port of a node: body, volume, source or driver."""
     for role in _RULERS:
         if found := node.having(role):
             return found[0]
@@ -137,7 +137,7 @@ def _spread(
     columns: dict[str, int],
     homes: dict[int, int],
 ) -> None:
-    """Step from the bodies through the hydraulics; adds their columns and those of their nodes."""
+    """Add columns of the hydraulics and their nodes, stepping out from the bodies."""
     wet = {index: node for index, node in nodes.items() if node.domain in FLUID_DOMAINS}
     meets: dict[str, list[int]] = {}
     for index, node in wet.items():

@@ -158,7 +158,7 @@ FRAMELESS: Mapping[str, tuple[float, float]] = {
     "junction": (24.0, 24.0),
     "pressure-source": (24.0, 24.0),
 }
-"""Sizes of the symbols that are drawn without a frame."""
+"""Sizes of frameless symbols."""
 
 MARKS: Mapping[str, tuple[Stroke, ...]] = {
     "ground": (
@@ -169,8 +169,9 @@ MARKS: Mapping[str, tuple[Stroke, ...]] = {
     "open": (Stroke(_circle(-4, 0, 4), "unknown"),),
     "unknown": (Stroke("M-12,-6 h12 v12 h-12 Z", "unknown"),),
 }
-"""Ends of ports that lead to the ground, to the surroundings, or nowhere, pointing left; and a type
-without a symbol, for the legend."""
+"""Ends of ports at the ground, the surroundings, or nothing, pointing left; and a type without a
+symbol, for the legend.
+"""
 
 
 def two_ended_strokes(part: Component) -> tuple[Stroke, ...] | None:
@@ -208,7 +209,7 @@ def framed_strokes(part: Component) -> tuple[Stroke, ...] | None:
 
 
 def _face(closing: bool, outer: float) -> tuple[Stroke, ...]:
-    """Plate under pressure; ``outer`` is the share of it at the edges."""
+    """Plate under pressure; ``outer`` is its share at the edges."""
     way = 1 if closing else -1
     arrows = "".join(
         f"M{x},{way * (4 - 18 * share):g} V{way * 4} m-3,{-4 * way} l3,{4 * way} l3,{-4 * way} "
@@ -219,7 +220,7 @@ def _face(closing: bool, outer: float) -> tuple[Stroke, ...]:
 
 
 def _magnet(part: Component) -> tuple[Stroke, ...]:
-    """Coil above its armature, or below where the armature closes the gap downward."""
+    """Coil above its armature, or below if the gap closes downward."""
     way = -1 if getattr(part, "closes", "upward") == "downward" else 1
     inside = f"M-17,{way * -1} L17,{way * -16}"
     if part.type == "force-map-solenoid":

@@ -53,7 +53,7 @@ class Schematic:
 
 
 def schematic_of(network: Network) -> Schematic:
-    """Lay out a network; the same network gives the same picture."""
+    """Lay out a network, always alike."""
     plan = plan_of(network)
     columns = columns_of_cells(network, plan)
     runs = [runs_between(a.pins("right"), b.pins("left")) for a, b in pairwise(columns)]
@@ -92,7 +92,7 @@ def schematic_of(network: Network) -> Schematic:
 
 
 def _shift(cell: Cell, column: Column, i: int, columns: list[Column]) -> float:
-    """Place of a cell in its column: on the side of the bodies, or in the middle between."""
+    """Place of a cell: towards the bodies, or in the middle between."""
     spare = column.width - cell.width
     sides = {pin.side for pin in cell.pins}
     if sides == {"left"}:
@@ -101,7 +101,7 @@ def _shift(cell: Cell, column: Column, i: int, columns: list[Column]) -> float:
 
 
 def _to_edges(cell: Cell, shift: float, width: float) -> list[tuple[int, tuple[Point, Point]]]:
-    """Lines from the ports of a cell to the edges of its column; through it for a passage."""
+    """Lines from ports to the column's edges; through it for a passage."""
     if not cell.name and not cell.symbols:
         pin = cell.pins[0]
         return [(pin.node, ((0.0, pin.y), (width, pin.y)))]
@@ -255,7 +255,7 @@ def svg_of(drawn: Schematic, name: str = "") -> str:
 
 
 def _ordered_lines(drawn: Schematic) -> Iterable[str]:
-    """Wires with their leads; the thick ones first, so that they hide no other."""
+    """Wires with leads, thick ones first, which hide no others."""
     for domain in ("mechanical", "hydraulic", "pneumatic", "electric", "thermal"):
         for wire in drawn.wires:
             if wire.domain == domain:
@@ -306,7 +306,7 @@ def _label(label: Label) -> str:
 
 
 def _safe(text: str) -> str:
-    """Text for XML: escaped, without the letters that it cannot have."""
+    """XML text: escaped, without forbidden letters."""
     return escape(_FORBIDDEN.sub("\N{REPLACEMENT CHARACTER}", text), {'"': "&quot;"})
 
 

@@ -41,7 +41,7 @@ class Column:
         return Column(list(self.cells), list(self.tops), self.fixed)
 
     def pins(self, side: Side) -> list[tuple[int, float]]:
-        """Node and height of the wires on one side."""
+        """Nodes and heights of wires on one side."""
         return [
             (pin.node, top + pin.y)
             for cell, top in zip(self.cells, self.tops, strict=True)
@@ -51,7 +51,7 @@ class Column:
 
 
 def columns_of_cells(network: Network, plan: Plan) -> list[Column]:
-    """Draw every component as a cell and place all cells."""
+    """Draw and place all components."""
     numbers = sorted({*plan.columns.values(), *plan.homes.values()})
     ports = {name: _by_role(network, name, plan.ports[name]) for name in plan.ports}
     found: list[list[Column]] = []
@@ -91,7 +91,7 @@ def _column(
 
 
 def _by_role(network: Network, name: str, ports: Sequence[PlannedPort]) -> tuple[PlannedPort, ...]:
-    """Ports from top to bottom: what is at the ground or in the upper part first."""
+    """Ports from top to bottom: grounded ones and upper parts first."""
     part = network.components[name]
     if _is_magnet(part):
         down = getattr(part, "closes", "upward") == "downward"
@@ -104,7 +104,7 @@ def _by_role(network: Network, name: str, ports: Sequence[PlannedPort]) -> tuple
 
 
 def _is_stop(part: Component) -> bool:
-    """Whether it keeps an upper and a lower part apart."""
+    """Whether it keeps two parts apart."""
     kinds = part.port_kinds()
     return all(name in kinds and kinds[name].domain == "mechanical" for name in ("upper", "lower"))
 
@@ -118,7 +118,7 @@ def _ports_by_height(
     ports: Mapping[str, Sequence[PlannedPort]],
     columns: Sequence[Column],
 ) -> dict[str, tuple[PlannedPort, ...]]:
-    """Ports in the order of the heights of what they lead to."""
+    """Ports by the heights that they lead to."""
     heights: dict[tuple[str, int], list[float]] = {}
     for column in columns:
         for cell, top in zip(column.cells, column.tops, strict=True):
@@ -148,7 +148,7 @@ def _ports_by_height(
 
 
 def _stop_ranks(network: Network) -> dict[tuple[str, str], int]:
-    """-1 for points of a body that hit something above them, 1 for below."""
+    """-1 for points that hit something above, 1 for below."""
     ranks: dict[tuple[str, str], int] = {}
     for node in network.nodes:
         for joint in node.joints:
@@ -160,7 +160,7 @@ def _stop_ranks(network: Network) -> dict[tuple[str, str], int]:
 
 
 def _from_above(network: Network, names: Sequence[str]) -> list[str]:
-    """Bodies from top to bottom as their end stops say, or in the order of the case."""
+    """Bodies from top to bottom by their end stops, else as in the case."""
     upper: dict[str, str] = {}
     lower: dict[str, str] = {}
     for node in network.nodes:
@@ -194,7 +194,7 @@ def _next(found: Sequence[str], free: Sequence[str], above: Mapping[str, set[str
 
 
 def _sort(columns: Sequence[Column], middle: int) -> list[Column]:
-    """Sort and place all columns back and forth; return the best that occurs."""
+    """Sort and place columns back and forth; return the best."""
     columns = [column.copy() for column in columns]
     outward = [*range(middle - 1, -1, -1), *range(middle + 1, len(columns))]
     found: list[list[Column]] = []
@@ -211,7 +211,7 @@ def _sort(columns: Sequence[Column], middle: int) -> list[Column]:
 def _ended(
     columns: Sequence[Column], middle: int, outward: Sequence[int], *, sort: bool
 ) -> list[Column]:
-    """Columns placed for the last time from the middle outward, with all wires apart."""
+    """Last placement from the middle outward, with wires apart."""
     ended = [column.copy() for column in columns]
     for i in outward:
         _settle(ended, i, [i + 1 if i < middle else i - 1], sort=sort)
@@ -220,7 +220,7 @@ def _ended(
 
 
 def _cost(columns: Sequence[Column]) -> float:
-    """Length of the upright wires [px], and :data:`_CROSSING` for each crossing."""
+    """Length of upright wires [px], plus :data:`_CROSSING` for each crossing."""
     cost = 0.0
     for left, right in pairwise(columns):
         runs = runs_between(left.pins("right"), right.pins("left"))
@@ -231,7 +231,7 @@ def _cost(columns: Sequence[Column]) -> float:
 def _ends(
     columns: Sequence[Column], i: int, near: Iterable[int]
 ) -> dict[Side, dict[int, list[float]]]:
-    """Heights of the wires that come from neighbouring columns, by side and node."""
+    """Heights of wires from neighbouring columns, by side and node."""
     found: dict[Side, dict[int, list[float]]] = {"left": {}, "right": {}}
     for k in near:
         here: Side = "left" if k < i else "right"
@@ -242,7 +242,7 @@ def _ends(
 
 
 def _settle(columns: list[Column], i: int, near: Iterable[int], *, sort: bool = True) -> None:
-    """Place the cells of a column so that their wires are as short and straight as possible."""
+    """Place cells for short and straight wires."""
     column = columns[i]
     ends, others = _ends(columns, i, near), _ends(columns, i, _beside(columns, i))
     wishes = []
@@ -257,7 +257,7 @@ def _settle(columns: list[Column], i: int, near: Iterable[int], *, sort: bool = 
 
 
 def _wishes(cell: Cell, ends: Mapping[Side, Mapping[int, Sequence[float]]]) -> list[float]:
-    """Heights at which one wire of a cell would be straight."""
+    """Heights that make one wire straight."""
     return [y - pin.y for pin in cell.pins for y in ends[pin.side].get(pin.node, ())]
 
 
@@ -294,7 +294,7 @@ def _top(block: tuple[list[float], float]) -> float:
 
 
 def _clear(columns: list[Column], i: int, middle: int) -> None:
-    """Move cells down until no wire meets one of another node head on."""
+    """Move cells down until no different nodes meet head on."""
     column = columns[i]
     inner: Side = "right" if i < middle else "left"
     ends = _ends(columns, i, [i + 1 if i < middle else i - 1])[inner]

@@ -13,7 +13,7 @@ from klack.schematic.shapes import Point
 __all__ = ["Lines", "Run", "channel_width", "crossings", "routed", "runs_between", "tracks_of"]
 
 Lines = tuple[tuple[tuple[Point, Point], ...], tuple[Point, ...]]
-"""Lines of a node, and the points where they branch."""
+"""Lines of a node, and its branches."""
 
 _TRACK, _MARGIN, _NEAR = 10.0, 12.0, 5.0
 
@@ -50,7 +50,7 @@ class Run:
 def runs_between(
     before: Sequence[tuple[int, float]], after: Sequence[tuple[int, float]]
 ) -> tuple[Run, ...]:
-    """Runs of the nodes that begin at the right of one column and end at the left of the next."""
+    """Runs between the right of one column and the left of the next."""
     left: dict[int, list[float]] = {}
     right: dict[int, list[float]] = {}
     for ends, pins in ((left, before), (right, after)):
@@ -63,7 +63,7 @@ def runs_between(
 
 
 def crossings(runs: Sequence[Run]) -> int:
-    """Crossings between wires of different nodes, with the tracks in their order."""
+    """Crossings of different nodes, with tracks in order."""
     straight = [run.low for run in runs if run.is_straight]
     order = _trunks(runs)
     over = sum(run.low < y < run.high for run in order for y in straight)
@@ -77,12 +77,12 @@ def _trunks(runs: Sequence[Run]) -> list[Run]:
 
 
 def channel_width(tracks: int) -> float:
-    """Room between two columns for a number of tracks."""
+    """Room between columns for some tracks."""
     return 2 * _MARGIN + _TRACK * max(tracks - 1, 0)
 
 
 def tracks_of(runs: Sequence[Run]) -> Mapping[int, int]:
-    """Track of every node that needs one, from the left."""
+    """Tracks by node, from the left."""
     order = _trunks(runs)
     tracks: dict[int, int] = {}
     for k, run in enumerate(order):
@@ -96,7 +96,7 @@ def tracks_of(runs: Sequence[Run]) -> Mapping[int, int]:
 
 
 def _ordered(runs: Sequence[Run]) -> list[Run]:
-    """Order from left to right with few crossings: neighbours change places while that helps."""
+    """Order with few crossings: neighbours change places while that helps."""
     order = list(runs)
     for _ in range(len(order)):
         changed = False
@@ -111,13 +111,13 @@ def _ordered(runs: Sequence[Run]) -> list[Run]:
 
 
 def _crossings(first: Run, second: Run) -> int:
-    """Crossings of two nodes if the trunk of the first lies to the left."""
+    """Crossings if the first trunk is on the left."""
     over = sum(second.low < y < second.high for y in first.right)
     return over + sum(first.low < y < first.high for y in second.left)
 
 
 def routed(runs: Sequence[Run], left: float, width: float) -> dict[int, Lines]:
-    """Lines and branches of every node in a channel that begins at ``left``."""
+    """Lines and branches by node in a channel from ``left``."""
     tracks = tracks_of(runs)
     used = _TRACK * max(tracks.values(), default=0)
     first = left + 0.5 * (width - used)

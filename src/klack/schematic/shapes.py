@@ -1,4 +1,4 @@
-"""What a schematic consists of, in px: boxes, labels, symbols made of strokes, wires."""
+"""Parts of a schematic in px: boxes, labels, symbols of strokes, wires."""
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -75,7 +75,7 @@ class Box:
     height: float
 
     def meets(self, other: "Box", gap: float = 0.0) -> bool:
-        """Whether both have a common area, or are closer than ``gap``."""
+        """Whether both overlap, or are closer than ``gap``."""
         return (
             self.x < other.x + other.width + gap
             and other.x < self.x + self.width + gap

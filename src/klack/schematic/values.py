@@ -1,4 +1,4 @@
-"""Main parameters of a component as short lines of text, in the units that people write."""
+"""Main parameters of a component as short lines, in usual units."""
 
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
@@ -37,7 +37,7 @@ _MAIN: Mapping[str, tuple[str, ...]] = {
     "rigid-mass": ("mass", "speed"),
     "fmu": ("file", "force", "coupling_step"),
 }
-"""Keys shown of a type, where the first ones that are given are not the main ones."""
+"""Shown keys of a type, where the first given are not the main ones."""
 
 _AT_START: Mapping[tuple[str, str], str] = {
     ("chamber", "pressure"): "p(0)",
@@ -58,10 +58,10 @@ _AT_START: Mapping[tuple[str, str], str] = {
     ("magnetic-network", "start_current"): "i(0)",
     ("force-map-solenoid", "start_current"): "i(0)",
 }
-"""Symbols of the keys that give the state at the start, by type and key."""
+"""Symbols of initial states, by type and key."""
 
 _ALWAYS = frozenset(("start_current",))
-"""Keys of the state that are shown with their default as well."""
+"""State keys that are shown even with defaults."""
 
 
 def value_lines(part: Component, name: str = "") -> tuple[str, ...]:
@@ -97,7 +97,6 @@ def _lines(part: Component, key: str, info: FieldInfo, name: str) -> Iterator[st
 
 
 def _course(course: Section) -> Iterator[str]:
-    """Step or table of a pressure or flow over time."""
     known = type(course).model_fields
     if {"to", "at"} <= known.keys():
         to, at = (written(getattr(course, key), kind_of_field(known[key])) for key in ("to", "at"))
@@ -111,7 +110,7 @@ def _course(course: Section) -> Iterator[str]:
 
 
 def _text(value: Any, kind: Kind | None) -> str:
-    """Value in words; ranges of rows of numbers; empty for what needs more than one line."""
+    """Value in words; ranges of rows; empty if one line is too short."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, int | float):
@@ -174,4 +173,4 @@ _WRITTEN: Mapping[str, Callable[[float], str]] = {
     "m^3": _volume,
     "m^3/s": lambda value: f"{6e4 * value:.4g} l/min",
 }
-"""How values are written whose units have no usual prefixes."""
+"""Writing of values whose units have no usual prefixes."""

@@ -1,4 +1,4 @@
-"""Points asked and values told, batch by batch: what a search and a refinement have in common."""
+"""Search and refinement in batches: points asked, values told."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
@@ -199,7 +199,7 @@ class Batches(ABC):
 
 
 def highest(edge: float) -> float:
-    """Largest coordinate: below 1, where a quantile of a distribution may be infinite."""
+    """Largest coordinate, below 1: a quantile there may be infinite."""
     return float(min(1.0 - edge, np.nextafter(1.0, 0.0)))
 
 

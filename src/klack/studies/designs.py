@@ -140,7 +140,7 @@ def _require(count: int, what: str) -> None:
 
 
 def require_size(count: int, parameters: int) -> None:
-    """Raise :class:`InputError` unless so many points of so many parameters make a design."""
+    """Raise :class:`InputError` for sizes that are no design."""
     _require(parameters, "parameters")
     _require(count, "points")
     refuse_if(
@@ -173,7 +173,7 @@ CUT = 5.0
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """Constant density between two values; of the logarithm with ``is_log``."""
+    """Constant density between two values, or between their logarithms."""
 
     low: float
     high: float
@@ -188,7 +188,7 @@ class Range:
         return min(max(value, self.low), self.high)
 
     def share(self, value: float) -> float:
-        """Probability below a value; 0 and 1 outside of the range."""
+        """Probability below a value."""
         if self.is_log:
             if value <= 0.0:
                 return 0.0
@@ -204,7 +204,7 @@ class Range:
 
 @dataclass(frozen=True, slots=True)
 class Normal:
-    """Gauss's distribution, cut off five standard deviations from its mean (6e-7 of it)."""
+    """Gauss's distribution, cut off at five standard deviations (6e-7 of it)."""
 
     mean: float
     deviation: float
@@ -217,7 +217,7 @@ class Normal:
         )
 
     def share(self, value: float) -> float:
-        """Probability below a value; 0 and 1 where the distribution is cut off."""
+        """Probability below a value, after the cut."""
         below = float(scipy.special.ndtr(-CUT))
         part = (float(scipy.special.ndtr((value - self.mean) / self.deviation)) - below) / (
             1.0 - 2.0 * below
@@ -231,7 +231,7 @@ class Normal:
 
 @dataclass(frozen=True, slots=True)
 class Listed:
-    """Values of a list, words or numbers, each as likely as the others."""
+    """Equally likely words or numbers."""
 
     values: tuple[str | float, ...]
 
@@ -240,7 +240,7 @@ class Listed:
         return self.values[min(int(share * len(self.values)), len(self.values) - 1)]
 
     def share(self, value: str | float) -> float:
-        """Middle of the share of a value of the list; that of all for another one."""
+        """Middle of the share of a value; of all for an unknown one."""
         if value not in self.values:
             return 0.5
         return (self.values.index(value) + 0.5) / len(self.values)

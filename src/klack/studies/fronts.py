@@ -15,7 +15,7 @@ from klack.studies.batches import values_of_points
 __all__ = ["Front", "compromise", "find_front", "spread_over"]
 
 _PAIRS = 40_000
-"""Largest number of pairs of points that are compared without another division."""
+"""Most pairs of points compared without a division."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,13 +109,13 @@ def spread_over(points: NDArray[np.integer], most: int) -> NDArray[np.integer]:
 
 
 def _non_dominated(values: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Rows of the points that no other one dominates; of equal points the first."""
+    """Rows of non-dominated points; of equal ones the first."""
     different, first = np.unique(values, axis=0, return_index=True)  # in lexicographic order
     return np.sort(first[_among_sorted(different)])
 
 
 def _among_sorted(values: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Non-dominated rows of different points in lexicographic order: none beats an earlier one."""
+    """Non-dominated rows of different, lexicographically sorted points."""
     count = len(values)
     if count * count <= _PAIRS:
         better = np.all(values[:, None, :] <= values[None, :, :], axis=2)
@@ -127,7 +127,7 @@ def _among_sorted(values: NDArray[np.float64]) -> NDArray[np.intp]:
 
 
 def _beaten(values: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """For which rows one of the others is at most as large in every column."""
+    """Rows that another one equals or beats in every column."""
     if not len(values) or not len(others):
         return np.zeros(len(values), dtype=bool)
     columns = values.shape[1]
@@ -143,7 +143,7 @@ def _beaten(values: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray
 
 
 def _beaten_in_two(values: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """As :func:`_beaten` with two columns: the lowest second one up to each first one."""
+    """As :func:`_beaten` for two columns: the lowest second up to each first."""
     order = np.argsort(others[:, 0], kind="stable")
     lowest = np.minimum.accumulate(others[order, 1])
     before = np.searchsorted(others[order, 0], values[:, 0], side="right")

@@ -1,4 +1,4 @@
-"""Last steps to a local optimum by derivatives: sequential quadratic programming."""
+"""Last steps to a local optimum by sequential quadratic programming."""
 
 from collections.abc import Callable
 
@@ -13,13 +13,13 @@ Pair = tuple[Array, Array]
 """Of the objectives, and of the constraints."""
 
 _TOLERANCE = 1e-5
-"""Change of the achievement, in scales of the objectives, at which a polish ends."""
+"""Change of the achievement, in scales, that ends a polish."""
 _SUM = 1e-3
-"""Weight of the sum of the objectives beside the worst one."""
+"""Weight of the objectives' sum beside the worst one."""
 
 
 class NoValue(Exception):
-    """A point, or its derivatives, cannot be computed: the polish ends there."""
+    """Point or derivatives that cannot be computed, which ends the polish."""
 
 
 def polish(
@@ -82,7 +82,7 @@ def polish(
 
 
 class _Problem:
-    """Functions of the point and ``t``, all of which SLSQP asks for at the same points."""
+    """Functions of point and ``t``, asked for by SLSQP at equal points."""
 
     def __init__(
         self,
@@ -103,7 +103,7 @@ class _Problem:
         return np.append(_SUM * self._lead_slopes(unknowns).sum(axis=0), 1.0)
 
     def room(self, unknowns: Array) -> Array:
-        """Zero or more where every objective is below ``t`` and every constraint kept."""
+        """Zero or more where objectives are below ``t`` and constraints kept."""
         constraints = self._at(unknowns[:-1])[1]
         return np.append(unknowns[-1] - self._leads(unknowns), -constraints)
 
@@ -113,7 +113,7 @@ class _Problem:
         return np.column_stack([-np.vstack([leads, constraints]), by_t])
 
     def _leads(self, unknowns: Array) -> Array:
-        """Objectives from those of the start, in their scales."""
+        """Scaled objectives, relative to the start."""
         return (self._at(unknowns[:-1])[0] - self._start) / self._scales
 
     def _lead_slopes(self, unknowns: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Local refinement of good points by a pattern search, batch by batch, without derivatives."""
+"""Local refinement by pattern search, in batches, without derivatives."""
 
 import math
 from dataclasses import dataclass
@@ -76,7 +76,7 @@ def achievement(
 
 
 _LEAST = 1e-12
-"""Smallest cosine between a move and the change of slope that counts as curvature."""
+"""Smallest cosine of move and slope change that counts as curvature."""
 
 
 class Secants:
@@ -246,7 +246,7 @@ class Refinement(Batches):
 
     @property
     def points(self) -> NDArray[np.float64]:
-        """Best point (points, parameters) so far from each start."""
+        """Best point (points, parameters) from each start."""
         return np.array([path.best.point for path in self._paths])
 
     @property
@@ -256,7 +256,7 @@ class Refinement(Batches):
 
     @property
     def steps(self) -> NDArray[np.float64]:
-        """Present step of each path: below ``last_step`` it came to its end."""
+        """Step of each path: below ``last_step`` it is done."""
         return np.array([path.step for path in self._paths])
 
     def _next_points(self) -> NDArray[np.float64] | None:
@@ -280,7 +280,7 @@ class Refinement(Batches):
 
 
 class _Path:
-    """One point on its way: turns of a poll around it and a batch along what the poll suggests."""
+    """A point on its way: polls, then batches along their suggestions."""
 
     def __init__(
         self,
@@ -303,7 +303,7 @@ class _Path:
         self._kept = rank[0] == 0.0
 
     def poll(self) -> NDArray[np.float64]:
-        """Points to evaluate next, none of them the present one; none at all at the end."""
+        """Next points, none the present one; none at the end."""
         trials = np.empty((0, len(self._last)))
         while not len(trials) and self.step >= self._settings.last_step:
             if self._suggested is None:
@@ -326,7 +326,7 @@ class _Path:
         violation: NDArray[np.float64],
         size: NDArray[np.float64],
     ) -> None:
-        """Keep the best; after the batch along the suggestions, go there or shorten the step."""
+        """Keep the best; after suggestions, go there or shorten the step."""
         lowest = int(np.lexsort((size, violation))[0])
         rank = (float(violation[lowest]), float(size[lowest]))
         if rank < self.best.rank:
@@ -337,12 +337,12 @@ class _Path:
             self._go()
 
     def _pairs(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Points one step ahead and one behind in every direction, before they are clipped."""
+        """Points one step ahead and behind in every direction, unclipped."""
         steps = self.step * self._directions
         return self._centre.point + steps, self._centre.point - steps
 
     def _go(self) -> None:
-        """Make the best point the centre; without a better one turn or halve the step."""
+        """Centre the best point; if there is none, turn or halve the step."""
         self._suggested = None
         count = len(self._last)
         if self.best is not self._centre:
@@ -363,7 +363,7 @@ class _Path:
         )
 
     def _in_parameters(self, along: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Components along the directions as components along the parameters."""
+        """Components along parameters, from those along directions."""
         return np.array([math.fsum(column) for column in (along[:, None] * self._directions).T])
 
     def _suggestions(
@@ -372,7 +372,7 @@ class _Path:
         violation: NDArray[np.float64],
         size: NDArray[np.float64],
     ) -> list[NDArray[np.float64]]:
-        """Points along the lowest ones of the parabolas, the secants, and the last move."""
+        """Lowest points of parabolas, secants, and the last move."""
         kept = self._centre.rank[0] == 0.0
         height = _moderate(np.array(self._centre.rank[1 if kept else 0]))
         heights = np.where(violation == 0.0, size, np.inf) if kept else violation
@@ -396,7 +396,7 @@ class _Path:
 
 @dataclass(frozen=True, slots=True)
 class _Best:
-    """A point, its objectives, and its violation and achievement."""
+    """Point, objectives, violation and achievement."""
 
     point: NDArray[np.float64]
     objectives: NDArray[np.float64]
@@ -404,7 +404,7 @@ class _Best:
 
 
 def _moderate(heights: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Heights of which squares are finite; what is infinite or nan stays: not known."""
+    """Heights with finite squares; infinite or nan means unknown."""
     return np.where(np.isfinite(heights), np.clip(heights, -1e100, 1e100), heights)
 
 
@@ -414,7 +414,7 @@ def _parabolas(
     behind: NDArray[np.float64],
     step: float,
 ) -> NDArray[np.float64]:
-    """Distances to the lowest points of parabolas, at most two steps; one where there is none."""
+    """Distances to lowest points, at most two steps; one without any."""
     with np.errstate(invalid="ignore", over="ignore"):
         slope, bend = (ahead - behind) / 2.0, ahead - 2.0 * centre + behind
         lowest = np.clip(-slope / np.where(bend > 0.0, bend, np.nan), -2.0, 2.0)
@@ -429,7 +429,7 @@ def _slopes(
     behind: NDArray[np.float64],
     step: float,
 ) -> NDArray[np.float64]:
-    """Central differences; one-sided where one side is unknown, zero where both are."""
+    """Central differences; one-sided for an unknown side, zero for both."""
     right = np.where(np.isfinite(ahead), ahead - centre, np.nan)
     left = np.where(np.isfinite(behind), centre - behind, np.nan)
     right, left = np.where(np.isnan(right), left, right), np.where(np.isnan(left), right, left)
@@ -437,12 +437,12 @@ def _slopes(
 
 
 def _different(trials: NDArray[np.float64], centre: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Without the centre itself and without repetitions, in the given order."""
+    """Without the centre and repetitions, in order."""
     rows = np.unique(np.vstack((centre, trials)), axis=0, return_index=True)[1]
     return trials[np.sort(rows[rows > 0]) - 1]
 
 
 def _reflection(normal: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Orthonormal directions: the parameters mirrored in a plane with this normal."""
+    """Orthonormal directions: parameters mirrored in a plane."""
     square = math.fsum(normal**2)
     return np.eye(len(normal)) - (2.0 / square) * np.outer(normal, normal)

@@ -51,7 +51,7 @@ def _no_list(got: str) -> InputError:
 
 
 def require_level(where: str, confidence: float) -> None:
-    """Raise :class:`InputError` unless a confidence is 0.5 or more and below 1."""
+    """Raise :class:`InputError` unless a confidence is in [0.5, 1)."""
     refuse_if(
         not 0.5 <= confidence < 1.0,
         where,
@@ -260,7 +260,7 @@ def _require_probability(probability: float) -> None:
 
 
 def _ranks(runs: int, probability: float, tail: float) -> tuple[int, int]:
-    """Ranks of the ends, from 1; 0 and ``runs + 1`` where the sample does not reach."""
+    """Ranks of the ends, from 1; 0 and ``runs + 1`` beyond the sample."""
     ranks = np.arange(1, runs + 1)
     at_least = _at_least(ranks, runs, probability)  # falls with the rank
     lower = int(np.count_nonzero(1.0 - at_least <= tail))
@@ -269,7 +269,7 @@ def _ranks(runs: int, probability: float, tail: float) -> tuple[int, int]:
 
 
 def _at_least(counts: NDArray[np.int64], runs: int, probability: float) -> NDArray[np.float64]:
-    """Probability that as many values or more are below the quantile, for every count."""
+    """Probability of as many values or more below the quantile, by count."""
     inside = np.clip(counts, 1, runs)
     found = scipy.special.betainc(inside, runs - inside + 1, probability)
     return np.asarray(np.where(counts < 1, 1.0, np.where(counts > runs, 0.0, found)))

@@ -1,4 +1,4 @@
-"""Search for the best points of the unit cube with one to four objectives, batch by batch."""
+"""Evolutionary search of the unit cube with one to four objectives, in batches."""
 
 import warnings
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ _WORST_VIOLATION = 1e200
 """Largest violation of a point that did not fail."""
 
 _LARGEST = 1e100
-"""Objectives beyond this are taken as this large: their differences and squares stay finite."""
+"""Largest objectives: their differences and squares stay finite."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,7 @@ class SearchSettings:
 
     @property
     def algorithm(self) -> str:
-        """``"DE"`` for one objective, ``"NSGA-II"`` for two and three, ``"NSGA-III"`` for four."""
+        """``"DE"`` for one objective, ``"NSGA-II"`` for two or three, ``"NSGA-III"`` for four."""
         return {1: "DE", 4: "NSGA-III"}.get(self.objectives, "NSGA-II")
 
 
@@ -126,7 +126,7 @@ class Search(Batches):
             self._algorithm.tell(infills=self._population)
 
     def _scales(self, values: PointValues) -> NDArray[np.float64]:
-        """What objectives are divided by: NSGA-III has limits of its own for sizes around one."""
+        """Divisors of objectives: NSGA-III has absolute limits for sizes around one."""
         if self.settings.algorithm != "NSGA-III":
             return np.ones(self.settings.objectives)
         if self._scale is None:
@@ -138,7 +138,7 @@ class Search(Batches):
 
 
 def _spread(objectives: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Distance between the quartiles of each column, or its range, or its size; never zero."""
+    """Distance of quartiles, or range, or size of each column; never zero."""
     near = np.clip(objectives, -_LARGEST, _LARGEST)
     low, high = np.quantile(near, (0.25, 0.75), axis=0)
     spread = high - low
@@ -166,14 +166,14 @@ def _start_points(settings: SearchSettings, start: ArrayLike | None) -> NDArray[
 
 @contextmanager
 def _own_warnings() -> Iterator[None]:
-    """Keep the warning filters: NSGA-III of pymoo switches all warnings off for good."""
+    """Keep warning filters, which pymoo's NSGA-III switches off for good."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         yield
 
 
 def require_pymoo() -> None:
-    """Refuse a search without pymoo before anything is computed for it."""
+    """Refuse a search without pymoo before any computation."""
     try:
         import pymoo.config  # noqa: F401
     except ImportError as error:
@@ -181,7 +181,7 @@ def require_pymoo() -> None:
 
 
 def _algorithm(settings: SearchSettings) -> Any:
-    """Algorithm of pymoo, set up, with nothing shared with another one."""
+    """Fresh algorithm of pymoo."""
     require_pymoo()
     from pymoo.algorithms.moo.nsga2 import NSGA2
     from pymoo.algorithms.soo.nonconvex.de import DE
@@ -209,7 +209,7 @@ def _algorithm(settings: SearchSettings) -> Any:
 
 
 def _nsga3(settings: SearchSettings) -> Any:
-    """NSGA-III with as many evenly spread directions as the population can follow."""
+    """NSGA-III with as many even directions as the population can follow."""
     from pymoo.algorithms.moo.nsga3 import NSGA3
     from pymoo.operators.selection.tournament import TournamentSelection
     from pymoo.util.ref_dirs import get_reference_directions

@@ -1,4 +1,4 @@
-"""Which parameters a measure depends on: shares of its variance, and screening after Morris."""
+"""Dependence of a measure on parameters: shares of variance, and screening."""
 
 from dataclasses import dataclass
 
@@ -25,12 +25,12 @@ _FEWEST_ROWS = 16
 _MANY_ROWS = 1024
 _ROUND_OFF = 64 * np.finfo(np.float64).eps
 _BLOCK = 2**22
-"""Numbers in memory at once while rows are drawn again: 32 MB."""
+"""Numbers in memory while rows are drawn again: 32 MB."""
 
 
 @dataclass(frozen=True, slots=True)
 class Estimates:
-    """One estimate for each parameter, with its confidence interval; nan without one."""
+    """One estimate per parameter, with confidence interval; nan without one."""
 
     value: Floats
     low: Floats
@@ -67,7 +67,7 @@ class SobolIndices:
 
     @property
     def few_rows(self) -> bool:
-        """Whether single intervals may be much too narrow: fewer than 1024 rows."""
+        """Whether intervals may be much too narrow: fewer than 1024 rows."""
         return self.rows < _MANY_ROWS
 
 
@@ -185,7 +185,7 @@ def sobol_indices(
 
 
 def _scaled(rows: Floats) -> Floats | None:
-    """Deviations from the mean of y_a and y_b, of size 1; None where those are all equal."""
+    """Deviations from the mean of y_a and y_b, of size 1; None if all are equal."""
     size = np.max(np.abs(rows))
     if size == 0:
         return None
@@ -204,14 +204,14 @@ def _terms(rows: Floats) -> Floats:
 
 
 def _indices(means: Floats) -> Floats:
-    """Indices (samples, 2 d) from the means of the terms; nan where the variance is zero."""
+    """Indices (samples, 2 d) from means of the terms; nan without variance."""
     variance = means[:, 1:2] - means[:, :1] ** 2
     variance = np.where(variance > _ROUND_OFF * means[:, 1:2], variance, np.nan)
     return means[:, 2:] / variance
 
 
 def _means_again(terms: Floats, resamples: int, seed: int) -> Floats:
-    """Means (resamples, terms) of the terms over as many rows, drawn with replacement."""
+    """Means (resamples, terms) over rows drawn with replacement."""
     count = len(terms)
     random = random_of(seed)
     means = np.empty((resamples, terms.shape[1]))
@@ -226,7 +226,7 @@ def _means_again(terms: Floats, resamples: int, seed: int) -> Floats:
 
 _MOST_LEVELS = 1000
 _MOST_WORK = 2e10
-"""Products in the distances of all candidates from each other: some ten seconds."""
+"""Products for distances of all candidates: some ten seconds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -396,7 +396,7 @@ def elementary_effects(points: ArrayLike, values: ArrayLike) -> Screening:
 
 
 def _trajectory(positions: Floats, seed: int, index: int) -> Floats:
-    """Rows (d + 1, d) of one trajectory; its own random numbers make the design extensible."""
+    """Rows (d + 1, d) of a trajectory; own random numbers make it extensible."""
     parameters, levels = positions.shape
     random = random_of(seed, index)
     half = levels // 2
@@ -429,7 +429,7 @@ def _squared_distances(paths: Floats) -> Floats:
 
 
 def _spread(squared: Floats, count: int) -> NDArray[np.int64]:
-    """Rows of trajectories far from each other, in the order of their drawing."""
+    """Trajectories far from each other, in order of drawing."""
     if count == 1:
         return np.array([0])
     chosen = list(np.unravel_index(np.argmax(squared), squared.shape))
@@ -441,7 +441,7 @@ def _spread(squared: Floats, count: int) -> NDArray[np.int64]:
 
 
 def _moments(effects: Floats) -> tuple[Floats, str]:
-    """mu, mu*, sigma and their standard errors; nan with a reason for fewer than two effects."""
+    """mu, mu*, sigma and their errors; nan with a reason below two effects."""
     count = effects.size
     if count < 2:
         return np.full(6, np.nan), f"effects without a failed point: {count}, at least 2 are needed"
@@ -454,7 +454,7 @@ def _moments(effects: Floats) -> tuple[Floats, str]:
 
 
 def _scatter_error(effects: Floats) -> float:
-    """Standard error of the standard deviation, by leaving out one effect at a time."""
+    """Jackknife error of the standard deviation."""
     count = effects.size
     if count < 3:
         return np.nan

@@ -26,11 +26,11 @@ Choice = TypeVar("Choice")
 SurrogateKind = Literal["polynomial-chaos", "gaussian-process"]
 
 GOOD = 0.9
-"""Predictivity from which something is derived from a surrogate."""
+"""Predictivity that allows conclusions."""
 _GROUPS = 5
 _FEWEST = 20
 _MOST_WITHOUT = 0.1
-"""Share of points without a value above which means over the whole ranges say nothing."""
+"""Share of failed points above which overall means say nothing."""
 _ROUND_OFF = 64 * np.finfo(np.float64).eps
 
 
@@ -161,7 +161,7 @@ def _why_not(axes: Sequence[SurrogateAxis], counts: tuple[int, int, int], y: Flo
 
 
 def _left_out(fit: _Fit[Any], y: Floats) -> Floats:
-    """Residuals of all points, each with a choice that has not seen it."""
+    """Residuals, by choices that have not seen the point."""
     group = random_of(0).permutation(len(y)) % _GROUPS
     found = np.empty(len(y))
     for out in range(_GROUPS):

@@ -22,15 +22,15 @@ Floats = NDArray[np.float64]
 Terms = NDArray[np.int64]
 
 _NORM = 0.75
-"""Exponent q of the sets of terms; the smaller, the fewer terms of several parameters."""
+"""Exponent q; smaller, fewer terms of several parameters."""
 _HIGHEST = 15
 _PATIENCE = 3
-"""Degrees without a smaller error after which no higher one is tried."""
+"""Degrees without improvement that end the search."""
 _MOST_TERMS = 1000
 _MOST_NUMBERS = 1_000_000
 """Points times terms."""
 _OF_POINTS = 0.5
-"""Terms of a fit, of the number of points."""
+"""Terms of a fit over the number of points."""
 _LEAST_FREEDOM = 1e-8
 _BETTER = 0.99
 _ROUND_OFF = 64 * np.finfo(np.float64).eps
@@ -61,7 +61,7 @@ class ChaosModel:
         return _matrix(_functions(self.axes, t, self.degree), self.terms) @ self.coefficients
 
     def main_effect(self, parameter: int, t: Floats) -> Floats:
-        """Mean over all other parameters where one has the coordinates t."""
+        """Mean over the other parameters at coordinates t of one."""
         alone = np.all(np.delete(self.terms, parameter, axis=1) == 0, axis=1)
         own = self.axes[parameter].functions(t, self.degree)[:, self.terms[alone, parameter]]
         return own @ self.coefficients[alone]
@@ -97,7 +97,7 @@ class ChaosFit:
         self._functions = _functions(self._axes, t, _HIGHEST)
 
     def choose(self, y: Floats, rows: NDArray[np.int64]) -> tuple[int, Terms]:
-        """Degree and terms with the smallest error over these rows."""
+        """Degree and terms of smallest error over these rows."""
         own, values = [functions[rows] for functions in self._functions], y[rows]
         none = np.zeros((1, len(self._axes)), dtype=np.int64)
         least, found = _penalised(_matrix(own, none), values)[0], (0, none)
@@ -175,7 +175,7 @@ def _left_out(matrix: Floats, y: Floats) -> Floats:
 
 
 def _penalised(matrix: Floats, y: Floats) -> Floats:
-    """Sums of squared residuals (columns), times (n + k) / (n - k) for k columns."""
+    """Squared residuals (columns), times (n + k) / (n - k) for k columns."""
     count, columns = len(y), np.arange(1, matrix.shape[1] + 1)
     return np.sum(_left_out(matrix, y) ** 2, axis=0) * (count + columns) / (count - columns)
 
@@ -194,7 +194,7 @@ def _matrix(functions: Sequence[Floats], terms: Terms) -> Floats:
 
 
 def _sets(axes: Sequence[SurrogateAxis], most: int) -> Iterator[tuple[int, Terms]]:
-    """Sets of terms of rising degree, each once, while there are not too many."""
+    """Different sets of terms of rising degree, while small enough."""
     last = 0
     for degree in range(_HIGHEST + 1):
         terms = _terms([axis.degrees(degree) for axis in axes], degree, most)
@@ -206,7 +206,7 @@ def _sets(axes: Sequence[SurrogateAxis], most: int) -> Iterator[tuple[int, Terms
 
 
 def _terms(degrees: Sequence[NDArray[np.int64]], degree: int, most: int) -> Terms | None:
-    """All terms with ``sum of degree_i^q <= degree^q``; None for more than ``most``."""
+    """Terms with ``sum of degree_i^q <= degree^q``; None above ``most``."""
     room = degree**_NORM * (1.0 + 1e-9)
     found: list[tuple[tuple[int, ...], float]] = [((), 0.0)]
     for own in degrees:

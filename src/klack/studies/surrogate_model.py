@@ -1,4 +1,4 @@
-"""What surrogates have in common: coordinates of their parameters, and shares of the variance."""
+"""Common to surrogates: coordinates of parameters, shares of variance."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -17,7 +17,7 @@ __all__ = ["Shares", "SurrogateAxis", "SurrogateModel", "require_scikit_learn", 
 Floats = NDArray[np.float64]
 
 _NODES = 96
-"""Of the Gauss rule of a range or a distribution: exact up to degree 191 on a range."""
+"""Gauss nodes of a range or distribution: exact up to degree 191 on a range."""
 _HIGHEST = 15
 
 
@@ -59,7 +59,7 @@ class SurrogateAxis:
 
     @property
     def most(self) -> int:
-        """Highest degree that its values tell apart; of words 1, of ranges 15."""
+        """Highest distinguishable degree; 1 for words, 15 for ranges."""
         if self.words:
             return min(len(self.words) - 1, 1)
         return len(self.nodes) - 1 if isinstance(self.spread, Listed) else _HIGHEST
@@ -141,7 +141,7 @@ def _shares(places: NDArray[np.int64]) -> Floats:
 
 
 def _scaled(x: Floats, among: Floats) -> Floats:
-    """From -1 at the lowest to 1 at the highest; 0 if both are the same."""
+    """From -1 (lowest) to 1 (highest); 0 if equal."""
     low, high = np.min(among), np.max(among)
     return (2.0 * x - low - high) / (high - low) if high > low else np.zeros_like(x)
 
@@ -172,7 +172,7 @@ class SurrogateModel(Protocol):
         """Values (points) at coordinates (points, parameters)."""
 
     def main_effect(self, parameter: int, t: Floats) -> Floats:
-        """Mean over all other parameters where one has the coordinates t."""
+        """Mean over the other parameters at coordinates t of one."""
 
     def shares(self) -> Shares:
         """Parts of its variance."""

@@ -21,14 +21,14 @@ __all__ = ["ProcessFit", "ProcessModel"]
 Floats = NDArray[np.float64]
 
 _LENGTHS = (0.15, 300.0)
-"""Bounds of a length of correlation, in standard deviations of its parameter."""
+"""Bounds of correlation lengths, in standard deviations of the parameter."""
 _NOISE = (1e-8, 1.0)
-"""Bounds of the variance of noise, of the variance of the values."""
+"""Bounds of the noise variance, relative to the values."""
 _SIZES = (1e-3, 1e5)
 _STARTS = (1.7, 6.0)
-"""Lengths that the search for the largest likelihood starts from."""
+"""Starting lengths for the largest likelihood."""
 _LEAST_NOISE = 1e-8
-"""Of the process: with less, weights cancel to less than four digits."""
+"""Share of the process: with less, weights cancel to less than four digits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +72,7 @@ class ProcessModel:
         return self.mean + _product(factors) @ self.weights
 
     def main_effect(self, parameter: int, t: Floats) -> Floats:
-        """Mean over all other parameters where one has the coordinates t."""
+        """Mean over the other parameters at coordinates t of one."""
         means = np.array(
             [axis.weights @ self._factor(k, axis.nodes) for k, axis in enumerate(self.axes)]
         )
@@ -130,7 +130,7 @@ class ProcessFit:
         self._columns = tuple(axis.columns(t[:, k]) for k, axis in enumerate(self._axes))
 
     def choose(self, y: Floats, rows: NDArray[np.int64]) -> Covariance:
-        """Covariance that makes the values of these rows most likely, by scikit-learn."""
+        """Most likely covariance for these rows, by scikit-learn."""
         require_scikit_learn()
         from sklearn.exceptions import ConvergenceWarning
         from sklearn.gaussian_process import GaussianProcessRegressor
@@ -185,7 +185,7 @@ class ProcessFit:
 
 
 def _factor(a: Floats, b: Floats, lengths: Floats) -> Floats:
-    """Factor (a, b) of the covariance that one parameter gives."""
+    """Covariance factor (a, b) of one parameter."""
     apart = (a[:, None, :] - b[None, :, :]) / lengths
     return np.exp(-0.5 * np.sum(apart**2, axis=2))
 

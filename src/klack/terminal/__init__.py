@@ -1,1 +1,1 @@
-"""What commands share: options, progress, tables and files on the terminal."""
+"""Shared by commands: options, progress, tables and files."""

@@ -101,13 +101,13 @@ def imported(words: Sequence[str] | None) -> "tuple[type[Component], ...]":
 
 
 def require_threads(threads: int | None) -> None:
-    """Refuse a number of processor cores that cannot be."""
+    """Refuse an impossible number of cores."""
     if threads is not None:
         require_positive("--threads", threads, "cores")
 
 
 def require_files(option: str, files: Sequence[Path]) -> None:
-    """Refuse files that are not there, before the long work begins."""
+    """Refuse missing files before the long work begins."""
     for file in files:
         if not file.is_file():
             raise InputError(
@@ -121,7 +121,7 @@ def require_files(option: str, files: Sequence[Path]) -> None:
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class Shown:
-    """Options ``--json`` and ``--quiet``; raise where the target cannot be written."""
+    """Options ``--json`` and ``--quiet``; the target must be writable."""
 
     json: Json = None
     quiet: Quiet = False
@@ -132,7 +132,7 @@ class Shown:
 
     @property
     def to_stderr(self) -> bool:
-        """Whether the standard output is reserved for JSON, or unused."""
+        """Whether the standard output is for JSON, or unused."""
         return self.quiet or str(self.json) == "-"
 
     @property
@@ -145,12 +145,12 @@ class Shown:
             print(text, file=self._stream)
 
     def note(self, notes: Iterable[str]) -> None:
-        """Print what makes a result doubtful or incomplete, also where it shall be quiet."""
+        """Print doubts about a result, even when quiet."""
         for note in notes:
             print(f"Note: {note}", file=self._stream)
 
     def warn(self, notes: Iterable[str]) -> None:
-        """Print notes on the input of a command, apart from its own output."""
+        """Print notes on the input, apart from the output."""
         for note in notes:
             print(f"Note: {note}", file=sys.stderr)
 
@@ -188,7 +188,7 @@ class Wanted(Shown):
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class WantedResult(Wanted):
-    """Options of every command that leaves a result with a report."""
+    """Options of commands with a result and report."""
 
     report: Report = True
     out: Out = None

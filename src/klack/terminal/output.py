@@ -1,4 +1,4 @@
-"""Files that a command leaves behind: whole or not at all."""
+"""Files of a command: whole or not at all."""
 
 import json
 import os
@@ -29,7 +29,7 @@ _MOST_NAMES = 8
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """Files written to a folder, sorted, and the lines that report them."""
+    """Files written to a folder, and lines on them."""
 
     folder: Path
     files: tuple[str, ...]
@@ -37,7 +37,7 @@ class Written:
 
     @classmethod
     def of(cls, folder: Path, stage: Path, *lines: str) -> Self:
-        """Content of the stage of a folder; without lines, with one that lists it."""
+        """Content of a stage; without lines, one that lists it."""
         files = tuple(sorted(path.name for path in stage.iterdir()))
         return cls(folder, files, lines or (f"Written to {folder}: {listing(files)}",))
 
@@ -49,7 +49,7 @@ def require_json_target(path: Path | None) -> None:
 
 
 def require_file_target(option: str, path: Path | None) -> None:
-    """Refuse a file that cannot be written, before the long work begins."""
+    """Refuse an unwritable file before the long work begins."""
     if path is None:
         return
     if path.is_dir():
@@ -86,7 +86,7 @@ def write_json(path: Path, data: Mapping[str, Any]) -> None:
 
 
 def _write_to_stream(path: Path, text: str) -> None:
-    """Write to a device or a named pipe that already has a reader."""
+    """Write to a device or a pipe with a reader."""
     handle = os.open(path, os.O_WRONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0))
     os.set_blocking(handle, True)
     with os.fdopen(handle, "w", encoding="utf-8") as file:
@@ -97,7 +97,7 @@ _FILES = frozenset(
     f".{ending}"
     for ending in "csv fmu html inp json mat mf4 mo nc pdf svg vtk vtu wav yaml yml".split()
 )
-"""Endings of files that klack writes: a folder of such a name was meant to be a file."""
+"""Endings of klack's files: a folder with one was meant as a file."""
 
 
 def require_folder(folder: Path) -> None:
@@ -119,7 +119,7 @@ def require_folder(folder: Path) -> None:
 
 
 def listing(names: Iterable[str]) -> str:
-    """Names of files in one line; of many, some of them and their number."""
+    """File names in one line; of many, some and their number."""
     every = sorted(names)
     if len(every) <= _MOST_NAMES:
         return ", ".join(every)

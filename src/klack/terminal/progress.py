@@ -1,4 +1,4 @@
-"""Progress of long work, shown from its first second; short work shows nothing."""
+"""Progress of long work, from its first second; short work shows nothing."""
 
 import json
 import os
@@ -19,7 +19,7 @@ from klack.machine.progress import PointCount, Progress, silent
 __all__ = ["PROGRESS_FILE", "show_progress"]
 
 PROGRESS_FILE = "KLACK_PROGRESS_FILE"
-"""Environment variable: file for the progress instead of the terminal."""
+"""Variable: file for the progress instead of the terminal."""
 
 _PATIENCE = 2.0  # s that a stage may take without a line
 _LASTS = 5.0  # s after which a stage that has not ended is named
@@ -30,12 +30,12 @@ _KINDS = {
     "klack:wait": "waiting for another process that compiles",
     "numba:compile": "compiling (once)",
 }
-"""Events and their words, the first that is on before the others."""
+"""Events and words, the first active one wins."""
 
 
 @contextmanager
 def show_progress(quiet: bool = False) -> Iterator[Progress]:
-    """Give a callback that draws a bar on a terminal and writes a line per stage elsewhere."""
+    """Give a callback: bar on a terminal, line per stage elsewhere."""
     if file := os.environ.get(PROGRESS_FILE):
         yield _ToFile(Path(file))
     elif quiet:
@@ -90,7 +90,7 @@ class _Lines:
         threading.Thread(target=self._watch, daemon=True).start()
 
     def _watch(self) -> None:
-        """Say what lasts, from a thread of its own: long steps report nothing for minutes."""
+        """Report what lasts, from a thread: long steps are silent for minutes."""
         stage, since, due = "", monotonic(), inf
         while not self._ended.wait(_OFTEN):
             now = monotonic()
@@ -136,7 +136,7 @@ class _Lines:
 
 @contextmanager
 def _bar() -> Iterator[Progress]:
-    """Bar that shows itself, since imports, compiling and meshing report nothing for a while."""
+    """Bar that shows itself: imports, compiling and meshing report little."""
     from rich.console import Console
     from rich.progress import BarColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
     from rich.progress import Progress as RichProgress
@@ -197,7 +197,7 @@ class _Compiling:
         return next((_KINDS[kind] for kind, depth in self._depth.items() if depth), "")
 
     def watch(self) -> None:
-        """Listen from now on, if numba is imported already, which takes a second."""
+        """Listen from now on, if numba is imported, which takes a second."""
         if self._listener is not None or "numba" not in sys.modules:
             return
         from numba.core import event

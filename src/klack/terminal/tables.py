@@ -108,7 +108,7 @@ _WIDE = 160  # where no terminal limits the width
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TextTable:
-    """A table for a terminal; the first ``left`` columns are texts, the others numbers."""
+    """Table for a terminal; the first ``left`` columns are texts."""
 
     title: str
     columns: Sequence[str]

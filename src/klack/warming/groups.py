@@ -1,4 +1,4 @@
-"""Groups of functions that are compiled together, each by a small calculation that needs them."""
+"""Groups of functions, each compiled by a small calculation."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

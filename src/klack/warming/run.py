@@ -1,4 +1,4 @@
-"""Compile all groups, one after another, and count what is compiled."""
+"""Compile groups, and count."""
 
 import os
 import warnings
@@ -19,7 +19,7 @@ __all__ = ["Compiled", "Warmed", "warm"]
 
 @dataclass
 class Compiled:
-    """Functions of klack that were compiled, and how long [s] that took."""
+    """Newly compiled functions of klack, and their time [s]."""
 
     functions: int = 0
     seconds: float = 0.0
@@ -27,7 +27,7 @@ class Compiled:
 
 @contextmanager
 def counted() -> Iterator[Compiled]:
-    """Count the functions that this process compiles meanwhile; what it loads does not count."""
+    """Count functions compiled meanwhile; loaded ones do not count."""
     count = Compiled()
     depth, begin = 0, 0.0
 
@@ -83,7 +83,7 @@ def warm(groups: Sequence[str]) -> Iterator[Warmed]:
 
 @contextmanager
 def _computed_anew() -> Iterator[None]:
-    """Without stored results, which need no functions, and without words about the cases."""
+    """Without stored results, which need no functions, and without words."""
     before = os.environ.get(FOLDER_VARIABLE)
     os.environ[FOLDER_VARIABLE] = "off"
     try:

@@ -1,4 +1,4 @@
-"""The smallest impacts that enter the time loops with the types of real ones, without a mesh."""
+"""Smallest impacts with the types of real ones, without a mesh."""
 
 from dataclasses import replace
 from math import inf
@@ -22,7 +22,7 @@ _LINES = np.array([0.0, 1e-6])
 
 
 def plain_impacts() -> None:
-    """Reduced and at the interface level: on the axis, elastic, smooth, without friction."""
+    """Impacts at both levels: on the axis, elastic, smooth, without friction."""
     bodies = rigid_mass_body("needle", 2e-3), fixed_body("seat")
     pair = ContactPair(
         body_a="needle",
@@ -37,7 +37,7 @@ def plain_impacts() -> None:
 
 
 def featured_impacts() -> None:
-    """One at the interface level with each of what contacts may have besides, and in a guide."""
+    """Impact at the interface level with every feature of contacts, and a guide."""
     plain, limit = _model(), np.array([1e8, 2e8])
     _touch(plain, guide=_guide())
     _touch(replace(plain, limit=PressureLimit(set=_LINES, pressure=limit)))
@@ -58,7 +58,7 @@ def _touch(model: InterfaceModel, guide: Guide | None = None) -> None:
 
 
 def _model() -> InterfaceModel:
-    """Two points below a rigid mass that moves along the axis, and across it."""
+    """Two points below a rigid mass that moves along and across the axis."""
     traces = np.array([[1.0, 0.0], [1.0, 0.0]])
     rigid = np.zeros((6, 2))
     rigid[2, 0] = rigid[0, 1] = 1.0

@@ -1,4 +1,4 @@
-"""The smallest valves with one of everything: along the axis, and in three dimensions."""
+"""Smallest valves with one of everything, on the axis and in three dimensions."""
 
 from pathlib import Path
 from typing import Literal
@@ -40,7 +40,7 @@ run: {duration: 20 us, step: 20 ns, coarse: 16, record: 1 us, variants: [wet]}
 
 
 def small_valve() -> ValveCase:
-    """Read the case: rigid bodies, a fluid, a pipe, a stop with a film."""
+    """Case of rigid bodies, a fluid, a pipe, a stop with a film."""
     return _valve(_SMALL, Path("small-valve.yaml"))
 
 
@@ -141,7 +141,7 @@ run: {duration: 20 us, variants: [wet, dry], check_steps: false}
 
 
 def spatial_valve(model: Literal["axisymmetric", "swept"]) -> ValveCase:
-    """Read the case: of bodies of revolution, or of solids whose faces rub."""
+    """Case of bodies of revolution, or of solids whose faces rub."""
     solid = model == "swept"
     words = "model: swept\n      layers: 8" if solid else "model: axisymmetric"
     text = _SPATIAL.replace("MODEL", words).replace("FRICTION", ", friction: 0.1" if solid else "")

@@ -1,4 +1,4 @@
-"""A case as a form and as text, both ways, with the messages of the checker."""
+"""A case as form and text, both ways, with the checker's messages."""
 
 import asyncio
 import json
@@ -56,7 +56,7 @@ async def case_editor_page(state: State, given: Mapping[str, str]) -> None:
 
 
 def _begins_a_study(text: str) -> bool:
-    """Whether a text has the section of a study, and none that a case needs."""
+    """Whether a text has a section ``study``, and none that a case needs."""
     heads = {line.partition(":")[0] for line in text.splitlines()}
     return "study" in heads and not heads & {"bodies", "network"}
 
@@ -146,19 +146,19 @@ class _Editor:
             await self._settle()
 
     def _begin(self) -> int:
-        """Say that what is seen is not checked yet; return the count of this change."""
+        """Show that a change is unchecked; return its count."""
         self._status.classes(remove="good fair out")
         self._status.set_text("checking ...")
         return self._count
 
     async def _settle(self) -> None:
-        """Write what waits, then check the text, after the check before it."""
+        """Write what waits, then check the text, after the check before."""
         async with self._turn:
             await self._write()
             await self._check()
 
     async def _write(self) -> None:
-        """Write the values that wait, each into the text that has come by then."""
+        """Write waiting values, each into the text at that time."""
         if not self._waiting:
             return
         while self._waiting:
@@ -179,7 +179,7 @@ class _Editor:
         self._show_text()
 
     async def _check(self) -> None:
-        """Keep the draft; say what the checker says; show a valid text in the form."""
+        """Keep the draft; show the checker's words, and a valid text in the form."""
         text, mine = self._text, self._count
         trouble = ""
         try:
@@ -217,7 +217,7 @@ class _Editor:
                     await self._keep(self._text if self._text != self._saved else None)
 
     async def _keep(self, draft: str | None) -> bool:
-        """Keep what is not saved, unless a page elsewhere does; whether it is kept."""
+        """Keep unsaved text, unless another page does; whether it is kept."""
         notes, known = self._state.notes, self._draft
         if not await asyncio.to_thread(notes.exchange_draft, self._case, known, draft):
             return draft is None
@@ -231,7 +231,7 @@ class _Editor:
     # ----------------------------------------------------------------------- from the form
 
     def _show_form(self, fields: tuple[FormField, ...]) -> None:
-        """Show the values; the form is made again only where the text has other keys now."""
+        """Show the values; make the form again only for other keys."""
         keys = frozenset(replace(item, written=_kind_of_box(item), default="") for item in fields)
         if keys != self._keys:
             self._keys = keys
@@ -260,7 +260,7 @@ class _Editor:
                             self._show_field(item)
 
     def _folded(self, name: str, words: str, more: str = "") -> ui.element:
-        """A part that is open where it was open before."""
+        """A part that stays open where it was."""
         part = ui.element("details")
         if name in self._open:
             part.props["open"] = True
@@ -298,7 +298,7 @@ class _Editor:
         element("input", "k-input", placeholder=hint, **kind | common)
 
     async def _changed(self, event: Any) -> None:
-        """Write a value of the form into the text; nothing else of it changes."""
+        """Write a form value into the text, nothing else."""
         box, value, count = event.args
         item = self._items[box]
         if not value:  # to remove a key is for the text, which shows what goes with it
@@ -317,14 +317,14 @@ class _Editor:
         self._tell("klackText", self._text)
 
     def _tell(self, function: str, what: object) -> None:
-        """Hand something to the page, with the last change that it knows."""
+        """Hand something to the page, with its last known change."""
         call = f"{function}({json.dumps(what)}, {self._count})"
         self._area.client.run_javascript(f"window.{call}")
 
     # ----------------------------------------------------------------------- keeping it
 
     async def _save(self) -> bool:
-        """Replace the file as a whole; what another program wrote meanwhile is not overwritten."""
+        """Replace the file, unless another program wrote it meanwhile."""
         if self._is_too_long:
             self._message.set_text(f"Not saved. {_TOO_LONG}")
             return False
@@ -349,7 +349,7 @@ class _Editor:
         return True
 
     async def _run(self) -> None:
-        """Run the case if the file has what is seen; if not, offer to save it first."""
+        """Run the case if the file is as seen; else offer to save it."""
         if self._is_too_long:
             self._message.set_text(f"Not run. {_TOO_LONG}")
             return
@@ -406,7 +406,7 @@ class _Editor:
 
 
 def _in_a_line(item: FormField) -> str:
-    """A value as its box has it: a browser would take the ends of lines out."""
+    """A value on one line: browsers drop line ends in boxes."""
     return " ".join(item.written.splitlines())
 
 

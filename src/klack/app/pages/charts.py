@@ -1,4 +1,4 @@
-"""Charts of answers as the plain data that Plotly draws, and the page that compares two results."""
+"""Charts of answers as data for Plotly, and the page that compares two results."""
 
 import asyncio
 from collections.abc import Mapping, Sequence
@@ -36,7 +36,7 @@ __all__ = [
 
 
 _COLOURS = ("#1f78c8", "#d9742b", "#1b9e77")
-"""Blue, orange and green, told apart with any colour vision; on light and dark."""
+"""Blue, orange and green, distinct in any colour vision, on light and dark."""
 _GHOST = "#8b95a1"
 _CONFIG = {"displaylogo": False, "responsive": True, "displayModeBar": False}
 
@@ -58,7 +58,7 @@ TITLES = ("Contact force", "Motion", "Third octaves of the force")
 
 
 def answer_figures(now: Answer, ghost: Answer, names: tuple[str, str]) -> list[dict[str, Any]]:
-    """Charts of an answer before the pinned one: force and motion over time, bands."""
+    """Charts of an answer and the pinned one: force, motion, bands."""
     time = f"time [{ghost.time_unit}]"
     return [
         _curves_figure(now.force, ghost.force, time, "force [N]", names),
@@ -70,7 +70,7 @@ def answer_figures(now: Answer, ghost: Answer, names: tuple[str, str]) -> list[d
 def _curves_figure(
     now: Sequence[Curve], ghost: Sequence[Curve], x: str, y: str, names: tuple[str, str]
 ) -> dict[str, Any]:
-    """Lines over time, those of the pinned design dashed and grey behind."""
+    """Lines over time, the pinned ones dashed and grey behind."""
     several = len(now) > 1 or len(ghost) > 1
     data = [
         _line(curve, _GHOST, f"{curve.name}, {names[1]}" if several else names[1], dash="dash")
@@ -84,7 +84,7 @@ def _curves_figure(
 
 
 def _bands_figure(now: Answer, ghost: Answer, names: tuple[str, str]) -> dict[str, Any]:
-    """Third octaves of the force within 60 dB of the highest, as steps."""
+    """Third octaves within 60 dB of the highest, as steps."""
     data = []
     for answer, colour, name, dash in (
         (ghost, _GHOST, names[1], "dash"),
@@ -109,7 +109,7 @@ def _bands_figure(now: Answer, ghost: Answer, names: tuple[str, str]) -> dict[st
 
 
 def _short(label: str) -> str:
-    """As narrow as a telephone has room for: 500, 2k, 31.5k."""
+    """Narrow, for telephones: 500, 2k, 31.5k."""
     return label.replace(" kHz", "k").replace(" Hz", "")
 
 
@@ -156,7 +156,7 @@ def _line(
 
 
 def _plain(values: Floats) -> list[float]:
-    """Numbers with the digits that a screen shows: a third of the bytes."""
+    """Digits that a screen shows: a third of the bytes."""
     return [float(f"{value:.5g}") for value in values]
 
 
@@ -188,7 +188,7 @@ def _figure(data: list[dict[str, Any]], x: str, y: str) -> dict[str, Any]:
 
 
 class DescribedChart:
-    """Heading, chart, and a text that only screen readers have; it is an image to them."""
+    """Heading, chart, and a text for screen readers, to which it is an image."""
 
     def __init__(self, title: str, figure: dict[str, Any]) -> None:
         with ui.element("section").classes("k-sheet k-chart"):
@@ -209,7 +209,7 @@ def _told(figure: dict[str, Any]) -> str:
 
 
 async def comparing_page(state: State, given: Mapping[str, str]) -> None:
-    """The page of two results, ``a`` the one that ``b`` is compared with."""
+    """Page of two results, ``b`` compared with ``a``."""
     first, second = given.get("a", ""), given.get("b", "")
 
     async def read() -> tuple[Answer, Answer]:

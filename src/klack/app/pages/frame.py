@@ -1,4 +1,4 @@
-"""What every page has: its bar, text, buttons, fields and tables, and errors in words."""
+"""Parts of every page: bar, text, buttons, fields, tables, and errors in words."""
 
 import asyncio
 from collections.abc import Awaitable, Callable, Iterator, Mapping
@@ -98,14 +98,14 @@ def with_props(found: _Element, **props: object) -> _Element:
 
 
 def element(tag: str, classes: str = "", **props: object) -> ui.element:
-    """An element with its classes, and attributes as :func:`with_props` has them."""
+    """Element with classes, and attributes as for :func:`with_props`."""
     return with_props(ui.element(tag).classes(classes), **props)
 
 
 def button(
     text: str, handler: Handler | None = None, *, main: bool = False, of: str = ""
 ) -> TextElement:
-    """A button; ``of`` names its object for those who do not see its row."""
+    """A button; ``of`` names its object for screen readers."""
     found = plain(text, "button").classes("k-btn" + (" k-main-btn" if main else ""))
     if handler is not None:
         found.on("click", handler, args=[])
@@ -124,12 +124,12 @@ def link(text: str, target: str, *, new: bool = False, of: str = "") -> TextElem
 
 
 def address(page: str, path: str) -> str:
-    """Address of a page of something in the folder."""
+    """Address of a page for something in the folder."""
     return f"/{page}?{urlencode({'path': path})}"
 
 
 def set_off(is_off: bool, *buttons: ui.element) -> None:
-    """Have buttons that cannot be pressed, or can be again."""
+    """Disable or enable buttons."""
     for found in buttons:
         found.props["disabled"] = is_off
         found.update()
@@ -207,7 +207,7 @@ def show_error(error: Exception) -> None:
 
 
 async def is_done(act: Callable[..., object], *arguments: object) -> bool:
-    """Do something off the event loop; say on the page what goes wrong; whether it went well."""
+    """Act off the event loop; show errors on the page; whether it went well."""
     try:
         await asyncio.to_thread(act, *arguments)
     except (KlackError, OSError) as error:
@@ -220,7 +220,7 @@ async def is_done(act: Callable[..., object], *arguments: object) -> bool:
 
 
 def number_text(number: Number) -> str:
-    """Value of a number with sensible digits; a dash where there is none."""
+    """Value with sensible digits; a dash without one."""
     if number.value is None:
         return "–"
     if isinstance(number.value, int):
@@ -251,7 +251,7 @@ def differing(now: Number, then: Number) -> str:
 
 @contextmanager
 def table(classes: str, *heads: str, scope: str | None = "col") -> Iterator[None]:
-    """A table with a head; its rows are made within."""
+    """A table with a head; rows are made within."""
     found = ui.element("table").classes(f"k-table {classes}")
     with found, ui.element("thead"), ui.element("tr"):
         for word in heads:
@@ -305,13 +305,13 @@ def choice_box(
 
 
 def entry_box(start: str, change: Change, *, event: str = "input", **props: object) -> ui.element:
-    """A line of text that hands on what is typed at each key, or after a ``change`` as a whole."""
+    """A line of text that hands on each key, or after a ``change`` the whole."""
     box = element("input", "k-input", **{"type": "text", "start": start} | props)
     return box.on(event, lambda found: change(str(found.args)), js_handler=_VALUE)
 
 
 def text_field(label: str, words: str, value: str, change: Change) -> None:
-    """A line of text, with words on what belongs there."""
+    """A line of text, with words on its meaning."""
     with ui.element("label").classes("k-field"):
         with ui.element("div"):
             plain(label)
@@ -337,7 +337,7 @@ def tick(
     classes: str = "k-btn",
     **props: object,
 ) -> ui.element:
-    """A box to tick with its label, which gets the classes."""
+    """A tick box with its label, which gets the classes."""
     with ui.element("label").classes(classes) as label:
         tick_box(start, change, **props)
         plain(words)

@@ -1,4 +1,4 @@
-"""A new study of a case: what varies, what is computed, how many points."""
+"""A new study of a case: parameters, measures, number of points."""
 
 import asyncio
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""Guide for a new valve: parts, faces, materials, motion, checks, and the case file."""
+"""Guide for a new valve: parts, faces, materials, motion, checks, case file."""
 
 import asyncio
 from collections.abc import Callable, Mapping
@@ -44,7 +44,7 @@ _CLOSE = """() => {
   step.inert = true;
   setTimeout(() => { step.inert = false; }, 10000);
 }"""
-"""A step takes no more changes; it does again should no other one come."""
+"""A step takes no more changes, unless no other one comes."""
 
 
 async def new_valve_page(state: State, given: Mapping[str, str]) -> None:
@@ -103,7 +103,7 @@ class _Guide:
         return self._plan
 
     async def keep(self, plan: ValvePlan) -> None:
-        """Change and keep the plan; what cannot be kept is told and not changed."""
+        """Keep a changed plan; what cannot be kept is told."""
         before, self._plan = self._plan, plan  # at once: another change may come meanwhile
         self._show_steps()
         async with self._writing:
@@ -136,7 +136,7 @@ class _Guide:
     # ----------------------------------------------------------------------- the parts
 
     def source(self, body: str) -> tuple[str, str] | None:
-        """Where a body comes from, for the process that reads it."""
+        """Source of a body for the reading process."""
         value = self._plan.given(body)
         if not value.strip():
             return None
@@ -179,7 +179,7 @@ class _Guide:
 
     @property
     def model(self) -> str:
-        """``"half"`` where it is chosen and both parts are turned."""
+        """``"half"`` if chosen and both parts are turned."""
         turned = all((f := self.facts(b)) is not None and not f.not_turned for b in BODIES)
         return self._plan.model if turned else "solid"
 
@@ -236,7 +236,7 @@ class _Guide:
         self._parts.build()
 
     async def _read_again(self, bodies: tuple[str, ...]) -> None:
-        """Read the bodies of the plan; faces that they do not have are chosen no more."""
+        """Read the bodies again; missing faces lose their choice."""
         for body in bodies:
             self._facts.pop(body, None)
         self._show_steps()
@@ -435,7 +435,7 @@ class _Guide:
 
 
 def _leaving(text: str, handler: Handler, *, main: bool = False) -> TextElement:
-    """A button that leads to another step; this one takes no more changes, they would be lost."""
+    """A button to another step; this one takes no more changes, which would be lost."""
     found = button(text, handler, main=main)
     found.on("click", js_handler=_CLOSE)
     return found

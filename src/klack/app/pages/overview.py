@@ -64,7 +64,7 @@ async def overview_page(state: State, given: Mapping[str, str]) -> None:
 
 
 class _Overview:
-    """Lists that are made again when something below the folder changed."""
+    """Lists, made again when something below the folder changes."""
 
     def __init__(self, state: State) -> None:
         self._state = state
@@ -115,7 +115,7 @@ class _Overview:
             await self._show_results()
 
     async def _find(self, event: Any) -> None:
-        """Show the cases and results with a part of a name, of all that were found."""
+        """Show cases and results whose names contain a text."""
         self._sought = mine = str(event.args)[:200].lower()
         await asyncio.sleep(_REST)
         if mine == self._sought and self._found is not _NONE:
@@ -126,7 +126,7 @@ class _Overview:
         return tuple(name for name in names if self._sought in name.lower())
 
     async def _follow(self) -> None:
-        """Show the progress of runs; look again for results where one ended."""
+        """Show progress of runs; look for results when one ends."""
         jobs = await asyncio.to_thread(self._state.jobs.all)
         states = tuple((job.name, job.state) for job in jobs)
         ended = {job.name for job in jobs if job.state != "running"}
@@ -185,7 +185,7 @@ class _Overview:
         self._show_jobs()
 
     def _offer_more(self, count: int) -> None:
-        """At the end of a list that is not shown whole: thousands of rows take minutes."""
+        """End of a shortened list: thousands of rows take minutes."""
         if count <= self._most:
             return
 
@@ -238,7 +238,7 @@ class _Overview:
         show: Callable[[str, _Told], None],
         then: Callable[[], None] = lambda: None,
     ) -> None:
-        """Rows that are filled as they are read, the first of them soon."""
+        """Rows that fill as they are read, the first ones soon."""
         with ui.element("div").classes("k-sheet"):
             rows = [(name, _reading(name)) for name in names[: self._most]]
             self._offer_more(len(names))
@@ -504,7 +504,7 @@ def _search_box(find: Callable[[Any], Awaitable[None]]) -> ui.element:
 
 
 def _parts(rows: list[_Row]) -> Iterator[list[_Row]]:
-    """Rows that are shown together: the page is drawn again for each part, not for each row."""
+    """Rows shown together: the page is drawn again for each part."""
     begin, count = 0, _FEW
     while begin < len(rows):
         yield rows[begin : begin + count]
@@ -512,7 +512,6 @@ def _parts(rows: list[_Row]) -> Iterator[list[_Row]]:
 
 
 def _reading(name: str) -> ui.element:
-    """Row of an entry that is not read yet."""
     with ui.element("div").classes("k-row") as row, ui.element("div"):
         plain(name, "div").classes("k-title")
         plain("reading ...", "div").classes("k-soft")
@@ -520,7 +519,7 @@ def _reading(name: str) -> ui.element:
 
 
 def _progress_bar(began: str) -> Callable[[Job], None]:
-    """Words and bar of a run; what is returned shows how far it is now."""
+    """Words and bar of a run; returns what updates them."""
     words = plain("", "div").classes("k-soft")
     bar = ui.element("div").classes("k-bar").props("role=progressbar aria-valuemin=0")
     bar.props["aria-valuemax"] = 100

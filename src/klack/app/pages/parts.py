@@ -1,4 +1,4 @@
-"""The two bodies of a new valve: STEP files or drawings, what was read in them, and their faces."""
+"""Two bodies of a new valve: sources, content and faces."""
 
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import replace
@@ -79,7 +79,7 @@ class PartsStep:
         self._modelled = ""
 
     def build(self) -> None:
-        """Make the fields, and show what is known already."""
+        """Make the fields; show what is known."""
         with ui.element("div").classes("k-sheet k-pad k-stack"):
             choice_field(
                 "The two bodies come from", _SOURCES, self._plan().source, self._change_source
@@ -96,7 +96,7 @@ class PartsStep:
         self.show_facts()
 
     def show_facts(self) -> None:
-        """Show what was read in the bodies, unless another step is shown by now."""
+        """Show the content of the bodies, unless another step is shown."""
         if self._models.is_deleted:
             return
         for body in BODIES:
@@ -188,7 +188,7 @@ class PartsStep:
     async def _with(
         self, plan: ValvePlan, bodies: tuple[str, ...], fields: tuple[str, ...] = ()
     ) -> None:
-        """Continue with a plan that changes bodies; fields show what was not typed into them."""
+        """Continue with a plan of other bodies; update fields not typed into."""
         await self._keep(plan)  # at once: the page may be left while parts are read
         if not self._models.is_deleted:
             self._show_fields(fields)
@@ -214,7 +214,7 @@ class PartsStep:
                 plain(f"{found.words}; {turned}", "p").classes("k-read").props("role=status")
 
     def _show_models(self) -> None:
-        """Half sections or solids, where there is a choice; made again only if that changes."""
+        """Half sections or solids, if there is a choice; made again if that changes."""
         facts = [self._facts().get(body) for body in BODIES]
         read = [found for found in facts if isinstance(found, PartFacts)]
         shown = ""
@@ -238,14 +238,14 @@ class PartsStep:
 
 
 def _file_box(label: str, accept: str, content: str, take: Handler) -> ui.element:
-    """A choice of a file of this computer; what the script makes of it is handed on."""
+    """Choice of a file of this computer; the script's result is handed on."""
     box = element("input", "k-input", type="file", accept=accept, aria_label=label)
     script = f"const file = e.target.files[0]; if (file) emit(await {content});"
     return box.on("change", take, js_handler=f"async (e) => {{ {script} }}")
 
 
 _ROLES = {"": "–", "contact": "contact", "held": "held", "radiating": "radiates"}
-"""Faces of the housing that are neither held nor in contact radiate where none is chosen."""
+"""Other faces of the housing radiate where none is chosen."""
 _OF_NEEDLE = {"": "–", "contact": "contact"}
 _CLICKS = {
     "contact": "contact face",
@@ -336,7 +336,7 @@ class FacesStep:
         self._boxes[name], self._rows[name] = box, row
 
     def _in_scene(self, act: Callable[[Scene], None]) -> None:
-        """Have the picture do something, once it is there."""
+        """Act on the picture, once it is there."""
         if self._scene is not None:
             act(self._scene)
 
@@ -349,7 +349,7 @@ class FacesStep:
     # ----------------------------------------------------------------------- what is chosen
 
     def _missing(self) -> str:
-        """The role that is asked for next; empty where nothing needed is missing."""
+        """Role to choose next; empty if nothing is missing."""
         plan = self._plan()
         if not all(plan.of(body, "contact") for body in BODIES):
             return "contact"
@@ -396,6 +396,6 @@ class FacesStep:
 
 
 def _set_value(box: ui.element, value: str) -> str:
-    """Script: Vue would leave a choice that the user made before."""
+    """Script, since Vue would leave an earlier choice."""
     assert value in _ROLES
     return f"(e => {{ if (e) e.value = '{value}'; }})(document.getElementById('c{box.id}'))"

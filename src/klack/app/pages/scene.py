@@ -1,4 +1,4 @@
-"""Bodies in three dimensions on a page: the component of ``klack show``, fed from the server."""
+"""Bodies in three dimensions on a page: the component of ``klack show``."""
 
 import asyncio
 from collections.abc import Callable, Mapping
@@ -16,7 +16,7 @@ __all__ = ["Scene", "showing_page"]
 
 
 Pick = Callable[[str, str], Any]
-"""Called with the names of a body and of one of its faces."""
+"""Called with the names of a body and a face."""
 
 
 class Scene(Element, component="scene_element.js"):  # type: ignore[call-arg]
@@ -63,7 +63,7 @@ class Scene(Element, component="scene_element.js"):  # type: ignore[call-arg]
         self.run_method("setVisible", body, on)
 
     def set_roles(self, roles: Mapping[str, str]) -> None:
-        """Mark faces, ``needle.tip``, as ``"contact"`` or ``"held"``; all others as neither."""
+        """Mark faces, ``needle.tip``, as ``"contact"``, ``"held"`` or neither."""
         self._props["roles"] = dict(roles)
         self.update()
 
@@ -74,7 +74,7 @@ def _told(handler: Pick, name: Any) -> Any:
 
 
 async def showing_page(state: State, given: Mapping[str, str]) -> None:
-    """The page of one case, as it stands in the editor, or of one result."""
+    """Page of one case, as in the editor, or of one result."""
     path = given.get("path", "")
     is_result = await asyncio.to_thread(state.folder.exists, f"{path}/{RESULT_NAME}")
     place = str(await asyncio.to_thread(state.folder.absolute, path))

@@ -1,4 +1,4 @@
-"""Sliders that answer: force, motion, bands and sound of the stored bodies."""
+"""Sliders: force, motion, bands and sound of the stored bodies."""
 
 import asyncio
 from collections.abc import Mapping
@@ -188,7 +188,7 @@ class _Sliders:
     # ----------------------------------------------------------------------- what is computed
 
     async def _follow(self) -> None:
-        """Answer the latest position; what takes longer once the sliders rest."""
+        """Answer the latest position; take longer once the sliders rest."""
         client = self._body.client
         judged, answers = False, 0
         while not client._deleted:
@@ -221,7 +221,7 @@ class _Sliders:
                 self._took.update()
 
     async def _judge(self) -> None:
-        """Two requests, so that a move waits for one of them at most."""
+        """Two requests, so that a move waits for one at most."""
         if self._is_refused:
             return  # the move has told it
         values = dict(self._values)
@@ -259,7 +259,7 @@ class _Sliders:
             self._show_number(heard.number, heard.number if self._is_pinned else heard.pinned)
 
     def _refuse(self, error: KlackError) -> None:
-        """Only the error and the pinned design: nothing of an earlier position stays beside it."""
+        """The error and the pinned design alone: nothing of an earlier position."""
         with self._body:
             self._draw(replace(_NOTHING, doubts=(str(error),)))
             self._is_refused = True
@@ -317,7 +317,7 @@ class _Sliders:
     # ----------------------------------------------------------------------- what is asked
 
     def _pin(self) -> None:
-        """The answer that follows is the pinned one, with all that is computed after it."""
+        """Pin the next answer, with all that follows it."""
         self._pins = True
         self._moved.set()
 
@@ -335,7 +335,7 @@ class _Sliders:
         self._moved.set()
 
     async def _write(self) -> None:
-        """Keep the text as the draft of the case, and open the editor."""
+        """Keep the text as draft, and open the editor."""
         try:
             text = await self._worker.call("text_at", dict(self._values))
         except KlackError as error:

@@ -1,4 +1,4 @@
-"""A study on the pages: what stands above its text, and the page of its points."""
+"""A study on pages: above its text, and the page of its points."""
 
 import asyncio
 import time
@@ -42,7 +42,7 @@ _WORDS = {"done": "complete", "cancelled": "stopped", "failed": "failed"}
 
 
 class StudyPanel:
-    """Start, watch, stop and resume the study of a file, or of a case with a study in it."""
+    """Start, watch, stop and resume the study of a file."""
 
     def __init__(self, state: State, path: str) -> None:
         self._state, self._path = state, path
@@ -51,7 +51,7 @@ class StudyPanel:
         self._seen: tuple[object, ...] | None = None
 
     def build(self) -> None:
-        """Make the places; they are filled once the text has been checked."""
+        """Make places, filled after the first check."""
         with ui.element("section").classes("k-sheet k-pad").style("margin-bottom:16px"):
             with ui.element("div").classes("k-head"):
                 self._choice = ui.element("div").style("flex:1 1 240px;min-width:0")
@@ -65,7 +65,7 @@ class StudyPanel:
         ui.timer(_EVERY, self._follow)
 
     async def checked(self, text: str, found: Checked) -> None:
-        """Check a text that is a study by itself with its case, too."""
+        """Check a study by itself with its case, too."""
         self._text = text
         if found.error or not found.has_study:
             self._tell("", "", found)
@@ -99,7 +99,7 @@ class StudyPanel:
         self._show_choice(cases, found)
 
     def _cases(self) -> tuple[str, ...]:
-        """Case files of the folder, those of the same folder first."""
+        """Case files, those of the same folder first."""
         cases = [case for case in self._state.folder.look().cases if case != self._path]
         here = self._path.rpartition("/")[0]
         return tuple(sorted(cases, key=lambda case: case.rpartition("/")[0] != here))
@@ -147,7 +147,7 @@ class StudyPanel:
     # ----------------------------------------------------------------------- runs
 
     async def _start(self, command: str) -> None:
-        """Start with what is saved: the text on the page may be newer."""
+        """Start what is saved: the page may be newer."""
         try:
             saved = await asyncio.to_thread(self._state.folder.case_text, self._path)
             if saved != self._text:
@@ -166,7 +166,7 @@ class StudyPanel:
         await self._follow()
 
     def _chosen(self) -> str:
-        """The case, unless the study itself tells it: another one has results of its own."""
+        """The case, unless the study names it: another case has its own results."""
         return "" if self._own or self._case == self._named else self._case
 
     async def _follow(self) -> None:
@@ -188,7 +188,7 @@ class StudyPanel:
 
 
 def show_study_run(state: State, job: Job) -> None:
-    """Progress of a study, with what can be done about it."""
+    """Progress of a study, with actions."""
     word = "klack optimise" if job.command == "optimise" else "klack study"
     running = job.state == "running"
     with ui.element("div"):
@@ -239,7 +239,7 @@ _OFTEN = 1.5  # [s] that the run is looked at
 
 
 async def study_points_page(state: State, given: Mapping[str, str]) -> None:
-    """The page of one result, also of one that is being computed."""
+    """Page of one result, complete or not."""
     out = given.get("path", "")
     ui.add_head_html(
         '<link rel="stylesheet" href="/static/points.css">'
@@ -253,7 +253,7 @@ async def study_points_page(state: State, given: Mapping[str, str]) -> None:
 
 
 class _Page:
-    """What the server has of the page; charts and table are drawn in the browser."""
+    """Server side of the page; the browser draws charts and table."""
 
     def __init__(self, state: State, out: str, job: Job | None) -> None:
         self._state, self._out, self._job = state, out, job
@@ -261,7 +261,7 @@ class _Page:
         self._is_busy, self._plays = False, False
 
     def build(self) -> None:
-        """Places that the script of the page fills, and the tools of the chosen point."""
+        """Places for the script, and tools for the chosen point."""
         with element("div", id="kp-root", data_path=self._out):
             self._tools = ui.element("div").classes("k-head")
             self._show_tools()
@@ -345,7 +345,7 @@ class _Page:
             await self._listen()
 
     async def _listen(self) -> None:
-        """Compute the click of the chosen point; of several asked for meanwhile the latest."""
+        """Compute the click of the chosen point, the latest if several."""
         if self._is_busy or self._point is None:
             return
         self._is_busy = True
@@ -395,7 +395,7 @@ class _Page:
         return await asyncio.to_thread(beside_case, self._state.folder, job, name, text)
 
     async def _write_case(self) -> None:
-        """Write the case of the chosen point beside the case of the study, and offer it."""
+        """Write the case of the chosen point beside that of the study, and offer it."""
         point = self._point
         if point is None:
             return

@@ -1,1 +1,1 @@
-"""Expensive results, cached on disk under a key of everything that they depend on."""
+"""Expensive results, cached on disk under a key of all that they depend on."""

@@ -48,12 +48,12 @@ _PREFIX = len(_MAGIC) + 32 + 8
 
 
 class DamagedEntry(Exception):
-    """The content of the file is not what was written for this key."""
+    """Content that was not written for this key."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Entry:
-    """Arrays by name, which come back with type, shape, order of storage and bits; and a text."""
+    """Arrays by name, which keep type, shape, order and bits; and a text."""
 
     arrays: Mapping[str, NDArray[Any]]
     text: str = ""
@@ -119,7 +119,7 @@ def read_entry(path: Path, key: str) -> Entry:
 
 
 def _open_trusted(path: Path) -> int:
-    """Handle of a file that only the caller or the administrator can write."""
+    """Handle of a file that only caller or administrator can write."""
     handle = os.open(path, os.O_RDONLY | SAFELY)
     state = os.fstat(handle)
     trusted = caller() is None or state.st_uid in (caller(), 0)
@@ -130,7 +130,7 @@ def _open_trusted(path: Path) -> int:
 
 
 def _fill(file: BufferedReader, header: Any, key: str, left: int, digest: Any) -> Entry:
-    """The arrays that the header announces must fill the file exactly."""
+    """Announced arrays must fill the file exactly."""
     if header["key"] != key:
         raise DamagedEntry("of another key")
     table = [(str(name), _known(kind), tuple(shape), order == "F") for name, kind, shape, order

@@ -1,4 +1,4 @@
-"""Compute once, and take it from the cache ever after."""
+"""Compute once, then take it from the cache."""
 
 import hashlib
 import os
@@ -20,7 +20,7 @@ __all__ = ["origin", "remembered", "source_files"]
 
 
 FORMAT = 1
-"""Number of the way results are stored; a new one makes old entries unknown."""
+"""Version of stored results; a new one hides old entries."""
 
 _DISTRIBUTIONS = (
     *("numpy", "scipy", "numba", "netgen-mesher", "netgen-occt"),
@@ -52,7 +52,7 @@ def origin() -> str:
 
 
 def source_files(place: Path) -> list[Path]:
-    """Files of Python of a folder, or the file itself; never none, which would change no key."""
+    """Python files of a folder, or the file; never none, which would change no key."""
     found = [place] if place.is_file() else list(place.rglob("*.py"))
     if not found:
         raise FileNotFoundError(f"no source of klack in {place}")

@@ -1,4 +1,4 @@
-"""A folder of results under their keys: bounded, safe to delete, never the reason of a failure."""
+"""Results under keys: bounded, safe to delete, never the reason of a failure."""
 
 import os
 import re
@@ -63,7 +63,7 @@ class ResultCache:
         self._room = 0.0  # [byte] that may be written before the next look at the folder
 
     def load(self, key: str, kind: str) -> Entry | None:
-        """Entry of a key, None if there is none that is whole."""
+        """Whole entry of a key."""
         path = self._path(key)
         entry = None
         with suppress(OSError, DamagedEntry, MemoryError):
@@ -79,7 +79,7 @@ class ResultCache:
         return entry
 
     def store(self, key: str, entry: Entry) -> None:
-        """Keep a result; without effect where that is not possible."""
+        """Keep a result, if possible."""
         if not self._writable:
             return
         try:
@@ -155,7 +155,7 @@ class ResultCache:
                     yield Path(place.path), state.st_size, state.st_mtime
 
     def _keep_within_limit(self) -> None:
-        """Delete what was not used for longest; looking at a file takes 10 us."""
+        """Delete the least recently used; looking at a file takes 10 us."""
         files = sorted(self._files(), key=lambda file: file[2])
         old = time.time() - _FORGOTTEN
         total = sum(size for _, size, _ in files)
@@ -187,7 +187,7 @@ _UNITS = {"": 1, "B": 1, "KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
 
 
 def result_cache() -> ResultCache | None:
-    """Cache that the environment names; that of the user without; None where it is off."""
+    """Cache by the environment, else of the user; None if off."""
     text = os.environ.get(FOLDER_VARIABLE, "").strip()
     if text.lower() in _OFF:
         return None

@@ -1,1 +1,1 @@
-"""Compiled functions: how they are marked, and where their machine code is kept."""
+"""Compiled functions: marks, and storage of machine code."""

@@ -1,4 +1,4 @@
-"""Where machine code is kept: a folder of the caller that no other user can write to."""
+"""Folder for machine code: the caller's, not writable for others."""
 
 import os
 import shutil
@@ -23,7 +23,7 @@ __all__ = [
 ]
 
 FOLDER_VARIABLE = "NUMBA_CACHE_DIR"
-"""Environment variable that names another parent folder; numba uses it as well."""
+"""Variable for another parent folder, also of numba."""
 _NAME, _BYTECODE = "klack-compiled", "bytecode"
 
 
@@ -42,7 +42,7 @@ def compiled_folder() -> Path | None:
 
 
 def is_trusted(state: os.stat_result) -> bool:
-    """Whether only the caller or the administrator can have written a file or folder."""
+    """Whether only caller or administrator can have written a file or folder."""
     if caller() is None:
         return True
     return state.st_uid in (0, caller()) and not state.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
@@ -71,12 +71,12 @@ def bytecode_folder() -> Path | None:
 
 
 def _is_sticky(state: os.stat_result) -> bool:
-    """Whether others may add to a folder, but not rename what is there (``/tmp``)."""
+    """Whether others may add to a folder but rename nothing (``/tmp``)."""
     return bool(state.st_uid in (0, caller()) and state.st_mode & stat.S_ISVTX)
 
 
 def is_usable(folder: Path | None) -> bool:
-    """Whether code can be written to the folder, now or once it is made."""
+    """Whether code can be written there, now or once it is made."""
     if folder is None:
         return False
     there = next((path for path in (folder, *folder.parents) if path.exists()), None)
@@ -86,7 +86,7 @@ def is_usable(folder: Path | None) -> bool:
 
 
 def stored(folder: Path) -> tuple[int, int]:
-    """Count the functions that are kept, and the bytes of all files of the folder."""
+    """Count functions, and bytes of all files of the folder."""
     count = size = 0
     with suppress(OSError):
         for entry in os.scandir(folder):
@@ -97,7 +97,7 @@ def stored(folder: Path) -> tuple[int, int]:
 
 
 def clear_folder(folder: Path) -> None:
-    """Delete what is kept, bytecode too, except what another process writes at this moment."""
+    """Delete all, bytecode too, except what another process is writing."""
     with suppress(FileNotFoundError):
         for entry in os.scandir(folder):
             if entry.name.endswith((".code", ".part")):
@@ -107,7 +107,7 @@ def clear_folder(folder: Path) -> None:
 
 @cache
 def warn_once(folder: Path | None, reason: str) -> None:
-    """Say once in this process why nothing is kept."""
+    """Say once per process why nothing is kept."""
     warnings.warn(
         f"compiled functions are not cached: {reason} ({folder or 'no home directory'}), so every "
         f"command compiles them again. Try: {FOLDER_VARIABLE} with a folder of your own.",

@@ -82,7 +82,7 @@ def _surroundings() -> str:
 
 
 def _type_words(kind: Any) -> str:
-    """Name of a numba type; of a named tuple also its class and fields, which numba leaves out."""
+    """Name of a numba type, with class and fields of a named tuple."""
     if isinstance(kind, types.BaseNamedTuple):
         cls = kind.instance_class
         inner = ", ".join(map(_type_words, kind.types))
@@ -96,7 +96,7 @@ def _type_words(kind: Any) -> str:
 
 @cache  # functions are not rewritten while the process lives
 def _origin(dispatcher: Any) -> str:
-    """Digest of a function and of all that it reaches."""
+    """Digest of a function and all that it reaches."""
     known: dict[Any, str] = {}
     left = [dispatcher]
     while left:
@@ -109,7 +109,7 @@ def _origin(dispatcher: Any) -> str:
 
 @cache
 def _own_words(dispatcher: Any) -> tuple[str, tuple[Any, ...]]:
-    """Digest of a function alone, and the compiled functions that it names."""
+    """Digest of a function alone, and the compiled ones that it names."""
     function = dispatcher.py_func
     calls: list[Any] = []
     words = [
@@ -151,7 +151,7 @@ def _outside(function: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _value(value: Any, calls: list[Any]) -> str:
-    """Words for what is behind a name; compiled functions are added to ``calls``."""
+    """Words for a value; compiled functions are added to ``calls``."""
     if isinstance(value, Marked):
         value = value.made
     if isinstance(value, Dispatcher):
@@ -179,7 +179,7 @@ def _value(value: Any, calls: list[Any]) -> str:
 
 
 def _of_file(value: Any) -> str:
-    """A class, an intrinsic or a plain function: by its name and the content of its file."""
+    """Class, intrinsic or plain function, by name and content of its file."""
     plain = getattr(value, "_defn", value)  # of an intrinsic
     module = getattr(plain, "__module__", "") or ""
     name = getattr(plain, "__qualname__", type(plain).__qualname__)
@@ -208,7 +208,7 @@ _UNREADABLE = (
 
 
 class CompiledStore(_Cache):
-    """Machine code of one function; what numba asks before and after it compiles."""
+    """Machine code of one function, as numba asks for it."""
 
     def __init__(self, dispatcher: Any) -> None:
         self._dispatcher = dispatcher
@@ -232,7 +232,7 @@ class CompiledStore(_Cache):
         """Nothing is dropped: another key is another file."""
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Compiled function for a signature, also from a process that compiles it now, or None."""
+        """Compiled function, also from a process that compiles it now, or None."""
         folder = compiled_folder()
         if not self._is_on or folder is None:
             return None
@@ -256,7 +256,7 @@ class CompiledStore(_Cache):
         return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep what was compiled for a signature, where that is possible."""
+        """Keep compiled code, if possible."""
         folder = compiled_folder()
         if not self._is_on or folder is None:
             return
@@ -308,7 +308,7 @@ def _prepared(folder: Path) -> bool:
 
 
 def _read_whole(path: Path) -> bytes | None:
-    """None for a file that is damaged, or that another user can have written."""
+    """None for a file that is damaged, or may be another user's."""
     try:
         with path.open("rb") as file:
             if not (is_trusted(os.fstat(file.fileno())) and is_trusted(path.parent.stat())):

@@ -36,12 +36,12 @@ class InnerCode(CPUCodeLibrary):
 
     @staticmethod
     def is_stored_in(state: tuple[Any, ...]) -> bool:
-        """Whether a stored result of compiling is that of an inner function."""
+        """Whether a stored result is an inner function."""
         return bool(state[0][1] == _KIND)
 
     @classmethod
     def restored(cls, target_context: Any, state: tuple[Any, ...]) -> CompileResult:
-        """Result of compiling, from what was stored of it."""
+        """Compiled result, from storage."""
         (name, _, content), fndesc, environment, signature, _, lifted, words, reload_init, _ = state
         for prepare in reload_init:
             prepare()
@@ -69,11 +69,11 @@ class InnerCode(CPUCodeLibrary):
 
     @property
     def codegen(self) -> "InnerCode":
-        """Where numba would note objects that machine code uses."""
+        """Where numba would note objects of machine code."""
         return self
 
     def set_env(self, name: str, environment: Any) -> None:
-        """Refuse objects of Python, which only functions with machine code can use."""
+        """Refuse Python objects, which need machine code."""
         if environment.consts:
             raise AssertionError(f"inner functions use no objects of Python: {self.name}")
 
@@ -100,7 +100,7 @@ class InnerCode(CPUCodeLibrary):
 
 
 class _Options(Flags):
-    """Options of a function, equal if the same ones were given."""
+    """Options, equal if given alike."""
 
     def __eq__(self, other: object) -> bool:
         if isinstance(other, _Options):
@@ -136,7 +136,7 @@ class InnerCompiler(EntryCompiler):
     """Compiler of functions that only compiled ones call."""
 
     def compile_extra(self, func: Callable[..., Any]) -> Any:
-        """Compile a plain function as far as its callers need it."""
+        """Compile as far as callers need."""
         self.state.library = InnerCode(self.state.targetctx.codegen(), func.__qualname__)
         return super().compile_extra(func)
 

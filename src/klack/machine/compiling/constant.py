@@ -1,4 +1,4 @@
-"""Two places at which a derivative is not that of the operations on a number."""
+"""Two derivatives that do not follow from the operations."""
 
 from typing import Any
 

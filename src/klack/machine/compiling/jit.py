@@ -1,4 +1,4 @@
-"""Marks of functions that are compiled at their first call, and kept for later processes."""
+"""Marks of functions to be compiled at the first call and kept."""
 
 from collections.abc import Callable
 from functools import partial
@@ -75,7 +75,7 @@ def _dispatcher(function: Callable[..., Any], **options: Any) -> Any:
 
 
 def _call_template(dispatcher: Any, args: Any, kws: Any) -> Any:
-    """Template of a call from compiled code: numba would compile anew for every literal number."""
+    """Call template: numba would compile anew for every literal number."""
     from numba import types
 
     plain = tuple(map(types.unliteral, args))

@@ -1,4 +1,4 @@
-"""A stand-in for a function that numba compiles, until numba, slow to load, is needed."""
+"""Stand-in for a compiled function until slow numba is needed."""
 
 from collections.abc import Callable
 from functools import cached_property, update_wrapper
@@ -8,7 +8,7 @@ __all__ = ["Marked"]
 
 
 class Marked:
-    """A function; ``make`` makes of it what numba calls, or compiles calls of."""
+    """A function; ``make`` gives what numba calls, or compiles calls of."""
 
     def __init__(self, function: Callable[..., Any], make: Callable[..., Any]) -> None:
         update_wrapper(self, function)
@@ -33,7 +33,7 @@ class Marked:
 
     @cached_property
     def _numba_type_(self) -> Any:
-        """Type of what it stands for, where a compiled function names it."""
+        """Type behind it, where a compiled function names it."""
         from numba.core.registry import cpu_target
 
         cpu_target.typing_context.refresh()  # an intrinsic is registered as it is made

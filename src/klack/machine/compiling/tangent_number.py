@@ -26,11 +26,11 @@ from numba.extending import intrinsic, models, register_model
 __all__ = ["TangentNumber", "tangent_number", "with_tangents"]
 
 _RULES = sha256(Path(__file__).read_bytes()).hexdigest()[:12]
-"""In the name of the type, and so in the key of all machine code made with it."""
+"""Part of the type name, and so of all keys of its machine code."""
 
 
 class TangentNumber(types.Type):  # as a number, numba would ask NumPy for its kind
-    """Numba type of a number with derivatives; ``lanes`` is one more than there are directions."""
+    """Numba type of a number with derivatives; ``lanes`` is their count plus one."""
 
     def __init__(self, lanes: int) -> None:
         self.lanes = lanes
@@ -67,7 +67,7 @@ _REAL = ir.DoubleType()
 
 
 class _Lanes:
-    """Rules of calculus for vectors of one length; ``context`` of numba, ``builder`` of LLVM."""
+    """Rules of calculus for vectors of one length."""
 
     def __init__(self, context: Any, builder: Any, kind: TangentNumber) -> None:
         self.context, self.builder, self.count = context, builder, kind.lanes
@@ -150,7 +150,7 @@ def _lifted(args: Any) -> TangentNumber | None:
 
 
 def _typed(function: Any, resolve: Callable[[Any], Any]) -> None:
-    """Let a function have the signature that ``resolve`` finds for its arguments, or None."""
+    """Give a function the signature that ``resolve`` finds, or None."""
 
     @infer_global(function)
     class _Template(AbstractTemplate):
@@ -168,7 +168,7 @@ def _of_two(args: Any) -> Any:
 
 
 def _of_one(result: Any) -> Callable[[Any], Any]:
-    """Signature of a function of one number; ``result`` None: a number of the same type."""
+    """Signature of a function of one number; ``result`` None: the same type."""
     return lambda args: (
         signature(result or args[0], args[0])
         if len(args) == 1 and isinstance(args[0], TangentNumber)
@@ -177,7 +177,7 @@ def _of_one(result: Any) -> Callable[[Any], Any]:
 
 
 def _lowered(rule: Callable[..., Any], *functions: Any) -> None:
-    """Both operands with derivatives, or one of them plain."""
+    """Both operands with derivatives, or one plain."""
     pairs = ((TangentNumber, TangentNumber), (TangentNumber, types.Float))
     for function in functions:
         for pair in (*pairs, (types.Float, TangentNumber)):
@@ -304,7 +304,7 @@ def _absolute(of: _Lanes, x: Any) -> Any:
 def _smooth(
     function: Any, slope: Callable[[_Lanes, Any, Any], Any]
 ) -> Callable[[_Lanes, Any], Any]:
-    """Rule of a function whose slope follows from its argument and its value."""
+    """Rule of a function whose slope follows from argument and value."""
 
     def rule(of: _Lanes, x: Any) -> Any:
         a = of.value(x)
@@ -315,7 +315,7 @@ def _smooth(
 
 
 def _slope_of_root(of: _Lanes, a: Any, root: Any) -> Any:
-    """Zero has no slope: it is taken as zero, as where a product with it has one."""
+    """Zero, without a slope, gets zero, as where a product has one."""
     slope = of.builder.fdiv(_real(0.5), root)
     return of.chosen(of.builder.fcmp_ordered(">", root, _real(0.0)), slope, _real(0.0))
 
@@ -392,7 +392,7 @@ _extreme(min, "<")
 
 
 def _with(kind: Any, number: TangentNumber) -> Any:
-    """Type of a bundle in which each array of floats has its lanes along its last axis."""
+    """Type of a bundle whose float arrays have lanes along the last axis."""
     if isinstance(kind, types.Array) and kind.dtype == types.float64:
         return number if kind.ndim == 1 else types.Array(number, kind.ndim - 1, "C")
     if isinstance(kind, types.NamedTuple | types.NamedUniTuple):

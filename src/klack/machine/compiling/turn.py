@@ -19,7 +19,7 @@ from klack.files.own import open_own_file
 __all__ = ["WAITING", "Turn", "take_turn"]
 
 WAITING = "klack:wait"
-"""Event of numba's kind while this process waits for another one that compiles."""
+"""Event of numba's kind while another process compiles."""
 
 _PAUSE = 0.02  # [s]
 _PATIENCE = 60.0
@@ -30,7 +30,7 @@ The other one may be stopped (Ctrl-Z) or starved; what it has compiled is in the
 
 
 class Turn:
-    """A locked file; without one, no process is kept out."""
+    """Locked file; without one, no process is kept out."""
 
     def __init__(self, path: Path, handle: int | None) -> None:
         self._path, self._handle = path, handle
