@@ -35,15 +35,13 @@ class Analysis(Generic[Kept]):
     Parameters
     ----------
     json
-        Of what ``to_json`` returns: a typed dictionary whose ``schema`` names it.
+        Typed dictionary that ``to_json`` returns; its ``schema`` names it.
     to_json
-        Its numbers, SI, the unit in the key.
+        Numbers in SI, the unit in the key.
     told
-        What a terminal shows of it, in this order.
-    measures
-        Its catalogue, by what they are of.
-    measured
-        What its measures are of: levels, variants, impacts, shots, by name.
+        What a terminal shows, in order.
+    measures, measured
+        Its catalogue, and what it is of: levels, variants, impacts, shots, by name.
     """
 
     json: Any
@@ -57,13 +55,8 @@ class Analysis(Generic[Kept]):
 class StoredAnalysis(Analysis[Kept]):
     """An analysis whose record is stored and reported.
 
-    Parameters
-    ----------
-    page
-        Function that makes the report of a record, ``"noise.content:noise_content"``; loaded with
-        all its figures when a report is asked for.
-    renewed
-        Brings what an earlier version has stored to what this one stores.
+    ``page``, ``"noise.content:noise_content"``, makes the report and is loaded for it alone;
+    ``renewed`` brings results of earlier versions up to date.
     """
 
     form: RecordFormat
@@ -73,8 +66,7 @@ class StoredAnalysis(Analysis[Kept]):
     def content(self, record: Kept, *, result: str = "", case: str = "") -> Content:
         """Report of a record, in words, tables and figures.
 
-        ``result`` and ``case``, the folder of the result and what it was computed from, are named
-        in its commands as typed at a terminal.
+        ``result`` and ``case`` stand in its commands, as typed at a terminal.
         """
         content: Content = named(self.page)(record)
         return content.placed(result=result, case=case)

@@ -23,12 +23,12 @@ class Entry:
     place
         Of its :class:`~klack.analyses.analysis.Analysis`, ``"shots.analysis:SHOTS"``.
     form
-        Name of the format of its record; empty where none is stored.
+        Format of its record; empty if none is stored.
     example
         Of its command, ``"klack shots demo-shots"``: the function ``shots`` of the module
         ``command`` in the same folder; empty without one.
     others
-        Examples of further commands in that module.
+        Examples of further commands there.
     """
 
     place: str

@@ -53,15 +53,7 @@ def write_result(
 ) -> Mark | None:
     """Write a result to a folder, with no report of an earlier one beside it.
 
-    Parameters
-    ----------
-    unfinished
-        Finished parts that are not needed any more once the result stands.
-
-    Returns
-    -------
-    mark
-        For :func:`add_report`.
+    Returns the ``mark`` for :func:`add_report`; ``unfinished`` parts are dropped then.
     """
     progress("result", 0.0)
     with uninterrupted():
@@ -110,10 +102,9 @@ Stored = TypeVar("Stored", bound="Record")
 
 @dataclass(frozen=True, kw_only=True)
 class Ending(Shown):
-    """What the user wants of a record that is stored.
+    """What the user wants of a stored record.
 
-    ``case`` is what the result is computed from, as typed at a terminal; empty if not from one
-    case.
+    ``case`` is its source, as typed at a terminal; empty if there is no single case.
     """
 
     folder: Path
@@ -165,7 +156,7 @@ class Ending(Shown):
         unfinished
             As for :func:`write_result`.
         incomplete
-            Raised at the end: why the record is not all that was asked for.
+            Raised at the end: why the record is incomplete.
         """
         from klack.machine.stages import stages_with_cached
 

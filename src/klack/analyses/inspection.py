@@ -102,16 +102,9 @@ INSPECTED = (*STEP_ENDINGS, *MESH_FORMATS, *MATRIX_FORMATS, ".fmu")
 def inspect_file(
     path: Path, unit_length: float | None = None, matrix: str | None = None
 ) -> tuple[Row, ...]:
-    """Content of a STEP file, a mesh, a matrix or an FMU.
+    """Content of a STEP file, a mesh, a matrix or an FMU, by the endings :data:`INSPECTED`.
 
-    Parameters
-    ----------
-    path
-        With one of the endings of :data:`INSPECTED`.
-    unit_length [m]
-        Of a mesh whose file does not name it.
-    matrix
-        Name of one matrix in a file of several; all of them without.
+    ``unit_length`` [m] is for a mesh whose file does not name it; ``matrix`` one of several.
     """
     ending = path.suffix.lower()
     if not path.is_file():

@@ -49,11 +49,11 @@ class Key(NamedTuple):
     words
         What the name does not say.
     of
-        What it is read from, what the record calls so by default.
+        What it is read from; the attribute of this name by default.
     depth
         From how far above it is inherited.
     after
-        Key that it follows in the schema, where that has another order than the object.
+        Key before it in the schema, if the order differs there.
     """
 
     name: str

@@ -70,16 +70,7 @@ JSON_TYPES: Mapping[str, Any] = {"number": float | None, "whole": int, "truth": 
 class Column:
     """Column of a terminal table with a measure.
 
-    Parameters
-    ----------
-    unit
-        In which people read it; empty for a pure number.
-    factor
-        From SI to that unit.
-    form
-        Format of the number.
-    head
-        Instead of the name of the measure.
+    ``unit`` is that for people, ``factor`` from SI to it; ``head`` replaces the name.
     """
 
     unit: str
@@ -105,39 +96,36 @@ class Measure(Generic[Of]):
     Parameters
     ----------
     key
-        In JSON, before its unit; ``json_name`` is used where that differs.
+        In JSON, before its unit; or ``json_name``.
     name
-        In words, those of the key by default; ``title`` is what a report calls it where that
-        differs.
+        In words, by default of the key; ``title`` in a report, if other.
     symbol
         In formulas.
     unit
-        SI, ``"1"`` for a pure number; empty where ``unit_of`` tells it of each thing.
+        SI, ``"1"`` for a pure number; empty with ``unit_of``.
     definition
         One sentence; ``note`` may add to it in a glossary.
     source
         Page of the documentation; see :func:`described_in`.
     read
-        Its value [unit], nan or None where it does not exist; what stands under its key by
-        default.
+        Its value [unit], nan or None without one; by default that under its key.
     form
         How a report prints it: a ``"quantity"`` with ``digits`` significant digits and a prefix,
         ``"fixed"`` decimals, a ``"share"`` in per cent, a ``"power"`` of ten, a ``"count"``, which
         is that of whole numbers, or with a sign.
     column
-        Of tables on a terminal that show it.
+        In tables on a terminal.
     given
-        Whether a record stands for it as defined; elsewhere it is left out of JSON.
+        Whether a record has it as defined; else JSON leaves it out.
     remark
-        Behind the value in tables, for example that it was cut off; a second line of it, after a
-        line break, stands in reports only.
+        Behind the value in tables, as that it was cut off; a second line is for reports only.
     deviation
         How two runs are compared: by their ``"relative"`` or plain ``"difference"``, by the
         ``"factor"`` between them, or by its level in dB, of an ``"amplitude"`` or an ``"energy"``.
     page
-        Whether it stands among the key numbers of a report.
+        Whether it is a key number of reports.
     absent
-        What tables say where there is no value.
+        For tables without a value.
     unit_of, digits_of
         Unit of the value of one thing, empty for a pure number; its significant digits.
     """

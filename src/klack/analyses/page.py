@@ -34,11 +34,11 @@ def page_of(
     kind
         What was computed.
     subtitle
-        What else stands before date and version.
+        Before date and version.
     answer
-        In one paragraph.
+        One paragraph.
     definitions, limits
-        Terms and their texts.
+        Terms and texts.
     """
     made = f"klack {record.version}"
     heading = (kind, f"case {record.case}", *subtitle, _date_text(record.created), made)

@@ -29,11 +29,11 @@ class PointColumn:
     Parameters
     ----------
     name
-        Key of the case, or name of a measure.
+        Key or measure.
     unit
         SI; ``"1"`` for pure numbers, empty for texts.
     values (points,)
-        Numbers, nan where there is none; of a key without unit what is written there.
+        Numbers or nan; of a key without unit its text.
     """
 
     name: str
@@ -54,16 +54,16 @@ class PointTable:
     Parameters
     ----------
     points
-        Keys that points exchange, in SI; nan or None where a point leaves the case as it is.
+        Changed keys, in SI; nan or None where a point leaves the case as it is.
     measures
-        In the order in which they were asked for; nan where a run does not have the number.
+        In the order asked for; nan where a run does not have the number.
     failures
-        Why a point has no measures: the error of its run; empty where it was computed.
+        Why a point has no measures; else empty.
     warnings
         Doubts about the numbers of each point.
     steps
-        Of strokes: how often their steps were halved, and the largest change over what the accuracy
-        promises that is left with steps twice as long (certified up to 0.5).
+        Of strokes: halvings of the steps, and the largest change over the promised accuracy with
+        steps twice as long (certified up to 0.5).
     """
 
     case: str

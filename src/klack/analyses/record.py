@@ -71,12 +71,10 @@ class CaseRecord(Record):
 
     Parameters
     ----------
-    case
-        Name.
     case_text
         The file itself.
     own_components
-        Components that are not part of klack: first digits of the SHA-256 of their code, by name.
+        SHA-256 (first digits) of components that are not klack's, by name.
     case_notes
         Added to the warnings, each once.
     """

@@ -58,14 +58,9 @@ def with_columns(
     later: Collection[str] = (),
     filled: float = float("nan"),
 ) -> Callable[[Kind], Kind]:
-    """Give a class a column (runs,) for each measure, in its unit.
+    """Give a class a column (runs,) for each measure, in its unit and in stored order.
 
-    Parameters
-    ----------
-    measures
-        In the order in which the columns are stored.
-    later
-        Columns that earlier versions have not stored; ``filled`` stands there instead.
+    Columns ``later`` are missing in earlier versions; ``filled`` stands there instead.
     """
     members = [
         (item.key, Column, field(default_factory=lambda: np.zeros(0)))

@@ -15,20 +15,9 @@ _FEWEST = 5
 
 @dataclass(frozen=True, slots=True)
 class Statistic:
-    """A number that describes a sample.
+    """A number that describes a sample, with its ``key`` in names of measures.
 
-    Parameters
-    ----------
-    key
-        In the name of a measure.
-    name
-        In words.
-    definition
-        Of the values of the sample.
-    of
-        Of values (n,), n > 0; nan where one of them is.
-    fewest
-        Values that it takes to tell more than their ends.
+    ``of`` takes values (n,), n > 0; nan where one is.  ``fewest`` values tell more than their ends.
     """
 
     key: str

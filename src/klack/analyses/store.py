@@ -40,16 +40,14 @@ class RecordFormat:
 
     Parameters
     ----------
-    name
-        Written into the store.
     kind
-        Frozen dataclass of numbers, words, arrays and further such records.
+        Frozen dataclass of numbers, words, arrays and such records.
     command
         That makes it, for messages.
     units
-        By name of the array; a name not listed is stored without a unit.
+        By name of the array.
     tables
-        Members that are long tuples of one kind of record without arrays: an array per field.
+        Long tuples of like records without arrays: an array per field.
     """
 
     name: str

@@ -19,10 +19,9 @@ from klack.input.problem import Key
 __all__ = ["Advice", "Counsel", "Fixed", "Measured", "counsel", "settle"]
 
 _COARSER = {"mesh": 2.0, "layers": 1.5, "modes": 1.0, "step": 4.0}
-"""How much coarser than the coarsest run an advised setting may be; finer is
-:data:`klack.analyses.advice.ladder.REACH`.
+"""How much coarser than the coarsest run an advised setting may be (finer: ``REACH``).
 
-Modes that are left out change more than a power law knows: no fewer than were run.
+Fewer modes than were run change more than a power law knows.
 """
 
 _LEAST_BUDGET = 0.25  # for the settings, where errors that no setting changes take the target
@@ -30,14 +29,9 @@ _LEAST_BUDGET = 0.25  # for the settings, where errors that no setting changes t
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Measured:
-    """A setting, its runs, and where they were made.
+    """A setting and its runs, ``runs`` in words for the table.
 
-    Parameters
-    ----------
-    runs
-        For the table: level, bodies, what was run.
-    at_least
-        Coarsest factor that the target band allows; inf without such a limit.
+    ``at_least`` is the coarsest factor for the target band; inf without a limit.
     """
 
     setting: Setting
@@ -66,16 +60,9 @@ class Fixed:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Counsel:
-    """Advice for one setting.
+    """Advice for one setting: ``values`` [SI] at a ``factor``; 1 keeps the case.
 
-    Parameters
-    ----------
-    values
-        Advised [SI].
-    factor
-        At which they stand; 1 keeps the case.
-    reached
-        Whether the share of the target is met within what may be extrapolated.
+    ``reached``: the share of the target is met within what may be extrapolated.
     """
 
     measured: Measured
@@ -111,27 +98,26 @@ class Counsel:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Advice:
-    """Everything that was measured for one case, and what follows from it.
+    """Everything measured for one case, and what follows from it.
 
     Parameters
     ----------
     level
         ``reduced``, ``interface`` or ``stroke``.
     up_to [Hz]
-        Middle frequency of the highest third octave that is judged; nan for strokes.
+        Middle frequency of the highest judged third octave; nan for strokes.
     band_from_case
         Whether the target band was taken from the force of the case.
     unmeshed
-        Bodies whose meshes were given: their errors are in no sum.
+        Bodies with given meshes: their errors are in no sum.
     dofs
         Of all bodies now, and with the advice.
     times [s]
         Of one run with everything before it: measured, and estimated for the advice.
     checked (m,) each
-        Deviations of the case as it is and of the advised one from the finest run.
+        Deviations of the case and of the advised one from the finest run.
     check_words
         What that was, or why there is none.
-    wall_time [s]
     runs
         Cases that were run in all.
     """
@@ -198,8 +184,8 @@ def settle(
 ) -> tuple[Counsel, ...]:
     """Share the target out over the settings and find the coarsest of each.
 
-    Scores are added although the worst measures of two settings may differ: the sum of every
-    single measure is then within its limit.
+    Scores add up although worst measures of two settings may differ: every single measure is then
+    within its limit.
     """
     spent = sum(score(item.errors, measures) for item in fixed)
     budget = max(1.0 - spent, _LEAST_BUDGET)

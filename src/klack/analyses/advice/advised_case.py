@@ -94,9 +94,9 @@ def _written(now: object, value: float, unit: str) -> str:
 
 
 def advice_yaml(tree: CaseTree, advice: Advice) -> str:
-    """Sections of the case with the advice in them: whole meshes and modes, single other keys.
+    """Sections to merge into the case: whole meshes and modes, single other keys.
 
-    Merged into the case, they give the advised case.  Empty if nothing changes.
+    Empty if nothing changes.
     """
     safe = YAML(typ="safe")
     data: Any = {}

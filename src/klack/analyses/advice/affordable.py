@@ -84,12 +84,7 @@ def affordable(
     """Settle a target, or the tightest multiple of it whose meshes are affordable.
 
     Affordable is what :func:`fits`, with no more than twenty times the degrees of freedom of the
-    case.  For a multiple no setting becomes coarser than the case.
-
-    Parameters
-    ----------
-    size_with
-        Degrees of freedom of all bodies with these values; ``present`` of the case.
+    case (``present``).  For a multiple no setting becomes coarser than the case.
 
     Returns
     -------

@@ -32,14 +32,9 @@ _COLUMNS = (
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class AdvisedCase:
-    """An advice for a case file, and what it writes there.
+    """Advice for a case file, with the sections ``yaml`` of :func:`advice_yaml`.
 
-    Parameters
-    ----------
-    yaml
-        Sections of the case with the advice in them; empty if nothing changes.
-    written
-        File of the whole case with the advice.
+    ``written`` is the file of the whole case with the advice.
     """
 
     advice: Advice

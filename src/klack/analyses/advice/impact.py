@@ -138,8 +138,7 @@ def advise_impact(
     up_to [Hz]
         Target band; by default the highest third octave within 40 dB of the strongest.
     level
-        ``reduced`` or ``interface``, whose results shall be so good; by default reduced, and
-        interface for a case off its axis.
+        ``reduced`` (default) or, by default for a case off its axis, ``interface``.
     confirm
         Run the advised case and compare it with the finest run.
 

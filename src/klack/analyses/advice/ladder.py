@@ -27,14 +27,10 @@ _SMALLEST = 1e-12
 
 @dataclass(frozen=True, kw_only=True)
 class Measure:
-    """One number of a run that is judged.
+    """One judged number of a run.
 
-    Parameters
-    ----------
-    limit
-        Greatest accepted error; inf for a number that is only reported.
-    decibel
-        Errors are in dB, otherwise relative (-).
+    ``limit`` is the greatest accepted error, inf for a number that is only reported; relative (-),
+    or in dB if ``decibel``.
     """
 
     name: str
@@ -55,13 +51,13 @@ class Ladder:
     Parameters
     ----------
     factors
-        Falling, in one constant ratio; 1 is the case.
+        Falling in a constant ratio; 1 is the case.
     differences (k - 1, m)
-        Absolute deviation of each run but the finest from the finest.
+        Absolute deviation from the finest run.
     steps (k - 1,)
-        Norm of the difference between neighbours: what the order is measured on.
+        Norm of the difference between neighbours, which tells the order.
     assumed_order
-        For two runs, which tell no order.
+        For two runs.
     """
 
     factors: tuple[float, ...]
@@ -151,9 +147,9 @@ def coarsest_within(
 def allotment(caps: Sequence[float], budget: float) -> float:
     r"""Share of the target that each setting may use: :math:`\sum_i \min(s, c_i) = b`.
 
-    What a setting cannot use, because even its coarsest is better than that, goes to the others.
-    A tighter target raises every cap and never raises the share, so no setting becomes coarser.
-    ``caps`` are the scores of the settings at their coarsest.
+    What a setting cannot use, even at its coarsest, goes to the others. A tighter target raises
+    every cap and never raises the share, so no setting becomes coarser. ``caps`` are the scores of
+    the settings at their coarsest.
     """
     left = sorted(caps)
     while left:

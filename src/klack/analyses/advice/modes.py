@@ -51,14 +51,10 @@ _RANGE = 40.0  # [dB] below the highest band
 
 
 def impact_measures(error: float, level: float) -> tuple[Measure, ...]:
-    """Measures of one impact.
+    """Measures of one impact, with accepted errors.
 
-    Parameters
-    ----------
-    error [-]
-        Accepted for peak force, contact time and force history (rms, over the peak force).
-    level [dB]
-        Accepted in every third octave of the target band.
+    ``error`` [-] holds for peak force, contact time and force history (rms, over the peak force),
+    ``level`` [dB] for every third octave of the target band.
     """
     return (
         Measure(name="peak force", limit=error),
@@ -194,14 +190,9 @@ def interface_history(
 def mode_setting(
     body: str, choice: ModeChoice, count: int, frequencies: NDArray[np.float64]
 ) -> Setting:
-    """Modes of a body as the case chooses them.
+    """Modes of a body as the case chooses ``count`` of them.
 
-    Parameters
-    ----------
-    count
-        That it keeps.
-    frequencies (k,) [Hz]
-        Of the elastic modes known, ascending; the case keeps some of them.
+    ``frequencies`` (k,) [Hz] of all known elastic modes ascend.
     """
     key = ("reduction", "modes", body)
     kind = "participation" if choice.participation is not None else "count"
@@ -230,17 +221,9 @@ def mode_ladder(
 ) -> Ladder | None:
     """A quarter, half, all and twice the modes of one body, the other bodies with twice theirs.
 
-    At the interface level, where leaving out modes is the only thing that changes: the compliance
-    that they carry goes to the contact points.  None where the pool holds no more modes.
-
-    Parameters
-    ----------
-    pools
-        Twice as many as kept.
-    counts
-        Kept.
-    reference
-        With twice the modes of every body.
+    At the interface level, where leaving out modes is the only change: their compliance goes to the
+    contact points.  None where the pool holds no more modes.  ``counts`` are kept, ``pools`` twice
+    as many; ``reference`` has twice the modes of every body.
     """
     most = {name: 2 * count for name, count in counts.items()}
     if len(pools[body].omega) < most[body]:

@@ -24,8 +24,8 @@ def mesh_settings(
 ) -> tuple[Setting, ...]:
     """Contact region of all bodies together, the growth away from it, then the rest of each body.
 
-    The contact region holds ``mesh.contact`` and the sizes of the touching ``surfaces``; the growth
-    is the grading of all bodies; the rest of a body is its size and those of its other surfaces.
+    The contact region is ``mesh.contact`` and the sizes of the touching ``surfaces``; the growth is
+    the grading of all bodies; the rest of a body are its other sizes.
     """
     contact: list[SettingValue] = []
     names: list[str] = []
@@ -80,7 +80,7 @@ def layer_setting(bodies: Mapping[str, CaseBody]) -> Setting | None:
 def axisymmetric_twin(case: Case, highest: Mapping[str, float]) -> Case | None:
     """The same half sections as axisymmetric bodies; None where a body has no swept profile.
 
-    Refining them changes the same at a hundredth of the cost.  Supports in sectors become supports
+    Refining them changes as much at a hundredth of the cost. Supports in sectors become supports
     all round, the impact is centred, and the modes go as high up as those of the case, ``highest``
     [Hz] by body.
     """
@@ -151,7 +151,7 @@ def unmeshed_notes(bodies: Mapping[str, CaseBody], size_ratio: float = nan) -> l
 
 
 def coarse_contact_notes(size_ratio: float) -> list[str]:
-    """What to make of the warning of a run where finer elements were measured to change little.
+    """Comment on a coarse-mesh warning where finer elements change little.
 
     ``size_ratio`` as in :func:`unmeshed_notes`.
     """

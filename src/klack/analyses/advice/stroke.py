@@ -99,14 +99,9 @@ def advise_stroke(
     """Measure what step, modes and meshes of a valve cost in accuracy at its first impacts.
 
     Contact regions and step are doubled and halved; growth, bodies away from their contacts and
-    modes are refined twice.  Nothing is simulated beyond the first impacts, and no sound is
-    prepared.  Parameters as for :func:`klack.analyses.advice.impact.advise_impact`.
-
-    Raises
-    ------
-    InputError
-        For a valve whose first impact does not come within the run, and for a motion in three
-        dimensions.
+    modes are refined twice.  Runs end after the first impacts, without sound.  Parameters as for
+    :func:`klack.analyses.advice.impact.advise_impact`.  InputError if no impact comes within the
+    run, and for a motion in three dimensions.
     """
     require_axial(case, "klack advise")
     begin = perf_counter()
@@ -218,8 +213,8 @@ def step_ladder(
 ) -> Measured:
     """Twice, once and half the step of the network.
 
-    Where a wave in a line would cross a cell within the doubled macro step, which the network
-    refuses: once, half and a quarter of it, and no longer step is advised.
+    Where a wave in a line would cross a cell within the doubled macro step, which is refused: once,
+    half and a quarter, and no longer step is advised.
     """
     step, doubles = valve.case.run.fine_step, _may_double(valve)
     factors = _NEAR if doubles else _REST

@@ -72,15 +72,14 @@ class CalibrationJson(TypedDict):
 
 
 def calibration_to_json(study: CalibrationStudy) -> CalibrationJson:
-    """Plain numbers in SI, the unit in the key or beside the value.
+    """Plain numbers in SI, the unit in the key or beside the value; None for nan and inf.
 
     Returns
     -------
     dict
         ``parameters``: per name its value, standard error, 95 % interval, start and unit, and the
         interval of its profile likelihood if that was followed; ``residual_rms_um``: of the lift;
-        ``correlation`` of the estimates in the order of the parameters; ``warnings``.  Numbers that
-        do not exist (infinite, nan) are None.
+        ``correlation`` of the estimates in the order of the parameters; ``warnings``.
     """
     profiles = {profile.name: profile for profile in study.profiles}
     parameters: dict[str, Any] = {}

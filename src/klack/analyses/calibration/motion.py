@@ -1,8 +1,8 @@
-"""One stroke with other values of its parameters: what a calibration computes many times.
+"""One stroke with other values of its parameters, computed many times by a calibration.
 
-Meshes, modes and contact laws do not depend on what can be calibrated; they are made once.  A trial
-checks the changed case as a whole, joins its network anew and runs it.  Trials are kept on disk:
-the same command finds those of an interrupted run.
+Meshes, modes and contact laws do not depend on these; they are made once.  A trial checks the
+changed case as a whole, joins its network anew and runs it.  Trials are kept on disk for the same
+command, if it is interrupted.
 """
 
 from base64 import b64decode, b64encode
@@ -52,16 +52,9 @@ third with half the step.
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Motion:
-    """What one trial leaves behind.
+    """Channels (n,) of one trial by role, SI, with a ``step`` [s] from time zero.
 
-    Parameters
-    ----------
-    step [s]
-        Of the channels, which begin at time zero.
-    channels (n,) each
-        By role, SI.
-    impacts [s]
-        Times by "opening" and "seat".
+    ``impacts`` [s] are times by "opening" and "seat".
     """
 
     step: float
@@ -79,16 +72,8 @@ class Motion:
 class MotionModel:
     """A valve of which some numbers of the case are still open.
 
-    Parameters
-    ----------
-    parameters
-        Those that the motion depends on.
-    variant
-        "wet" or "dry".
-    channels
-        Recorded channel of each role.
-    record [s]
-        Spacing of the records.
+    ``parameters`` are those of the motion, ``channels`` recorded ones by role; ``record`` [s] is
+    the spacing of the records.
     """
 
     tree: CaseTree
@@ -270,21 +255,17 @@ class StrokeModel:
     Parameters
     ----------
     parameters
-        All of them, in the order of the fit.
+        All, in the order of the fit.
     pool
-        Computes motions from those parameters that are not of the sensor.
-    sensor
-        Of the case.
+        Computes motions, from parameters that are not of the sensor.
     zeroed
         Whether the lift before the trigger is set to zero.
     time (k,) [s]
         Of the measured strokes.
-    channels
-        Roles that are fitted.
-    counted (k,)
-        Samples that are fitted.
+    channels, counted (k,)
+        Fitted roles and samples.
     duration [s]
-        To compute: up to the last of them.
+        To compute: up to the last fitted sample.
     """
 
     parameters: tuple[FreeParameter, ...]

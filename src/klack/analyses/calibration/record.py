@@ -47,9 +47,9 @@ class CalibratedParameter:
     lower_95, upper_95
         Ends of the 95 % interval, by Student's t.
     start, lower, upper
-        Value before, and the bounds.
+        Value before, and bounds.
     strokes (n,)
-        Value that each stroke alone asks for; nan if the data do not see the parameter.
+        Value for each stroke alone; nan if not seen.
     """
 
     name: str
@@ -87,7 +87,7 @@ class FittedChannel:
     low, high
         Band of 90 % of the measured strokes.
     before, after
-        Computed with the values of the case, and with the calibrated ones.
+        With the values of the case, and calibrated.
     weight
         Of each sample in the fit, inverse variance; 0 outside the windows.
     """
@@ -106,8 +106,8 @@ class FittedChannel:
 class FittedImpact:
     """Time of the first impact on a stop, from the trigger [s]; nan where there is none.
 
-    ``measured`` and ``scatter`` are median and standard deviation of the strokes; the computed ones
-    are with the values of the case and with the calibrated ones.
+    ``measured`` and ``scatter`` are median and standard deviation of the strokes; ``before`` and
+    ``after`` are computed.
     """
 
     stop: str
@@ -121,15 +121,9 @@ class FittedImpact:
 class ProfileCurve:
     """Profile likelihood of one parameter [SI].
 
-    Parameters
-    ----------
-    values (k,)
-    excess (k,) [-]
-        ``Lambda``: squared distance from the best value in standard errors, for a linear model.
-    threshold [-]
-        Of the 95 % interval.
-    lower, upper
-        Ends of that interval; infinite where it is not left within the bounds.
+    ``excess`` [-] is ``Lambda``: squared distance from the best value in standard errors, for a
+    linear model; ``threshold`` that of the 95 % interval from ``lower`` to ``upper``, infinite
+    where it is not left within the bounds.
     """
 
     name: str
@@ -151,22 +145,22 @@ class CalibrationStudy(CaseRecord):
     source
         Measured files, in words.
     strokes, rejected
-        Names of the fitted strokes, and discarded ones with the reason.
+        Names of fitted strokes; discarded ones with the reason.
     correlation, design_correlation (p, p)
         Of the estimates, from the scatter of the strokes; and from the sensitivities alone.
     singular_values (p,)
-        Of the weighted sensitivities by parameters scaled to their bounds.
+        Of weighted sensitivities by parameters scaled to their bounds.
     time (k,) [s]
         From the trigger.
     residual_rms, residual_rms_before [m]
         Of the lift, mean stroke less computed, inside the windows.
     misfit [-]
-        Weighted root mean square residual of the mean stroke, in standard errors of the mean: about
-        1 or less if nothing but scatter is left.
+        Weighted root mean square residual of the mean stroke, in standard errors of the mean: up to
+        about 1 if nothing but scatter is left.
     degrees
         Degrees of freedom of Student's t.
     evaluations, resumed
-        Computed strokes, and those from an earlier, interrupted run.
+        Computed strokes, and those from an interrupted run.
     """
 
     profile_time: float

@@ -81,13 +81,7 @@ _STOPS = {"opening": "opening stop", "seat": "seat"}
 
 
 def calibration_of(case: ValveCase) -> CaseCalibration:
-    """Section ``calibration`` of a case.
-
-    Raises
-    ------
-    InputError
-        If there is none.
-    """
+    """Section ``calibration`` of a case; InputError without one."""
     if case.calibration is None:
         raise InputError(
             f"{case.path or 'case'}: calibration",
@@ -110,22 +104,10 @@ def run_calibration(
 ) -> CalibrationStudy:
     """Fit the parameters of the section ``calibration`` to measured strokes.
 
-    Parameters
-    ----------
-    tree
-        Case of the whole valve, as it was written.
-    folder
-        Keeps computed trials there until it is finished; the same call resumes from them.
-    workers
-        Processes; all cores by default.
-    threads
-        Of the factorisations.
-
-    Raises
-    ------
-    InputError
-        Also for a motion in three dimensions, strokes without the fitted channels, or a lift that
-        goes down where the computed one goes up.
+    Computed trials are kept in ``folder`` until the end; the same call resumes from them.
+    ``workers`` are processes, by default as many as cores; ``threads`` those of factorisations.
+    InputError also for a motion in three dimensions, strokes without the fitted channels, or a lift
+    that goes down where the computed one goes up.
     """
     begin = perf_counter()
     case = tree.case()
@@ -554,7 +536,7 @@ CALIBRATED_NAME = "case_calibrated.yaml"
 def calibrated_text(tree: CaseTree, study: CalibrationStudy, folder: Path) -> str:
     """Text of the case with the values found, for a file in ``folder``.
 
-    Comments and order are those of the author; files are named from the new place.  Errors as of
+    Comments and order stay; files are named from the new place.  Errors as of
     :func:`klack.analyses.advice.advised_case.advised_text`.
     """
     found = {item.name: item for item in study.parameters}

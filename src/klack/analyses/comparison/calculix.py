@@ -40,12 +40,8 @@ __all__ = [
 class OtherRun:
     """One impact that another program computed.
 
-    Parameters
-    ----------
-    energy_swing [-]
-        Largest distance of the total energy from that at the start, over that at the start.
-    iterations
-        Of all steps together.
+    ``energy_swing`` [-] is the largest change of the total energy since the start, relative;
+    ``iterations`` those of all steps.
     """
 
     program: str
@@ -151,13 +147,7 @@ _COMPARISON = JsonForm(
 
 
 def level_of(study: ImpactStudy, name: str) -> LevelResult:
-    """Level of a study by name.
-
-    Raises
-    ------
-    InputError
-        If the study does not hold it.
-    """
+    """Level of a study by name; InputError if it is missing."""
     if name not in study.levels:
         raise InputError(
             f"result of case '{study.case}'",

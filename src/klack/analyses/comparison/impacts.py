@@ -73,12 +73,12 @@ def compare_impact(
     low_pass
         Instead of that of the output.
     known_speed
-        The speed is known and the recordings are absolute: no factor is fitted.
+        The recordings are absolute at a known speed: no factor is fitted.
 
     Raises
     ------
     InputError
-        Also for a record without a pulse that has a front, a plateau and an end.
+        Also for a record without a pulse with front, plateau and end.
     """
     begin = perf_counter()
     clock = StageClock(progress)

@@ -21,23 +21,18 @@ class ComparedPulse:
 
     Parameters
     ----------
-    name
-        Of the recording.
-    channel
-        Read from it, with its unit.
+    name, channel
+        Of the recording; the channel with its unit.
     measured, computed
         In the unit of the output, each on its own clock.
     factor [-]
-        Measured over computed.
-    fitted
-        Whether the factor is fitted; otherwise it is 1.
+        Measured over computed; 1 unless ``fitted``.
     shift [s]
         Computed time minus measured time.
     rms [-]
         Of the difference, over the measured plateau.
     absolute
-        False if the recording cannot be in the unit of the output: it names none, or a scale that
-        klack does not know.
+        False if the recording names no unit of the output, or a scale that klack does not know.
     """
 
     name: str
@@ -58,7 +53,7 @@ class ComparedPulse:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeasuredImpactStudy(CaseRecord):
-    """An impact beside measured pulses of one and the same channel.
+    """An impact beside measured pulses of one channel.
 
     Parameters
     ----------
@@ -69,10 +64,9 @@ class MeasuredImpactStudy(CaseRecord):
     time (n,) [s]
         From half of the plateau in the front of the computed pulse.
     measured (recordings, n)
-        Over the factor of each, so that all belong to the computed speed, upwards.
+        Over their factors: at the computed speed, upwards.
     middle, low, high (n,)
         Median, 5 % and 95 % of the recordings.
-    computed (n,)
     """
 
     level: str

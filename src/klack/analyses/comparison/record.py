@@ -33,13 +33,11 @@ class Compared:
     Parameters
     ----------
     computed
-        Read off the computed lift in the same way as off the measured one; nan if it has none.
-    measured
-        Median of the strokes; nan if they have none.
-    scatter
-        Standard deviation from stroke to stroke; nan for a single stroke.
+        Read off the computed lift like the measured ones; nan without one.
+    measured, scatter
+        Median and standard deviation of the strokes; nan for none, or a single one.
     error
-        Standard error of reading it off one stroke, median of the strokes.
+        Standard error of one reading, median of the strokes.
     count
         Strokes that have it.
     """
@@ -57,10 +55,7 @@ class Compared:
 
     @property
     def in_scatter(self) -> float:
-        """Difference over the scatter, or over the reading error where that is larger [-].
-
-        Of a single stroke, whose scatter is not known, over the reading error.
-        """
+        """Difference over the scatter, or the reading error if that is larger or alone [-]."""
         width = max(self.error, self.scatter) if isfinite(self.scatter) else self.error
         if not isfinite(self.difference) or not width > 0.0:
             return float("nan")
@@ -102,19 +97,17 @@ class HighestShot:
 
     Parameters
     ----------
-    stop
-        ``"opening"`` or ``"seat"``.
     count
-        Strokes of which it is the highest.
+        Strokes in all.
     rebound_height, rebound_height_error [m]
-        With standard error.
+        With standard errors, as below.
     restitution, restitution_error [-]
     by_reading [m]
-        How much too high the highest of so many readings is by their errors alone.
+        Excess of the highest of so many readings by their errors alone.
     above_median [m]
-        How far the highest of so many strokes lies above the median, without reading errors.
+        Distance from the median without reading errors.
     bounces
-        Bounces from this stop, median of the strokes.
+        Median number of bounces from this stop.
     """
 
     stop: str
@@ -145,15 +138,12 @@ class ComparedVariant:
         From the trigger, that of the model too.
     lift, velocity (strokes, n) [m], [m/s]
         Measured.
-    lift_median, lift_low, lift_high (n,) [m]
+    lift_median, lift_low, lift_high, velocity_median, velocity_low, velocity_high (n,)
         Median, 5 % and 95 % of the strokes.
-    velocity_median, velocity_low, velocity_high (n,) [m/s]
-    computed_lift (n,) [m]
-        As the sensor would show it.
-    computed_velocity (n,) [m/s]
-        From it, by the same differentiator as the measured one.
-    velocity_bandwidth [Hz]
-        3 dB of that differentiator; ``velocity_noise`` [m/s] is what it leaves of the noise.
+    computed_lift, computed_velocity (n,) [m], [m/s]
+        As the sensor would show them, with the differentiator of the measured ones.
+    velocity_bandwidth, velocity_noise [Hz], [m/s]
+        3 dB of that differentiator, and the noise that it leaves.
     lift_rms, velocity_rms [m], [m/s]
         Root mean square of computed minus median, over the whole record.
     lift_scatter, velocity_scatter [m], [m/s]
@@ -243,22 +233,18 @@ class MeasuredStrokeStudy(CaseRecord):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeasuredDistribution:
-    """One number of many drops, computed and measured.
+    """One number of many drops, computed (n,) and measured (m,); nan where a shot has none.
 
     Parameters
     ----------
-    name
-        In words.
     unit
         SI; ``""`` for a plain number.
-    computed (n,), measured (m,)
-        One value per shot; nan for a shot without.
     error
-        Standard error of reading it off one drop, median of the drops.
+        Standard error of one reading, median of the drops.
     computed_highest, measured_highest
         Of the shot with the highest rebound.
     centred
-        Of the computed shot that is centred.
+        Of the centred computed shot.
     expected_highest
         Mean over the highest of any m computed shots.
     statistic, significance [-]
@@ -290,12 +276,8 @@ class MeasuredShotsStudy(CaseRecord):
 
     Parameters
     ----------
-    source
-        Files of the measurement.
     names
-        Of the measured drops, in the order of the distributions.
-    sensor
-        In words.
+        Of the measured drops, in order.
     approach_speed [m/s]
         Mean of the computed shots as ``computed``.
     distributions
@@ -303,7 +285,7 @@ class MeasuredShotsStudy(CaseRecord):
     time (k,) [s]
         From the first touch.
     lift (drops, k) [m]
-        Measured, above the seat.
+        Above the seat.
     computed_time (j,) [s]
     computed_height (shots, j) [m]
         Of the centre of mass.

@@ -57,18 +57,16 @@ def compare_shots(
 
     Parameters
     ----------
-    paths
-        Recordings of the drops.
     section
-        With ``zero: none`` the lift is the height above first touch; else the needle has to rest
-        on its seat somewhere in the record.
+        With ``zero: none`` the lift counts from first touch; else the needle must rest on its seat
+        somewhere.
     case_text
-        The case that ``section`` stands in, if it is not that of the study.
+        Case of ``section``, if not that of the study.
 
     Raises
     ------
     InputError
-        Also for recordings with fewer than three drops that can be read.
+        Also for fewer than three readable drops.
     """
     begin = perf_counter()
     used = CaseMeasurement() if section is None else section

@@ -68,15 +68,9 @@ def compare_strokes(
 ) -> MeasuredStrokeStudy:
     """Compare the variants of a stroke study with their measured sets.
 
-    Parameters
-    ----------
-    measurements
-        Files of one set for each variant.
-    section
-        Channels, trigger and sensor; with None, channels are found by their names, each recording
-        is one stroke, and the sensor is perfect.
-    case_text
-        The case that ``section`` stands in, if it is not that of the study.
+    ``measurements`` are files of one set for each variant.  Without a ``section``, channels are
+    found by their names, each recording is one stroke, and the sensor is perfect; ``case_text`` is
+    its case, if not that of the study.
     """
     begin = perf_counter()
     used = CaseMeasurement() if section is None else section
@@ -230,9 +224,9 @@ def _as_noisy(lift: Floats, noise: float, count: int) -> Floats:
 def _computed_lift(
     study: StrokeStudy, variant: StrokeVariant, time: Floats, section: CaseMeasurement
 ) -> tuple[Floats, Floats]:
-    """Grid up to the end of the computation, and the computed lift on it, as the sensor shows it.
+    """Grid up to the end of the computation, and the lift as the sensor shows it.
 
-    Before the start of the computation the valve rests.
+    Before the computation the valve rests.
     """
     result, trigger = variant.result, section.trigger
     lift = result.channels[study.channels.lift].values

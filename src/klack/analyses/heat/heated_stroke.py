@@ -81,17 +81,9 @@ def aspects_of(case: ValveCase) -> tuple[Aspect, ...]:
 def warm_valve(valve: Valve, at: Mapping[Aspect, Temperatures]) -> WarmValve:
     """Valve whose copper, magnets, fluid and gaps have the temperatures of their nodes.
 
-    Parameters
-    ----------
-    valve
-        Built once; bodies and laws stay.
-    at [K]
-        Temperature of every thermal node, for each aspect.
-
-    Raises
-    ------
-    InputError
-        For a gap that growth has closed, and a resistance or remanence that is not above 0.
+    ``at`` has the temperature [K] of every thermal node, for each aspect; bodies and laws of the
+    given valve stay.  InputError for a gap that growth has closed, and a resistance or remanence
+    that is not above 0.
     """
     thermal = _thermal(valve.case)
     parts: dict[str, Component] = dict(valve.case.network.components)
@@ -237,16 +229,10 @@ _LEFT = 0.01  # of the largest current: less at the end of a stroke is none
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HeatedStroke:
-    """What a warm-up keeps of a stroke.
+    """What a warm-up keeps of a stroke: ``losses`` [J] as the energy balance calls them.
 
-    Parameters
-    ----------
-    losses [J]
-        As the energy balance calls them.
-    numbers
-        By the names of :data:`NUMBERS`; nan where the stroke does not have it.
-    values
-        Resistances and gaps at its temperatures, with their units.
+    ``numbers`` by the names of :data:`NUMBERS`, nan where missing; ``values`` are resistances and
+    gaps with their units.
     """
 
     losses: Mapping[str, float]

@@ -15,15 +15,7 @@ Vector = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class WarmColumn:
-    """One quantity at every point.
-
-    Parameters
-    ----------
-    name, unit
-        SI.
-    values (points,)
-        nan where a stroke does not have it.
-    """
+    """One quantity [SI] at every point; nan where a stroke does not have it."""
 
     name: str
     unit: str
@@ -51,11 +43,9 @@ class HeatStudy(CaseRecord):
     period [s]
         From one stroke to the next.
     time (points,) [s]
-        Of a warm-up: infinite for the steady state; of soaked strokes all 0.
-    temperature [K]
-        Of the nodes.
-    heat [W]
-        Mean heat of the strokes into each node.
+        Infinite for the steady state; 0 of soaked strokes.
+    temperature [K], heat [W]
+        Of the nodes, and mean heat of the strokes into them.
     numbers, values
         Of the strokes: delays and peaks; resistances and gaps.
     end
@@ -68,7 +58,7 @@ class HeatStudy(CaseRecord):
     unsent [W]
         Mean power of losses of the last stroke that warm no node.
     strokes, repeats
-        Strokes computed, and steps that were done again.
+        Computed strokes, and repeated steps.
     cpu_time [s]
         Of the strokes.
     """

@@ -131,21 +131,10 @@ def run_heat(
     folder: Path | None = None,
     progress: Progress = silent,
 ) -> HeatStudy:
-    """Follow the warm-up of a valve, or compute its strokes soaked at temperatures.
+    """Follow the warm-up of a valve, or compute its strokes soaked at temperatures [K].
 
-    Parameters
-    ----------
-    variant
-        The first one of the case by default.
-    soak [K]
-        Temperatures of the whole valve, instead of a warm-up.
-    folder
-        Where finished strokes are kept until the result stands; in memory without one.
-
-    Raises
-    ------
-    InputError
-        Without a section ``thermal``, and for heat that has no way out.
+    Finished strokes are kept in ``folder`` until the result stands.  InputError also for heat that
+    has no way out.
     """
     begin = perf_counter()
     name = case.one_variant(variant)

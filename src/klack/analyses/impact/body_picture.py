@@ -46,14 +46,7 @@ def body_pictures(
 ) -> tuple[BodyPicture, BodyPicture]:
     """Pictures of the upper and of the lower body.
 
-    Parameters
-    ----------
-    problem
-        With its factorisations.
-    pair
-        As the case asks.
-    ran
-        The level reduced; without it there is no motion and no stress.
+    Motion and stress are those of the reduced level ``ran``; ``pair`` is as the case asks.
     """
     bodies = (problem.pair.upper, problem.pair.lower)
     faces = (problem.pair.upper_surface.name, problem.pair.lower_surface.name)

@@ -61,12 +61,8 @@ _LINE = 1.79
 class YieldCheck:
     """Where the bodies yield.
 
-    Parameters
-    ----------
-    pressure [Pa]
-        Highest pressure at the force that was asked for; nan where it is not known.
-    needed [Pa]
-        Yield stress from which on both bodies stay elastic up to there.
+    ``pressure`` [Pa] is the highest at the given force, nan if unknown; up to ``needed`` [Pa], the
+    yield stress, both bodies stay elastic there.
     """
 
     pressure: float = nan
@@ -82,26 +78,11 @@ def check_yield(
     *,
     computed: bool = False,
 ) -> YieldCheck:
-    """Compare the pressure with the yield stress of both bodies.
+    """Compare the pressure at the peak force [N] with the yield stress of both bodies.
 
-    Parameters
-    ----------
-    case
-        For the materials.
-    static
-        Of elastic bodies.
-    force [N]
-        Peak force of the impact.
-    surfaces
-        For the message.
-    computed
-        Whether the law of the contact has the yield.
-
-    Warns
-    -----
-    AccuracyWarning
-        Where a body yields, though levels compute it as elastic, and where that yield stress is an
-        estimate that decides whether it does.
+    ``static`` is of elastic bodies; ``computed`` if the law of the contact has the yield.  Warns
+    where a body yields, though levels compute it as elastic, and where an estimated yield stress
+    decides that.
     """
     if not 0.0 < force <= static.max_force:
         return YieldCheck()
@@ -203,22 +184,10 @@ _BEYOND = 0.98
 
 @dataclass(frozen=True, kw_only=True)
 class ContactCheck:
-    """Findings on a contact.
+    """Findings on a contact; see :class:`klack.analyses.impact.record.ContactSummary`.
 
-    Parameters
-    ----------
-    half_width [m]
-        On this mesh.
-    size_ratio [-]
-        Element size across the contact over the half width.
-    points_across
-        Contact points across the whole width.
-    expected [m]
-        Half width of smooth bodies of this shape (Hertz); nan where no law fits.
-    needed_yield [Pa]
-        Yield stress from which on both bodies stay elastic; nan where it is not known.
-    doubts
-        Why no error of this contact can be judged on this mesh, each in a few words.
+    ``expected`` [m] is the half width of smooth bodies of this shape (Hertz); nan where no law
+    fits.
     """
 
     half_width: float
@@ -239,22 +208,10 @@ def check_contact(
     has_yield: bool = False,
     worn_by: float = 0.0,
 ) -> ContactCheck:
-    """Judge a static contact at a force, and warn of what makes it doubtful.
+    """Judge a static contact, placed in touch, at the peak force [N], and warn of doubts.
 
-    Parameters
-    ----------
-    case
-        For the materials.
-    pair
-        Placed as they touch.
-    force [N]
-        Peak of the impact.
-    surfaces
-        For the messages.
-    has_yield
-        Whether the law of the contact has the yield of its faces.
-    worn_by [N]
-        Highest force of the impacts that have worn the faces, 0 for faces as made.
+    ``surfaces`` are named in messages; ``has_yield`` if the law of the contact has it; ``worn_by``
+    [N] is the highest force of the impacts that have worn the faces.
     """
     space, lam = static.space, static.pattern_at(force)
     ratio = size_over_half_width(static, force)
@@ -332,12 +289,7 @@ def _as_drawn(points: NDArray[np.float64], dimension: int) -> NDArray[np.float64
 def force_all_round(record: PressureRecord, peak: float) -> float:
     """Axial force [N] of a centred contact as heavily loaded as the worst part of this ring.
 
-    Parameters
-    ----------
-    record
-        Of points at equal angles of a ring.
-    peak [N]
-        Peak axial force of that impact.
+    ``record`` has points at equal angles; ``peak`` [N] is the peak axial force of its impact.
     """
     turn = np.round(np.arctan2(record.points[:, 1], record.points[:, 0]), 9) + 0.0
     angles, number = np.unique(turn, return_inverse=True)

@@ -54,12 +54,12 @@ class ContactMap:
     shape
         Of axisymmetric bodies ``meridian`` (a ring) or ``disc`` (around the axis).
     along (nc,)
-        Ring: angle round its axis from +x towards +y, 0 to 360 [deg]; spot: x [m]; else 0.
+        Ring: angle from +x towards +y, 0 to 360 [deg]; spot: x [m]; else 0.
     across (nc,) [m]
         Ring: distance along the surface, outwards, from where the bodies touch first.  Spot: y.
         Disc: distance from the axis.  A spot is counted from the centre of its force.
     radius [m]
-        Mean radius of the ring; nan without one.
+        Mean radius; nan without a ring.
     """
 
     shape: Literal["ring", "spot", "meridian", "disc"]
@@ -214,9 +214,9 @@ def line_load_weights(found: ContactMap, cells: Cells) -> Floats:
 
 
 def averaged(values: Floats, cells: Cells) -> Floats:
-    """Moving mean over two cells either way, that is over one quadratic element, shape (ny, nx).
+    """Moving mean (ny, nx) over two cells either way: one quadratic element.
 
-    It holds no share of what lies beyond the surface.
+    What lies beyond the surface has no share.
     """
     inside = (cells.owner >= 0).astype(float)
     size = tuple(2 * width for width in _cell_size(cells))

@@ -45,10 +45,10 @@ def simulate_in_full(
     Parameters
     ----------
     kept
-        Elastic modes that the reduced levels keep: a damping ratio acts on these, as it does
-        there, and they tell when the bodies have parted for good.
+        Elastic modes of the reduced levels: a damping ratio acts on these, as there, and they tell
+        when the bodies have parted for good.
     space
-        Other contact points of the same surfaces than those of the static contact.
+        Other contact points than those of the static contact.
     longest_period, snapshots
         As in :func:`klack.transient.full_order.simulate_full_order`.
 

@@ -104,7 +104,7 @@ def modal_motion(
 
     Parameters
     ----------
-    omega, damping : array, shape (m,) [rad/s], [-]
+    omega, damping (m,) [rad/s], [-]
     loads (n, m)
         Modal force of each interval.
     velocity (m,)
@@ -215,10 +215,7 @@ def interface_gauges(
 ) -> tuple[GaugeRecord, ...]:
     """What the gauges read at the interface level.
 
-    Warns
-    -----
-    AccuracyWarning
-        Where the run is too long to keep the forces of all points: there are no channels then.
+    Warns, without channels, where the run is too long to keep the forces of all points.
     """
     if not problem.pair.gauges:
         return ()

@@ -99,23 +99,18 @@ def build_interface(
     compliance: NDArray[np.float64] | None = None,
     limit: PressureLimit | None = None,
 ) -> InterfaceModel:
-    """Interface-level model of a case.
+    """Interface-level model of a case, before its factorisations are freed.
 
     Parameters
     ----------
-    problem
-        With its factorisations still there.
     ports
         Of both bodies: needed when modes are chosen by participation.
     count
-        Take so many modes of each body, as far as the pool goes, instead of those of the case.
-    space
-        Other contact points of the same surfaces than those of the static contact.
-    compliance (nc, nc) [m/N]
-        Static compliance of both bodies at these.
+        So many modes of each body, as far as the pool goes, instead of those of the case.
+    space, compliance (nc, nc) [m/N]
+        Other contact points than those of the static contact, and the static compliance there.
     limit
-        Of the points of the contact, from :func:`klack.assembling.pressure_limit.pressure_limit`;
-        those of an upper stop stay elastic.
+        Of the contact points; those of an upper stop stay elastic.
     """
     bodies = [
         InterfaceBody(

@@ -44,14 +44,9 @@ _MARGIN = 0.18
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PressureView:
-    """One run: title of its picture, and the forces of its contact points.
+    """One run: title of its picture, and the forces (n, nc) [N] of its contact points.
 
-    Parameters
-    ----------
-    time (n,) [s]
-        Since first touch.
-    force (n, nc) [N]
-    area (nc,) [m^2]
+    ``time`` [s] counts from first touch.
     """
 
     title: str

@@ -44,17 +44,17 @@ class ContactSummary:
     surfaces
         For example ``"needle.tip on housing.seat"``.
     points
-        Number of contact points (mortar multipliers).
+        Contact points (mortar multipliers).
     half_width [m]
         At the highest force of the impact.
     size_ratio [-]
         Element size across the contact over the half width; good up to 1, doubtful above 1.5.
     points_across
-        Loaded contact points across the whole width then; 0 if unknown.
+        Loaded contact points across the width then; 0 if unknown.
     doubts
-        Why no error can be judged on these meshes, each in a few words.
+        Why no error can be judged on these meshes.
     needed_yield [Pa]
-        Yield stress from which on both bodies stay elastic; nan where it is not known.
+        Yield stress from which on both bodies stay elastic; nan if unknown.
     layer
         Asperities of rough faces in words; empty for smooth ones.
     approach, force, area (n,) [m], [N], [m^2]
@@ -170,20 +170,20 @@ class LevelResult:
     wall_time [s]
         Of the time integration alone.
     setup_time [s]
-        Of everything that this level needs before it can run (shared steps counted once each).
+        Of all that this level needs before (shared steps counted once each).
     energies [J]
         After separation, e.g. ``"needle kinetic (rigid)"``, ``"needle vibration"``, ...; the first
         entry is ``"initial kinetic"``.
     energy_residual [-]
         Over the initial kinetic energy.
     pressure
-        Of levels that resolve the contact point by point.
+        Of levels with contact points.
     frictionless
         Without the friction of the faces, where they rub.
     doubts
         Why this level can be no reference for others (:mod:`klack.analyses.impact.trust`).
     gauges
-        Output channels of the case; none at the level lumped.
+        Output channels; none at the level lumped.
     """
 
     level: str
@@ -245,9 +245,9 @@ class BodyPicture:
     Parameters
     ----------
     skin
-        In its place at the start.
+        At the start.
     held (v,)
-        Vertices of the skin that are held.
+        Held vertices of the skin.
     section (s, 2, 3) [m]
         Sides of elements in the plane y = 0.
     finest [m]
@@ -255,21 +255,21 @@ class BodyPicture:
     node (n,)
         Nodes of the mesh on the skin, rising.
     shapes (m, n, dimension)
-        Displacements of these nodes, each in 32767ths of the largest component of its shape: rigid
-        modes, elastic modes, and last the static rest of the contact force if there is one.
+        Displacements of these nodes, in 32767ths of the largest component of a shape: rigid modes,
+        elastic modes, and last any static rest of the contact force.
     scale (m,)
         Displacement of 32767 [m] per unit of its amplitude.
     frequency (m,) [Hz]
         0 of rigid modes; nan of attachment modes and of the static rest.
     instants (frames,) [s]
-        Of the reduced level; empty where it was not computed.
+        Of the reduced level, if computed.
     amplitude (frames, m)
         Of the modes in sqrt(kg) m, of the static rest in N.
     stress (n,) [Pa]
-        Von Mises at the highest force, of the full level if it was computed; empty without.
+        Von Mises at the highest force, of the full level if computed; empty without.
     touch (k, 3) [m]
-        Points of first touch of both bodies when centred, in their order round the axis: of the
-        lower body; else, and for faces that touch all at once, none.
+        Points of first touch of the centred bodies round the axis, of the lower body; none for
+        faces that touch all at once.
     """
 
     body: str
@@ -294,7 +294,7 @@ class RunningIn:
     Parameters
     ----------
     asked
-        Impacts that were asked for; those of running-in follow them.
+        Impacts asked for; those of running-in follow.
     peak_force (n,) [N]
     contact_time (n,) [s]
     restitution (n,) [-]
@@ -308,10 +308,10 @@ class RunningIn:
     run_in
         The last impact does not yield any more.
     radius (nc,) [m]
-        Of the contact points, from the axis, rising; none at the interface level, where the set
-        differs round the ring.
+        Of the contact points, rising; none at the interface level, where the set differs round the
+        ring.
     opening (nc,) [m]
-        Gap between both faces that has stayed at them after the last impact.
+        Gap that has stayed there after the last impact.
     worn_by [N]
         Force up to which the faces are elastic now; nan at the interface level.
     """
@@ -338,7 +338,7 @@ class ImpactStudy(CaseRecord):
     ----------
     speed, gap [m/s], [m]
     reference
-        Level whose numbers are the answer: the finest one that nothing speaks against.
+        Level of the answer: the finest one that nothing speaks against.
     deviations
         From the reference; none where that has doubts itself.
     estimates
@@ -353,11 +353,11 @@ class ImpactStudy(CaseRecord):
         That of the force history.  Above :data:`SETTLED` the run is no reference, and the
         estimates say little.
     estimate_doubt
-        Why there is no estimate, although one was asked for.
+        Why an estimate that was asked for is missing.
     structures
         Held bodies as sources of sound; their stop is called ``"contact"``.
     failures
-        Why a level that was asked for has no result, by its name.
+        Why a level has no result, by its name.
     running_in
         Where faces yield and more than one impact was asked for.
     pictures

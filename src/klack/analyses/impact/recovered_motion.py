@@ -109,16 +109,15 @@ def recovered_bodies(
 def recovered_motion(
     problem: ContactProblem, instants: Sequence[int], progress: Progress
 ) -> Iterator[tuple[float, tuple[MotionOfBody, ...]]]:
-    """Compute the motion of the reduced level of a case, instant by instant.
+    """Motion of the reduced level of a case at instants.
 
     Yields the time [s] and the motion of the upper and the lower body.
 
     Parameters
     ----------
-    problem
-        Its factorisations are needed until the last instant.
     instants
-        In steps of ``run.reduced_step``, rising; 0 is the start.
+        In steps of ``run.reduced_step``, rising; factorisations of the problem must stay until the
+        last.
     """
     case = problem.case
     tell_elastic(case, "the recovered motion is that of")

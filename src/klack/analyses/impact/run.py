@@ -138,12 +138,10 @@ def run_impact(
     progress: Progress = silent,
     threads: int | None = None,
 ) -> ImpactStudy:
-    """Compute one impact at several levels and compare them.
+    """Compute one impact at several levels (:data:`klack.case.levels.LEVELS`) and compare them.
 
     Parameters
     ----------
-    levels
-        Among :data:`klack.case.levels.LEVELS`.
     certify
         Estimate the error of reduced levels, and of the steps of the full order, by one
         interface-level run with twice as many modes; bodies without surfaces have no such level.
@@ -153,7 +151,7 @@ def run_impact(
     Raises
     ------
     IncompleteImpactError
-        When a level fails: with the study of those that did not.
+        When a level fails: with the study of the others.
     """
     begin = perf_counter()
     wanted = case.require_levels(levels)
@@ -226,7 +224,7 @@ def impact_of_bodies(
     near: Mapping[str, NearLoads] | None = None,
     progress: Progress = silent,
 ) -> ImpactStudy:
-    """Compute one impact of bodies that are there, without what is only compared with.
+    """Compute one impact of existing bodies, without mere comparisons.
 
     Its levels are those of :func:`run_impact`, bit for bit; the classical stiffness of the contact
     and the transfer functions are left out.
@@ -234,9 +232,9 @@ def impact_of_bodies(
     Parameters
     ----------
     case
-        Of these bodies; with an upper stop also of this speed and these forces.
+        With an upper stop, of this speed and these forces as well.
     bodies
-        Made for the same levels; they stay open.
+        Of the same levels; they stay open.
     levels
         Without ``full``, which frees the factorisations first.
     near

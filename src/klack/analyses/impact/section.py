@@ -65,7 +65,6 @@ def section_picture(mesh: Mesh, displacement: Floats, time: float, body: str) ->
         Axisymmetric (columns r, z) or solid (columns x, y, z; axis of motion z).
     displacement (n_dof,) [m]
         ``dimension * node + component``, counted from ``mesh.points``.
-    time [s]
 
     Raises
     ------

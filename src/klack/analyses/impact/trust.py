@@ -1,4 +1,4 @@
-r"""Which level of an impact can be relied on: is its time step short enough, is its record whole.
+r"""Which level of an impact can be relied on, by time step and record.
 
 A step of the full order or of a contact law sees the first touch only at its end.  Measured on
 three impacts (docs, *full order*): with n steps per contact the peak force is low by up to
@@ -148,16 +148,14 @@ def doubts_of_history(
     key: str,
     periods: np.ndarray,
 ) -> tuple[str, ...]:
-    """Reasons why a run cannot measure others, sentences that end in what to try.
+    """Reasons why a run cannot measure others, with what to try.
 
     Parameters
     ----------
-    step [s]
-        Of the integration.
     key
         Where a case gives the step.
     periods [s]
-        Of the modes that ring and that the time integration does not take exactly.
+        Of ringing modes that the time integration does not take exactly.
     """
     if measures.cut_off:
         return (

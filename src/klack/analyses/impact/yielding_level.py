@@ -43,15 +43,7 @@ _LARGE = 0.1
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class YieldingFaces:
-    """How the faces of an impact yield.
-
-    Parameters
-    ----------
-    loops
-        For the law of reduced levels.
-    limit
-        For the contact points of the interface level.
-    """
+    """How the faces of an impact yield: ``loops`` for laws, ``limit`` for contact points."""
 
     loops: YieldingLoops | None
     limit: PressureLimit | None

@@ -52,12 +52,7 @@ def pid_loop(
 ) -> tuple[Callable[[float], complex], float]:
     """Open loop of a controller over the frequency [Hz], and half its sampling rate [Hz].
 
-    ``network`` has its drivers.
-
-    Raises
-    ------
-    InputError
-        For another law than a PID, and for a sensor whose channel the linear model has not.
+    InputError for another law than a PID, and for a sensor whose channel the linear model lacks.
     """
     part = controllers_of(network)[name]
     law = part.controller

@@ -37,9 +37,9 @@ class Eigenvalue:
     Parameters
     ----------
     real, imaginary [1/s]
-        The imaginary part is zero or above.
+        The latter zero or above.
     uncertainty [1/s]
-        By which round-off may move it.
+        By round-off.
     verdict
         ``decays``, ``grows`` or ``neutral``.
     """
@@ -68,14 +68,7 @@ class Eigenvalue:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Response:
-    """Frequency response of one output to one input.
-
-    Parameters
-    ----------
-    frequency [Hz]
-    real, imaginary
-        In the unit of the output per unit of the input.
-    """
+    """Frequency response, in the unit of the output per unit of the input."""
 
     source: SignalName
     target: SignalName
@@ -97,15 +90,15 @@ class LoopMargins:
     Parameters
     ----------
     name
-        Output at which the loop is opened.
+        Of the output where it is opened.
     frequency [Hz]
     real, imaginary [-]
         Of the open loop ``L``, closed by ``-1``.
     gain_margin [-]
-        Factor on the loop at which it would reach the limit of stability, the nearest to one.
+        Factor on the loop for the limit of stability, the nearest to one.
     gain_frequency [Hz]
     phase_margin [degrees]
-        Lag, or lead below zero, that would bring it there.
+        Lag, or lead below zero, for it.
     phase_frequency [Hz]
     distance [-]
         Least distance of ``L`` from -1.
@@ -148,10 +141,9 @@ class StabilitySweep:
     frequency [Hz]
     damping [-]
     unstable
-        Number of eigenvalues that grow, those without oscillation among them; -1 where there is no
-        point.
+        Number of growing eigenvalues, also without oscillation; -1 without a point.
     failures
-        Why there is no point; empty where there is one.
+        Why there is no point.
     """
 
     name: str
@@ -178,7 +170,7 @@ class LinearModel(CaseRecord):
     drive [A]
         Current of each coil.
     band [Hz]
-        Up to which the matrices and the eigenvalues hold where there are lines.
+        Up to which matrices and eigenvalues hold with lines.
     delays [s]
         Of the segments of lines, both directions.
     A, B, C, D
@@ -190,8 +182,7 @@ class LinearModel(CaseRecord):
     shares (eigenvalues, owners) [-]
         Participation; every row adds up to one.
     unconfirmed
-        Eigenvalues of the matrices within the band that lead to no root of the equation with
-        delays.
+        Eigenvalues of the matrices in the band that lead to no root with delays.
     sweeps
         None or one.
     cpu_time [s]

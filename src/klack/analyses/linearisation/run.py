@@ -121,26 +121,24 @@ def run_linearisation(
 
     Parameters
     ----------
-    base
-        Drive and lift of the operating point.
     origin
-        Where the search for the point begins.
+        Where the search begins.
     band [Hz]
-        Up to which matrices and eigenvalues hold where there are lines.
+        As of :class:`LinearModel`.
     sources, targets
-        Inputs and outputs between which the frequency response is wanted.
+        Inputs and outputs of frequency responses.
     frequencies [Hz]
     loops
-        Outputs at which a loop is opened for its margins.
+        Outputs at which a loop is opened.
     tree
         The case as it was written; for a sweep.
     sweep
-        What changes from point to point, beside the point itself.
+        What changes from point to point.
 
     Raises
     ------
     InputError
-        Also for a valve in three dimensions, or a point that has no linear law.
+        Also for a valve in three dimensions, or a point without a linear law.
     ConvergenceError
         If there is no operating point.
     """

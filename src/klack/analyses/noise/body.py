@@ -51,7 +51,7 @@ _SMALLEST = 1e-30
 
 
 def net_share(net: TimeSeries | None, bands: Sequence[ThirdOctaves]) -> Floats:
-    """Share (b,) of the energy of all stops per band that is not balanced.
+    """Unbalanced share (b,) of the energy of all stops per band.
 
     Parameters
     ----------
@@ -100,14 +100,7 @@ _LONGEST = 4_000_000  # values of a spectrum that resolves every resonance
 class Surroundings:
     """What is below a held body, and the air.
 
-    Parameters
-    ----------
-    period [s]
-        From click to click.
-    share (b,) [-]
-        Of the energy of the forces per band that is not balanced within the valve.
-    octaves
-        The bands.
+    ``period`` [s] is from click to click, ``share`` (b,) [-] that of :func:`net_share`.
     """
 
     mount: Mount | None
@@ -126,12 +119,7 @@ def body_noise(
 ) -> BodyNoise | None:
     """Vibration and radiation of one body, if a stop pushes it.
 
-    Parameters
-    ----------
-    structure
-        Rigidly held, as the forces were computed.
-    stop_forces [N]
-        By stop.
+    It is rigidly held, as the forces [N] of the stops were computed.
     """
     forces = port_forces(structure, stop_forces)
     if not forces:

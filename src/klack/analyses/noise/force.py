@@ -129,15 +129,9 @@ def impact_force(history: ImpactHistory) -> TimeSeries:
 def interrupted_impact(events: Sequence[ImpactEvent], net: TimeSeries | None) -> ImpactEvent | None:
     """Impact in which a run ends, if it does: its force would seem to persist.
 
-    A needle that rests on its stop does not accelerate; without damping it may ring there
-    endlessly, but has then stayed closed for longer than any impact before.
-
-    Parameters
-    ----------
-    events
-        In order of time.
-    net [N]
-        Mass times acceleration of the needle.
+    A needle at rest on its stop does not accelerate (``net``: its mass times acceleration [N]);
+    without damping it may ring there endlessly, but has then stayed closed for longer than any
+    impact before.
     """
     if net is None or not events or np.isfinite(events[-1].separation_time):
         return None

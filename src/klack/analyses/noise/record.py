@@ -37,15 +37,15 @@ class StopForce:
     peak_force [N]
         Largest mean over a step.
     impulse [N s]
-        Of the whole record, with what presses at rest.
+        Of the whole record, with forces at rest.
     force [N]
-        Means over steps, above zero when it presses.
+        Means over steps, positive when it presses.
     first [N]
         The strongest impact alone.
     frequency, level (k,) [Hz], [dB re 1 uN s]
         Magnitude of the Fourier integral of the strongest impact.
     bands
-        Energies of the whole record, from 20 Hz to 200 kHz [N^2 s].
+        Of the whole record, 20 Hz to 200 kHz [N^2 s].
     """
 
     stop: str
@@ -94,18 +94,17 @@ class BodyNoise:
     injected (p,) [J]
         ``int F v dt``: structure-borne energy through each port.
     vibration_energy [J]
-        Lost in the modes, or still ringing when the record ends: by the motion over time.
+        Lost in the modes, or still ringing at the end: by the motion over time.
     vibration_spectral [J]
         The same by ``int 2 Re(Y) |F|^2 df``; nan for a body without damping.
     dissipated, ringing [J]
         Parts of the vibration energy.
     static_energy [J]
-        What the modes store statically at the end, less at the start: the rest of what was
-        injected.
+        Stored statically at the end, less at the start: the rest of what was injected.
     residual [-]
         Of the balance of energy, over the energy turned over.
     assumed
-        Whether the damping that radiation takes is assumed.
+        Whether the damping for radiation is assumed.
     frequency (k,) [Hz]
     mobility (p, p, k) [m/s/N]
         Drive-point on the diagonal, transfer beside it.
@@ -115,12 +114,11 @@ class BodyNoise:
     area (g,) [m^2]
         Nan for the plate.
     radiated (g, b) [J]
-        Estimate of the radiated sound energy, on the mount and with the plate of the case.
+        Estimated sound energy, on the mount and with the plate of the case.
     upper_bound (g, b) [J]
         Equivalent radiated energy ``rho c int v_n^2 dA dt``: radiation efficiency 1.
     support_energy [J]
-        That flows through the held surfaces into mount and plate; nan in results of former
-        versions.
+        Through the held surfaces into mount and plate; nan in results of former versions.
     """
 
     name: str
@@ -216,20 +214,19 @@ class NoiseDesign:
     Parameters
     ----------
     name
-        Short, unique in the study.
+        Short and unique.
     label, detail
-        What a legend says; what was run, in words.
+        For a legend; what was run.
     kind
         ``"impact"`` or ``"stroke"``.
     run
         Name of the variant or level.
     valid_from, valid_up_to [Hz]
-        One over the record, 0 if every force ends as it began; lowest of the highest kept modes of
-        the bodies, nan without any.
+        One over the record, 0 if every force ends as it began; lowest of the bodies' highest kept
+        modes, nan without any.
     net_share (b,) [-]
-        Share of the energy of the forces per band that springs, magnets and fluid do not balance
-        within the valve (:mod:`klack.analyses.noise.body`).  Radiated energy, surface velocity and
-        sound have it.
+        See :mod:`klack.analyses.noise.body`; a factor of radiated energy, surface velocity and
+        sound.
     bodies
         Elastic held ones; without any there is no sound.
     """

@@ -58,15 +58,9 @@ def run_noise(
     names: Sequence[str] = (),
     progress: Progress = silent,
 ) -> NoiseStudy:
-    """Follow the noise of some runs from force to ear, and compare them.
+    """Follow the noise of some runs from force to ear, and compare them with the first.
 
-    Parameters
-    ----------
-    sources
-        One per design; the first one is the one to compare with.
-    names
-        Of the designs, each different; by default case and run of each source, and a number
-        where they repeat.
+    ``names`` of the designs differ; by default case and run, and a number where they repeat.
     """
     begin = perf_counter()
     names = _design_names(sources, names)

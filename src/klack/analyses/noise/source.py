@@ -70,13 +70,12 @@ class NoiseSource:
     kind
         ``"impact"`` or ``"stroke"``.
     run, label
-        Name of the variant or level, and in words.
+        Variant or level, and in words.
     net [N]
-        Mass times acceleration of the needle, means over records: the force that all of the valve
-        together exerts on it.  None where it is the contact force (a needle that only falls), or
-        where it is not known.
+        Mass times acceleration of the needle, means over records: all forces on it. None where it
+        is the contact force (a needle that only falls), or unknown.
     kept_up_to [Hz]
-        Lowest of the highest kept modes of all bodies; nan for rigid ones.
+        Lowest of the bodies' highest kept modes; nan for rigid ones.
     given
         Whether the case has a section ``noise``.
     """
@@ -104,8 +103,7 @@ class NoiseSource:
 def load_sources(folder: Path, names: Sequence[str] = ()) -> tuple[NoiseSource, ...]:
     """Take forces and bodies from a stored result of an impact or a stroke.
 
-    ``names`` are variants or levels; the best one of an impact and the first one of a stroke
-    without.
+    ``names`` are levels, by default the best, or variants, by default the first.
     """
     analysis = analysis_in(folder)
     if analysis.form.kind not in (ImpactStudy, StrokeStudy):
@@ -140,8 +138,7 @@ def run_sources(
 ) -> tuple[NoiseSource, ...]:
     """Run a case and take forces and bodies from it.
 
-    ``names`` are levels of an impact, ``reduced`` without; variants of a stroke, the first one
-    without.
+    ``names`` are levels, by default ``reduced``, or variants, by default the first.
     """
     if isinstance(case, ValveCase):
         variants = tuple(names) or case.run.variants[:1]

@@ -30,14 +30,8 @@ _OWN: Mapping[str, Kind] = {"lift": LENGTH, "current": CURRENT, "voltage": VOLTA
 class Conditions:
     """Conditions of one operating point.
 
-    Parameters
-    ----------
-    current, voltage [A], [V]
-        By coil; an empty name stands for every coil.
-    lift [m]
-        At which the needle is held; None lets it find its place.
-    changes
-        What stands in the case instead.
+    ``current`` [A] and ``voltage`` [V] are by coil, an empty name for all coils; without a ``lift``
+    [m] the needle finds its place.  ``changes`` are to the case.
     """
 
     current: Mapping[str, float] = field(default_factory=dict)

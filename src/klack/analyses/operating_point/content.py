@@ -63,8 +63,8 @@ def sweep_charts(
 ) -> tuple[Chart, ...]:
     """Charts of what changes along a sweep.
 
-    With one swept quantity, quantities of the same kind share a chart; with two, every chart has
-    one quantity and a curve for each value of the second one.
+    With one swept quantity, like quantities share a chart; with two, every chart has one quantity,
+    and a curve for each value of the second.
 
     Parameters
     ----------

@@ -15,16 +15,7 @@ Vector = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SweptQuantity:
-    """What a sweep changes.
-
-    Parameters
-    ----------
-    name
-        Key of the case, or ``lift``, ``current``, ``voltage``.
-    unit
-        SI; ``"1"`` for a pure number.
-    values (points,)
-    """
+    """A swept key of the case, or ``lift``, ``current``, ``voltage``, in SI."""
 
     name: str
     unit: str
@@ -68,21 +59,19 @@ class OperatingPoints(CaseRecord):
     needle
         ``component.point`` whose displacement is the lift.
     origin
-        Where the search begins: ``"start"``, or ``"far"`` stops.
+        ``"start"``, or ``"far"`` stops.
     drive [A]
         Current of each coil, of the first point.
-    swept
-        None, one or two of them.
     force_left (points,) [N]
-        Largest force that is left on a free body.
+        Largest on a free body.
     flow_left (points,) [m^3/s]
-        Largest flow that is left of a volume.
+        Largest of a volume.
     voltage_left (points,) [V]
-        Largest voltage that the steady fluxes of a coil leave.
+        Largest of a coil with steady fluxes.
     failures
-        Why there is no point; empty where there is one.
+        Why there is no point.
     doubts
-        What has to be known of each point, one line each.
+        A line for each point.
     cpu_time [s]
         Of all points, without bodies and contact laws.
     """

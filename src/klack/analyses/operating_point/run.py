@@ -91,27 +91,12 @@ def run_operating_points(
     threads: int | None = None,
     progress: Progress = silent,
 ) -> OperatingPoints:
-    """Find the operating point of a valve, or those along a sweep.
+    """Find the operating point of a valve, or those along one or two sweeps.
 
-    Parameters
-    ----------
-    tree
-        The case as it was written.
-    variant
-        The first one of the case by default.
-    base
-        Drive and lift; those of the start of a run by default.
-    sweeps
-        None, one or two.
-    origin
-        Where the search begins: bodies where they are drawn, or at the stops farthest from there.
-
-    Raises
-    ------
-    InputError
-        Also for a motion in three dimensions, and for a single point that does not exist.
-    ConvergenceError
-        For a single point that is not found.
+    ``base`` is drive and lift, by default of the start of a run.  The search begins at bodies as
+    drawn (``start``), or at the stops ``far`` from there.  InputError also for a motion in three
+    dimensions, and for a single point that does not exist; ConvergenceError for one that is not
+    found.
     """
     begin = perf_counter()
     name = case.one_variant(variant)

@@ -68,12 +68,11 @@ class OneNode:
     place (2,) or (3,) [m]
         In the drawing of the body.
     distance [m]
-        Between the node and the place that the case asks for.
+        From the place that the case asks for.
     correction
-        Attachment modes of the recipe: ``"residual"``, or where they are shifted to.
+        ``"residual"``, or the shifts of attachment modes.
     compliance [-]
-        Static displacement of the node over that of the port, both of the whole body; of a free
-        body the elastic part.
+        Static displacement of the node over that of the port; of a free body the elastic part.
     transfer
         From the contact force to the node: the full order first, 20 modes alone, 20 and 50 with
         the correction; last, the full order at the port.

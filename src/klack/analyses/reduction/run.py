@@ -87,16 +87,8 @@ def bending_modes(
 class ReductionStudy:
     """Two reduced bodies with a port at their contact, and their transfer functions.
 
-    Parameters
-    ----------
-    transfer
-        Of each body: full order first, then 20 and 50 modes with and without correction.
-    nodes
-        Of the bodies of which the case names a node.
-    impacts
-        With 20 and with 50 modes a body, where there is such a node.
-    bending
-        Of the axisymmetric bodies.
+    ``transfer``: of each body full order first, then 20 and 50 modes with and without correction.
+    ``impacts``: with 20 and 50 modes a body, where the case names a node.
     """
 
     case: str

@@ -60,13 +60,13 @@ class SlopeSpace:
     Parameters
     ----------
     others [SI]
-        Parameters of the study that stay as they are.
+        Parameters of the study that stay.
     kinds
-        Of all keys of the case that are set.
+        Of all changed keys.
     space
-        Of the study: what follows from its parameters.
+        Of the study.
     skipped
-        Parameters of the study that have no derivative here.
+        Parameters without a derivative here.
     """
 
     varied: tuple[VariedKey, ...]
@@ -85,7 +85,7 @@ class SlopeSpace:
     def together(self, share: float) -> dict[str, float]:
         """Shifts [SI] of all parameters by a share of their sizes, with + and - in turn.
 
-        Alternating: what two parameters of equal kind do must not only add up.
+        So the effects of two like parameters do not only add up.
         """
         return {item.name: share * (-1.0) ** k * item.size for k, item in enumerate(self.varied)}
 
@@ -123,18 +123,9 @@ class SlopeSpace:
 def slope_space(case: AnyCase, source: StudySource | None, names: Sequence[str] = ()) -> SlopeSpace:
     """Find the parameters in the case.
 
-    Parameters
-    ----------
-    source
-        Whose parameters are meant, with what is linked to them.
-    names
-        Keys of the case, or parameters of the study; all numbers that vary in it by default.
-
-    Raises
-    ------
-    InputError
-        Also for a key that is no number with a unit, one that the run itself follows from, and of a
-        whole valve one that bodies or contact laws follow from.
+    ``names`` are keys, or parameters of ``source``; by default all its numbers that vary.
+    InputError also for a key that is no number with a unit, one that the run itself follows from,
+    and of a valve one that bodies or contact laws follow from.
     """
     space = space_of(case, source) if source is not None else Space(parameters=(), linked=())
     found: dict[str, VariedKey] = {}

@@ -31,20 +31,17 @@ class MeasureSlopes:
 
     Parameters
     ----------
-    title
-        What it is.
     slopes
-        With each parameter, per its unit; None where it has no value a little further on.
+        By parameter, per its unit; None where a little further on has no value.
     predicted, secant
-        Change of the measure if all parameters change together by the share of the check, each in
-        the sense of its sign there: from the derivatives, and from two runs.
+        Change of the measure under :meth:`SlopeSpace.together`: from the derivatives, and from two
+        runs.
     scale
-        Root of the sum of the squares of what each parameter adds to ``predicted``.
+        Root sum of squares of the parts of ``predicted``.
     resolution
-        What the steps of a run resolve of the measure: a smaller difference is no doubt.
+        Of the steps of a run: a smaller difference is no doubt.
     strayed
-        Difference of the value in the run with derivatives from that without, which differ by
-        round-off; 0 without a check.
+        Difference by round-off between runs with and without derivatives; 0 without a check.
     """
 
     name: str
@@ -116,15 +113,13 @@ class ImpactSlope:
     Parameters
     ----------
     number
-        On that stop, from 1.
+        On its stop, from 1.
     time [s]
     growth [s]
-        Change of the time for all parameters changed by their whole size, root of the sum of the
-        squares: how strongly the motion up to here answers.
-    deviation
-        As of :attr:`MeasureSlopes.deviation`.
+        Change of the time for all parameters changed by their size, root sum of squares: how
+        strongly the motion answers.
     is_doubtful
-        Whether two runs tell something else.
+        Whether two runs differ.
     """
 
     stop: str
@@ -142,11 +137,9 @@ class SensitivityRecord(CaseRecord):
     Parameters
     ----------
     variant
-        Of an impact its level.
-    impacts
-        In order of time.
+        Or level.
     share
-        By which the check changed each parameter; 0 without a check.
+        Change of each parameter in the check; 0 without.
     runs_time, run_time [s]
         Processor time of the derivatives, and of one run without them.
     by_differences

@@ -55,26 +55,10 @@ def run_sensitivities(
 ) -> SensitivityRecord:
     """Differentiate measures of a stroke.
 
-    Parameters
-    ----------
-    source
-        A study with parameters and measures; that of the case by default, if it has one and no
-        parameters are given.
-    parameters
-        Keys of the case, or parameters of the study.
-    measures
-        See :func:`~klack.analyses.study.measures.stroke_measures`; those of the study by
-        default.
-    variant
-        The first one of the case, or that of the study, by default.
-    check
-        Whether three more strokes are computed: the derivatives have to predict two of them, and
-        the values have to be those of the third.
-
-    Raises
-    ------
-    InputError
-        Also for what cannot be differentiated, and for a motion in three dimensions.
+    ``source`` has parameters and measures; by default the study of the case, unless parameters
+    (keys) are given.  ``variant`` is that of the study, or the first.  A ``check`` computes three
+    more strokes: derivatives have to predict two of them, and values those of the third.
+    InputError also for what cannot be differentiated, and for a motion in three dimensions.
     """
     require_axial(case, "klack sensitivities")
     begin = perf_counter()

@@ -76,15 +76,14 @@ class ShotsJson(TypedDict):
 
 
 def shots_to_json(study: ShotsStudy) -> ShotsJson:
-    """Plain numbers in SI, the unit in the key.
+    """Plain numbers in SI, the unit in the key; None for nan.
 
     Returns
     -------
     dict
         ``case``, ``seed``; ``centric`` and ``shots``: the numbers of the centred shot and of every
         other; ``highest``: index of the highest rebound; ``distribution``: per measure its mean,
-        standard deviation and quantiles; ``rule``: highest rebound minus centred shot.  Numbers
-        that do not exist (nan) are None.
+        standard deviation and quantiles; ``rule``: highest rebound minus centred shot.
     """
     shots, rule = study.shots, study.rule
     found: Any = {

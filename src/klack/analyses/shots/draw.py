@@ -60,9 +60,9 @@ class ShotDraw:
     index
         From 0; -1 for the centred one.
     aside (2,) [m]
-        Position of the axis of the moving body at the height of first touch.
+        Axis of the moving body at the height of first touch.
     lean (2,) [rad]
-        Slope of that axis over the height: towards x and y.
+        Slope of that axis, towards x and y.
     force [N]
         Closing force at first touch.
     friction [-]
@@ -72,7 +72,7 @@ class ShotDraw:
     waviness [m]
         Root mean square.
     waves (h, 2) [m]
-        Amplitudes of cosine and sine of each harmonic of the ring.
+        Cosine and sine of each harmonic of the ring.
     harmonics (h,)
     """
 

@@ -48,17 +48,17 @@ class ShotSetup:
     model
         Centred, in first touch, with the mean friction between the faces.
     about (3,) [m]
-        Point of the axis at the height of first touch, about which the moving body is tilted.
+        Point of the axis at the height of first touch, about which the body tilts.
     inertia (3, 3) [kg m^2]
-        Of the moving body about its centre of mass.
+        About the centre of mass.
     opposite_gap (m,) [m]
-        Gaps of the contact points of an upper stop, at the placement of the model.
+        At an upper stop, at the placement of the model.
     opposite_slope (m, 6)
         Their change per unit of a rigid placement; there the gaps stay linear.
     radial (nc - m,) [-]
-        Change of each gap at the seat per unit growth of the radius of the moving body.
+        Change of gaps at the seat per growth of the moving body's radius.
     angle (nc - m,) [rad]
-        Of each contact point round the axis.
+        Of these points round the axis.
     speed [m/s]
     start_height [m]
         Above first touch.
@@ -132,20 +132,10 @@ class ShotGaps:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ShotOutcome:
-    """Result of one shot.
+    """Result of one shot: ``numbers`` of its columns, ``height`` and ``force`` on the grids.
 
-    Parameters
-    ----------
-    numbers
-        One for each field of :class:`klack.analyses.shots.record.ShotColumns`.
-    height, force
-        On the grids of the setup.
-    approach [m]
-        Largest way of the moving body after first touch.
-    doubts
-        Accuracy warnings of its run, in whichever process.
-    worn (nc,) [m]
-        Set of the contact points after it; no points where they stay elastic.
+    ``approach`` [m] is the largest way after first touch, ``worn`` (nc,) [m] the set of contact
+    points, none where they stay elastic.  ``doubts`` are accuracy warnings, from whichever process.
     """
 
     index: int
@@ -167,14 +157,8 @@ def simulate_shot(
 ) -> InterfaceResult:
     """Simulate the moving body as drawn.
 
-    Parameters
-    ----------
-    impacts
-        Stop earlier than the setup says.
-    points
-        Keep the force of every contact point.
-    worn (nc,) [m]
-        Set of the faces that the shot meets; new ones without.
+    It stops after so many ``impacts``, may keep the force of every contact point (``points``), and
+    meets faces with a set ``worn`` (nc,) [m].
     """
     guide = setup.guide.with_friction(draw.friction) if setup.guide is not None else None
     return simulate_interface(

@@ -38,13 +38,13 @@ class RuleVerdict:
     Parameters
     ----------
     restitution_bias [-]
-        Restitution of the shot with the highest rebound, minus the centred one.
+        Of the shot with the highest rebound, minus the centred one.
     rebound_height_bias [m]
         The same of the rebound height.
     relative_restitution_bias, relative_rebound_height_bias [-]
         Over the centred values.
     rank
-        How many shots rebound at least as high as the centred one.
+        Shots that rebound at least as high as the centred one.
     holds
         Whether the relative bias of the restitution is below 1 %.
     """
@@ -319,33 +319,29 @@ class ShotsStudy(CaseRecord):
     Parameters
     ----------
     shot_time [s]
-        Wall time of the shots alone, on ``workers`` processes.
+        Wall time, on ``workers`` processes.
     resumed
-        Shots that an earlier, interrupted run had finished.
+        Shots of an interrupted run.
     speed [m/s]
         At the start, ``start_height`` [m] above first touch.
     step [s]
     distributions, guide, faces, layer
-        In words; the last three are empty without a guide, friction between the faces, and
-        asperities.
+        In words, or empty: guide, friction of the faces, and asperities.
     surfaces
         For example ``"needle.tip on housing.seat"``.
     mass [kg]
         Of the moving body.
     modes
-        Kept elastic modes of the moving body and of the one it hits.
-    points
-        Contact points.
+        Kept elastic modes of both bodies.
     approach [m]
         Largest approach of any shot.
     centric
-        One row: no eccentricity, tilt, waviness or Coulomb friction in the guide, the mean force,
-        and the mean coefficient of friction between the faces.
+        One row, see :func:`~klack.analyses.shots.draw.centric_draw`.
     highest
         Row of the shot with the highest rebound.
     pressures
-        Contact forces point by point of the first impact: ``"centric"`` and ``"highest"``, and
-        ``"lowest"`` for the shot with the lowest restitution.
+        Point forces of the first impact: ``"centric"``, ``"highest"``, and ``"lowest"`` by
+        restitution.
     """
 
     shot_time: float

@@ -76,19 +76,9 @@ def run_shots(
 ) -> ShotsStudy:
     """Draw and compute many shots of one valve.
 
-    Parameters
-    ----------
-    count, seed
-        Instead of those of the case.
-    workers
-        Processes; as many as there are cores without.
-    folder
-        Where finished shots are kept until all are there: an interrupted run resumes from them.
-
-    Raises
-    ------
-    InputError
-        Also for a contact that leaves the contact points.
+    ``count`` and ``seed`` are those of the case by default, ``workers`` as many processes as cores.
+    Finished shots are kept in ``folder``, so that an interrupted run resumes.  InputError also for
+    a contact that leaves the contact points.
     """
     begin = perf_counter()
     stated = shots_of(case)

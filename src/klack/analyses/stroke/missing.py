@@ -54,7 +54,7 @@ def _line(text: object) -> str:
 def rest_note(variant: str, result: NetworkResult, seat: str) -> str:
     """Note that the needle never left its seat; empty if it did.
 
-    The smallest force on the seat is what was missing to lift it at the best moment.
+    It tells the smallest force on the seat, which was missing to lift it.
     """
     pressing = result.channels.get(f"{seat} contact force")
     if pressing is None or pressing.values.size < 2:

@@ -34,7 +34,7 @@ class FluidSummary:
     ----------
     temperature [K]
     pressure [Pa]
-        Absolute, at which the numbers below hold: the highest start pressure of the valve.
+        Absolute, for the numbers below: the highest start pressure.
     density [kg/m^3]
     bulk_modulus [Pa]
         With its entrained gas.
@@ -81,21 +81,21 @@ class StopSummary:
     Parameters
     ----------
     name
-        Component of the network, for example ``"seat"``.
+        Component, ``"seat"``.
     surfaces
-        For example ``"needle.tip on housing.seat"``; empty for a stop without surfaces.
+        ``"needle.tip on housing.seat"``; empty without.
     kind
         ``"consistent"`` if the law was computed, else the kind that the case gives.
     gap [m]
         At the start; of the opening stop, the lift.
     film
-        Whether a squeeze film acts beside the contact.
+        Whether there is a squeeze film.
     indentation, force (k,) [m], [N]
         Local law; empty for a law that is given.
     share (k,) [-]
-        Share of the static compliance that the law carries, at each force.
+        Of the static compliance that the law carries.
     approach, static_force, area (n,) [m], [N], [m^2]
-        Static contact of the two full bodies, from first touch.
+        Static contact of the full bodies, from first touch.
     pattern_force [N]
         Force whose pressure pattern the ports carry; nan for a law that is given.
     half_width [m]
@@ -136,14 +136,13 @@ class StrokeChannels:
     Parameters
     ----------
     lift
-        Displacement of the port at which the lift is measured, for example
         ``"needle.tip displacement"``; ``lift_velocity`` is its rate.
     velocity
         Of the centre of mass of the needle.
     voltage, current, magnetic_force
         One per solenoid.
     opening_stop, seat
-        Components of the two stops; empty if the valve has none.
+        Components, or empty.
     """
 
     lift: str
@@ -171,20 +170,18 @@ class StrokeVariant:
     modes
         Degrees of freedom of all bodies.
     opening_time [s]
-        From time zero to the first touch of the opening stop in the stroke of ``times``, if it is
-        touched.
+        First touch of the opening stop in the stroke of ``times``, if any.
     closing_time [s]
         The same for the seat, after the largest lift of that stroke.  A valve that starts open
         closes before it opens.  Neither is ever negative.
     times
-        Of the needle first, then of every other body between stops: passing 10, 50 and 90 % of the
-        lift, and the touches.
+        Of the needle first, then of other bodies between stops.
     setup_time [s]
-        Wall time of everything before the time loop that is this variant's own.
+        Wall time before the time loop, for this variant alone.
     changes
-        Of each impact when all steps are doubled; empty where that was not asked for.
+        Of each impact when all steps are doubled, if asked for.
     halvings
-        How often the check of the steps halved all of them.
+        Of all steps, by their check.
     """
 
     name: str
@@ -238,20 +235,18 @@ class StrokeStudy(CaseRecord):
 
     Parameters
     ----------
-    needle
-        Component of the body that moves.
     lift [m]
-        Travel from the seat to the opening stop, both unloaded; None if no stop ends it.
+        Travel between the unloaded stops, if they end it.
     switch_off [s]
-        When the drivers' command ends; None if no driver says.
+        End of the drivers' command, if any.
     duration, step [s]
     variants
-        The first one is the one to compare with; the last one may be incomplete, see
+        Compared with the first; the last may be incomplete, see
         :attr:`~klack.simulation.network_result.NetworkResult.failure`.
     bodies
         Their ``compliance_share`` is the smallest of all contact ports.
     structures
-        Held bodies as sources of sound, their stops by the names of the end stops.
+        Held bodies as sources of sound, with named end stops.
     schematic
         Picture of the network (SVG); empty in older results.
     """

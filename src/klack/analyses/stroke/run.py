@@ -83,17 +83,9 @@ def run_stroke(
 ) -> StrokeStudy:
     """Compute one actuation in several variants and compare them.
 
-    Parameters
-    ----------
-    variants
-        Among :data:`klack.case.levels.VARIANTS`; those of the case by default.
-    after
-        Continue from the end of this study of the same case, for another duration.
-
-    Raises
-    ------
-    IncompleteStrokeError
-        When a variant fails on its way: with the study up to there.
+    ``variants`` are by default those of the case, among :data:`klack.case.levels.VARIANTS`;
+    ``after`` continues the same case for another duration.  IncompleteStrokeError, with the study
+    up to there, when a variant fails on its way.
     """
     begin = perf_counter()
     wanted = case.require_variants(tuple(variants) or case.run.variants)
@@ -203,14 +195,9 @@ def stroke_study(
     warnings: tuple[str, ...] = (),
     schematic: str = "",
 ) -> StrokeStudy:
-    """Record of variants that were computed, from a valve that may be without meshes and contacts.
+    """Record of computed variants, from a valve that may have no meshes and contacts.
 
-    Parameters
-    ----------
-    made
-        See :func:`~klack.analyses.record.run_fields`: by which version, when, in which time.
-    schematic
-        SVG.
+    ``made`` are those of :func:`~klack.analyses.record.run_fields`.
     """
     case = valve.case
     rows = [run.rows for run in runs.values()]
@@ -324,12 +311,10 @@ def one_variant(
     check
         Whether steps are checked, and halved where impacts depend on them, unless the case says.
     until
-        Time [s] of a run until which impacts have to be right.
+        Time [s] of a run up to which impacts have to be right.
 
     Raises
     ------
-    InputError
-        For a network that cannot start.
     ConvergenceError
         Before the first record.
     """

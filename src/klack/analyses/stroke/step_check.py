@@ -50,14 +50,13 @@ class ImpactChange:
     Parameters
     ----------
     number
-        On its stop, from 1; 0 for a touch too slow to be counted, or later than what is asked for.
+        On its stop, from 1; 0 for a touch that is too slow or too late to count.
     time [s]
-        Of the first touch, above zero where it comes later; nan, as those below, where there is
-        none.
+        Of the first touch, positive if later; nan, as those below, if missing.
     approach_speed, peak_force, impulse [-]
         Relative.
     reason
-        Why a number is missing; empty where all are there.
+        Why a number is missing.
     """
 
     number: int
@@ -149,16 +148,9 @@ def _by_stop(*runs: Sequence[ImpactEvent]) -> dict[str, tuple[list[ImpactEvent],
 
 
 class CheckedSteps(NamedTuple):
-    """What a check of the steps of a run has found.
+    """What a check of the steps has found: ``changes`` of impacts, ``halvings`` of all steps.
 
-    Parameters
-    ----------
-    changes
-        Of each impact; empty where nothing was checked.
-    doubt
-        Sentence on what still depends on the steps, or on why they were not checked.
-    halvings
-        Of all steps.
+    ``doubt`` says what still depends on the steps, or why they were not checked.
     """
 
     changes: tuple[ImpactChange, ...] = ()

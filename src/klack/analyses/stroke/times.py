@@ -27,12 +27,11 @@ class Passage:
     Parameters
     ----------
     at_10, at_50, at_90 [s]
-        From time zero, which is that of the first run where one continues it, at these shares of
-        the lift: 0 closed, 1 open.
+        From time zero, that of the first run in a series; at shares of the lift: 0 closed, 1 open.
     stop
-        End stop at which the way ends; empty if there is none.
+        End stop, or empty.
     touch [s]
-        First contact there.  None as well where a film cushions it to the end.
+        First contact there, unless a film cushions it.
     """
 
     at_10: float | None = None
@@ -59,8 +58,8 @@ class LiftTimes:
     lift [m]
         Between both ends; None if nothing moved.
     between_stops
-        Whether stops end the lift; else it counts to the furthest place of the run, because no stop
-        is there or because less than 10 % of the way to it are used.
+        Whether stops end the lift; else it counts to the furthest place of the run, without a stop
+        or with less than 10 % of the way to it.
     """
 
     body: str
@@ -128,9 +127,7 @@ def lift_times(
     displacement (n,) [m]
         Along +z, the direction of opening.
     ends [m]
-        Displacements closed and open; infinite where no stop ends the lift.
-    stops
-        End stops there.
+        Closed and open; infinite without a stop.
     """
     closed, opened = ends
     free = not (isfinite(closed) and isfinite(opened))

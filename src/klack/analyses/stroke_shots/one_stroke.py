@@ -66,12 +66,12 @@ class StrokeStart:
     Parameters
     ----------
     aside (2,) [m]
-        Position of the axis of the needle at the height of its seat.
+        Axis of the needle at the height of its seat.
     lean (2,) [rad]
-        Slope of that axis over the height: towards x and y.
+        Slope of that axis, towards x and y.
     placement (6,) [m], [rad]
-        The same as a translation of the centre of mass and a rotation vector; with a turn about
-        the axis, which guides with friction leave behind.
+        The same as translation of the centre of mass and rotation vector, with the turn about the
+        axis that friction in guides leaves.
     friction [-]
         Coulomb's coefficient in the guide.
     contact_friction [-]
@@ -90,12 +90,8 @@ class StrokeStart:
 class Starts:
     """Draws the starts of the strokes of a case.
 
-    Parameters
-    ----------
-    height [m]
-        Of the seat in the drawing of the needle.
-    centre (3,) [m]
-        Centre of mass of the needle there.
+    ``height`` [m] is that of the seat in the drawing of the needle, ``centre`` (3,) [m] its centre
+    of mass there.
     """
 
     case: ValveCase
@@ -229,23 +225,10 @@ class StrokeTask:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StrokeOutcome:
-    """Result of one stroke.
+    """Result of one stroke: ``stroke`` and ``stops`` have the numbers of their columns.
 
-    Parameters
-    ----------
-    label
-        Of the variant in words.
-    stroke
-        One for each field of :class:`klack.analyses.stroke_shots.record.StrokeColumns`.
-    stops
-        By end stop, likewise of :class:`~klack.analyses.stroke_shots.record.StopColumns`.
-    lift (k,) [m]
-    end (6,) [m], [rad]
-        Where it leaves the needle: translation of the centre of mass and rotation vector.
-    failure
-        Why it ended early; empty if it did not.
-    doubts
-        Of its run, in whichever process.
+    ``end`` (6,) [m], [rad], where it leaves the needle, is translation of the centre of mass and
+    rotation vector.  ``failure`` says why it ended early; ``doubts`` come from whichever process.
     """
 
     variant: str

@@ -37,16 +37,12 @@ class HighestRebound:
 
     Parameters
     ----------
-    stroke
-        Its number.
     rebound_height, eccentricity [m]
         The eccentricity is that at first touch.
     place
         In the order of that eccentricity; 1 is the most centred.
-    count
-        Strokes with a rebound.
     most_centred
-        Number of the most centred stroke among them.
+        Its number.
     most_centred_height, most_centred_eccentricity [m]
     centred_height [m]
         Of the stroke that starts centred.
@@ -372,9 +368,9 @@ class VariantShots:
         One row: started centred and upright, without Coulomb friction in the guide.
     time (k,) [s]
     lift (n, k), centric_lift (k,) [m]
-        Displacement of the point of the lift; nan after the end of a stroke that failed.
+        Nan after the end of a stroke that failed.
     failures
-        By the number of the stroke, why it ended early; its row holds what was known by then.
+        Why a stroke ended early, by number; its row holds what was known.
     """
 
     name: str
@@ -396,23 +392,19 @@ class StrokeShotsStudy(CaseRecord):
     Parameters
     ----------
     carry
-        Whether every stroke starts from where the one before has left the needle.
+        Whether strokes start where the one before ended.
     resumed
-        Strokes that an earlier, interrupted run had finished.
+        Strokes of an interrupted run.
     stroke_time [s]
-        Wall time of the strokes alone.
+        Wall time of all.
     duration [s]
         Of each stroke.
     needle, seat, opening_stop
-        Components; empty where the valve has no such stop.
+        Components, or empty.
     guide, distributions
         In words.
     largest_eccentricity [m]
-        At the height of each stop: what the guide allows to the axis of a rigid needle.
-    mass [kg]
-        Of the needle.
-    points
-        Contact points of each stop.
+        By stop: what the guide allows to a rigid needle.
     schematic
         Picture of the network (SVG); empty in older results.
     """

@@ -180,7 +180,7 @@ def compute_strokes(
 ) -> None:
     """Compute the strokes that the log does not have, the centred one first, and keep them there.
 
-    ConvergenceError for a stroke that failed, where the next one would start from its end.
+    ConvergenceError for a failed stroke from whose end the next one starts.
     """
     carry = shots_of_valve(starts.case).carry
     total = len(variants) * (count + 1)

@@ -36,13 +36,8 @@ __all__ = [
 class PointSteps(NamedTuple):
     """What a check of the time steps of a stroke has found.
 
-    Parameters
-    ----------
-    halvings
-        Of all steps.
-    change [-]
-        Largest change of the impacts that the measures depend on with all steps twice as long, over
-        what the accuracy promises; inf where one has no counterpart, nan where nothing was checked.
+    ``change`` [-] is the largest one of impacts that the measures depend on with all steps twice as
+    long, over what the accuracy promises; inf where one has no counterpart, nan without a check.
     """
 
     halvings: int = 0
@@ -63,16 +58,14 @@ class PointRow:
     Parameters
     ----------
     failure
-        Why there are no values; empty if it was computed.
-    notes
-        Doubts about the numbers.
-    others
-        Warnings that are no doubt about a number.
+        Why there are no values.
+    notes, others
+        Doubts about the numbers, and other warnings.
     by_chance
-        True if the same point may be computed another time: the memory was full, or a component
-        of the user's own has failed.
+        Whether another try may succeed: the memory was full, or a component of the user's own has
+        failed.
     model
-        What the numbers come from, in words: level, modes and meshes of an impact.
+        Level, modes and meshes of an impact.
     steps
         Of a stroke.
     """
@@ -219,12 +212,8 @@ class PointKind(ABC, Generic[CaseT, Built]):
 class AskedPoints(Generic[CaseT]):
     """Points of a case, and what is computed at every one of them.
 
-    Parameters
-    ----------
-    variant
-        Of the stroke; of an impact its level, ``"shots"``, or both.
-    checks
-        Whether time steps of strokes are checked, unless the case says.
+    ``variant`` may be a level, ``"shots"``, or both; ``checks`` if time steps of strokes are
+    checked, unless the case says.
     """
 
     kind: PointKind[CaseT, Any] = field(compare=False)

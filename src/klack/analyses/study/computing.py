@@ -221,16 +221,9 @@ _STAGE = "points"
 
 
 class Tally(Closing):
-    """Hands rows on as they come, and shows their warnings at the end, each once.
+    """Hands rows on to ``keep`` as they come, and shows their warnings at the end, each once.
 
-    Parameters
-    ----------
-    whole
-        Points of the study.
-    wanted
-        Of them, those that are not known yet.
-    keep
-        Gets the place of a point and its row.
+    ``wanted`` are those points, of the ``whole`` study, that are not known yet.
     """
 
     def __init__(
@@ -300,15 +293,9 @@ def compute_points(
 ) -> int:
     """Compute some of the points, those with the same bodies one after another.
 
-    Returns how many were computed at a time, at most.  InputError where so many do not fit into the
-    memory; Ctrl-C after the rows that were finished have been kept.
-
-    Parameters
-    ----------
-    keep
-        Called in this thread with each place and its row, in the order of their end.
-    builds
-        Bodies and laws that were made before.
+    Calls ``keep`` in this thread with each place and its row, in the order of their end, and
+    returns how many were computed at a time, at most.  InputError where so many do not fit into the
+    memory; Ctrl-C after finished rows have been kept.
     """
     wanted, most = list(places), 0
     tally = Tally(len(asked.points), len(wanted), keep, progress)

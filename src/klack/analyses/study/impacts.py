@@ -74,13 +74,9 @@ _OF_THE_IMPACT = (
 class _Built:
     """Bodies of a group.
 
-    Parameters
-    ----------
-    bodies
-        Of the impact; None where every impact builds its own (in full, and of given models), and
-        where no measure takes one.
-    shots
-        Of the shots, which start centred and in first touch.
+    ``bodies`` of the impact are None where every impact builds its own (in full, and of given
+    models); those of ``shots`` start centred and in first touch.  Either is None without a measure
+    of it.
     """
 
     bodies: ImpactBodies | None

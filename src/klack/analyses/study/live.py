@@ -27,14 +27,7 @@ class Pace:
     def tell(self, done: int, computed: int, best: str = "") -> bool:
         """A line, unless the last one was just now; whether there was one.
 
-        Parameters
-        ----------
-        done
-            Points that have their values.
-        computed
-            Of them computed since the begin; the others were there.
-        best
-            The best one so far, in words.
+        Points ``done`` have values, of them ``computed`` since the begin; ``best`` is in words.
         """
         now = perf_counter()
         rate = computed / max(now - self._begin, 1e-9)

@@ -27,14 +27,10 @@ __all__ = ["Compute", "MadeValves", "made_space", "made_valves_of"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Scattered:
-    """A value that scatters: a parameter of the study, or another key of the case.
+    """A value that scatters, of a parameter of the study or another key.
 
-    Parameters
-    ----------
-    deviation [SI]
-        Standard deviation of made valves.
-    today [SI]
-        In the case; None for a word whose value there is not known.
+    ``deviation`` [SI] is the standard deviation of made valves; ``today`` [SI] is None for a word
+    without a value in the case.
     """
 
     name: str

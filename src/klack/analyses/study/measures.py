@@ -109,10 +109,10 @@ class ChosenMeasure:
     Parameters
     ----------
     of
-        What it is of: the ``"variant"`` of a stroke or one ``"impact"`` in it, the ``"level"`` of
-        an impact, all of its ``"shots"``, a ``"click"`` or the noise ``"design"``.
+        The ``"variant"`` of a stroke or one ``"impact"`` in it, the ``"level"`` of an impact, all
+        of its ``"shots"``, a ``"click"`` or the noise ``"design"``.
     part
-        Of a run, what the measure is read from; None where the run does not have it.
+        Of a run, what the measure is read from.
     """
 
     name: str

@@ -71,14 +71,7 @@ def run_optimisation(
 
     The points depend on nothing but the study and the case: an interrupted search finds those that
     were computed.  Strokes are searched in steps as they are; those of the front are then computed
-    again with their steps checked.
-
-    Parameters
-    ----------
-    seen
-        Takes what was found so far, now and then.
-    live
-        Is offered a record of what was found so far, often.
+    again with their steps checked.  ``seen`` takes records now and then, ``live`` often.
 
     Raises
     ------

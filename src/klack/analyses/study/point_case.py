@@ -17,14 +17,8 @@ def case_of_point(
 ) -> tuple[str, str]:
     """Name and text of the case of a point, with all digits; comments stay.
 
-    Parameters
-    ----------
-    point
-        The recommended one of an optimisation by default.
-    folder
-        Where it will lie; files that the case names are looked for there.
-    study
-        What it is called in the comment at the head of the text.
+    ``point`` is by default the recommended one; files are looked for in ``folder``, where the case
+    will lie; ``study`` is named in its first comment.
     """
     if point is None and record.optimum is not None:
         point = record.optimum.best

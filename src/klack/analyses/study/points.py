@@ -52,16 +52,9 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parameter:
-    """One parameter of a study.
+    """One parameter of a study: path of its key, or a word of its own for expressions.
 
-    Parameters
-    ----------
-    name
-        Path of its key in the case; a word of its own where only expressions use it.
-    kind
-        None for words and whole numbers.
-    today
-        What stands in the case; None for a word of its own.
+    ``kind`` is None for words and whole numbers; ``today`` None for a word of its own.
     """
 
     name: str
@@ -288,14 +281,9 @@ _UNBALANCED = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Linked:
-    """A key of the case whose value follows from parameters.
+    """A key of the case whose value follows from parameters, ``today`` [SI] in the case.
 
-    Parameters
-    ----------
-    words
-        Parameter, or other key, that each word of the expression means.
-    today [SI]
-        In the case.
+    ``words`` of the expression mean parameters or other keys.
     """
 
     name: str
@@ -319,12 +307,8 @@ class Linked:
 class Space:
     """Parameters of a study and what follows from them: from the unit cube to the case.
 
-    Parameters
-    ----------
-    linked
-        In the order in which they can be computed.
-    constants [SI]
-        What expressions need beside the parameters; no part of a point.
+    ``linked`` keys are in the order of computation; ``constants`` [SI] are further values for
+    expressions.
     """
 
     parameters: tuple[Parameter, ...]
@@ -387,16 +371,9 @@ class Space:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StudyPoints:
-    """Points of a study in the order of its design.
+    """Points of a study in the order of its design, by name [SI].
 
-    Parameters
-    ----------
-    values
-        Of each point by name [SI]: parameters, then what follows from them.
-    design
-        In words.
-    cube (points, parameters that vary)
-        Where they lie in the unit cube, if they were drawn there.
+    Parameters come first, then what follows from them; ``cube`` has drawn points in the unit cube.
     """
 
     space: Space

@@ -55,13 +55,11 @@ class SentCase:
     Parameters
     ----------
     content
-        The tree of the case: plain data, and components of the user's own by their module and name.
+        Tree of the case: plain data, and own components by module and name.
     folder
-        Current folder of the sender: paths of the case are relative to it.
+        Of the sender: paths are relative to it.
     mark
-        Of the log of its points: content of the case, its files, components and of klack.
-    versions
-        See :func:`versions_here`.
+        Of case, files, components and klack, for the log of points.
     """
 
     content: bytes

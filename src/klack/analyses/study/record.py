@@ -38,17 +38,15 @@ class StudyColumn:
     Parameters
     ----------
     name
-        Path of a key of the case, a word of the study, or name of a measure.
-    title
-        What it is, in words.
+        Key, word of the study, or measure.
     unit
         SI; ``"1"`` for a pure number, empty for words.
     spread
-        How its values are spread, or the expression that they follow from; empty for a measure.
+        Distribution or expression; empty for a measure.
     today
-        In the case as it is; nan where it has none.
+        In the case; nan where it has none.
     values (points,)
-        Nan where there is none; places in ``words`` where there are any.
+        Nan if missing; places in ``words``, if any.
     is_whole
         Whether the case has whole numbers there.
     """
@@ -76,13 +74,13 @@ class Sensitivity:
     Parameters
     ----------
     first, first_low, first_high (parameters,)
-        Share that a parameter causes alone, with its interval of ``confidence``.
+        By a parameter alone, with interval.
     total, total_low, total_high (parameters,)
-        Share that vanishes once the parameter is known and the others are free.
+        What vanishes once the parameter is known.
     rows, discarded
-        Base points used, and those left out because one of their points has no value.
+        Base points used, and left out for a missing value.
     reason
-        Why there are no numbers; empty if there are.
+        Why there are no numbers.
     """
 
     measure: str
@@ -101,19 +99,19 @@ class Sensitivity:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Screening:
-    """Elementary effects of each parameter on one measure: its change over a whole range.
+    """Elementary effects (parameters,) on one measure: its change over a whole range.
 
     Parameters
     ----------
-    size, size_error (parameters,) [unit of the measure]
-        Mean of the sizes of the effects, mu*, and its standard error.
-    mean (parameters,)
-        Mean of the effects with their signs, mu.
-    scatter (parameters,)
-        Standard deviation of the effects, sigma: of a parameter that acts differently at other
-        places, by itself or through others.
-    effects (parameters,)
-        How many there are; those next to a point without a value are left out.
+    size, size_error [unit of the measure]
+        Mean size, mu*, and its standard error.
+    mean
+        With signs, mu.
+    scatter
+        Standard deviation, sigma: of a parameter that acts differently at other places, by itself
+        or through others.
+    effects
+        How many; those next to a failed point are left out.
     """
 
     measure: str
@@ -145,11 +143,8 @@ class StudySurrogate:
 
     Parameters
     ----------
-    made_of
-        In words.
     points, failed, repeated
-        Different points with a value, which it was fitted to; points without a value; points that
-        repeat another one.
+        Different points of the fit; points without a value, and repeating ones.
     predictivity
         Q2 of the points, each predicted from the others.
     error, largest [unit of the measure]
@@ -157,12 +152,11 @@ class StudySurrogate:
     residuals (points of the study,)
         Value minus prediction from the other points; nan where there is none.
     reason
-        Why nothing follows from it; empty if something does.
+        Why nothing follows from it.
     first, first_low, first_high, total, total_low, total_high (parameters,)
-        Shares of the variance as of :class:`Sensitivity`, with the largest change that the error
-        can make in them; nan with a reason.
+        As of :class:`Sensitivity`, with the largest change by the error; nan with a reason.
     effects
-        Of each parameter; empty with a reason.
+        By parameter.
     """
 
     measure: str
@@ -199,12 +193,11 @@ class Optimum:
     kept (points,)
         Points that keep all bounds.
     front
-        Points that no other one beats in every objective, by the first objective.
+        Unbeaten points, by the first objective.
     best
-        Of the front, nearest to the ideal point by the ranges of the front; the best one of a
-        single objective.  -1 without a front.
+        Nearest of the front to the ideal point, in ranges of the front; -1 without a front.
     feasible
-        False if no point keeps all bounds: the front is then of those that miss them least.
+        False if no point keeps all bounds: the front then misses them least.
     """
 
     algorithm: str
@@ -232,11 +225,11 @@ class MissedBound:
     Parameters
     ----------
     missed, points, failed
-        Points that miss it, points with a value, and those without.
+        Points that miss it, with a value, and without.
     probability, low, high
         Share that misses it, with its interval of 95 %.
     at_most
-        One-sided bound of 95 %: the one to state where none missed it.
+        One-sided bound of 95 %, to state where none missed it.
     low_if_none, high_if_all
         Ends of the interval if none or all of the points without a value miss it.
     """
@@ -260,32 +253,27 @@ class StudyRecord(CaseRecord):
     Parameters
     ----------
     study_text
-        Of the file of the study; empty if it stands in the case.
+        Of a study in its own file.
     variant
-        Of the stroke; of an impact its level, ``"shots"``, or both.
+        Or level, ``"shots"``, or both.
     design
-        Where the points lie, in words.
+        In words.
     threads
-        Points that were computed at a time.
+        Points at a time.
     computed, kept
-        Points that were computed now, and that an earlier run had left.
+        Points computed now, and left by an earlier run.
     point_time [s]
-        Wall-clock time of the points that were computed now.
+        Wall time of the points computed now.
     failures
-        Why a point has no measures; empty where it was computed.
+        Why a point has no measures.
     notes
         Doubts about the numbers of each point.
     sensitivities, screenings
         Of each measure, from the design of Saltelli, and from the trajectories of Morris.
-    optimum
-        Of ``klack optimise``.
-    missed
-        Of drawn points.
     workers
-        What computed them: threads, processes, or workers of dask.
+        Threads, processes, or workers of dask.
     model
-        What the numbers of an impact come from: level, modes and meshes of the case as it is, and
-        at how many points they differ; empty for strokes.
+        Of impacts: level, modes and meshes of the case, and at how many points they differ.
     halvings, step_changes (points,)
         Of strokes, see :class:`~klack.analyses.study.asked_points.PointSteps`; nan without one, and
         empty for impacts.

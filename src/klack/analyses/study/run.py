@@ -69,20 +69,10 @@ def run_study(
 ) -> StudyRecord:
     """Compute the points of a study that are not known yet.
 
-    Parameters
-    ----------
-    folder
-        Where computed points are kept: an interrupted study resumes, and another study of the same
-        case finds what both have.
-    live
-        Is offered a record of the points so far, often.
-
-    Raises
-    ------
-    InputError
-        Before the first run, see :func:`asked_points`; and if no point at all can be computed.
-    KeyboardInterrupt
-        Ctrl-C, after all computed points have been kept.
+    ``folder`` keeps computed points: an interrupted study resumes, and another study of the same
+    case finds what both have.  ``live`` is often offered a record of the points so far.  InputError
+    before the first run, see :func:`asked_points`, and if no point can be computed; Ctrl-C after
+    computed points have been kept.
     """
     begin = perf_counter()
     points, asked = asked_points(case, tree, source)

@@ -33,12 +33,12 @@ def run_points(
     Parameters
     ----------
     points
-        Key of the case to a value with its unit, for every point; or a list of values by key.
+        Key to value with unit, for every point; or a list of values by key.
     measures
         See :func:`~klack.analyses.study.measures.stroke_measures` and
         :func:`~klack.analyses.study.measures.impact_measures`.
     variant
-        The first one of the case by default; of an impact its level, ``reduced`` by default.
+        The first of the case, or the level ``reduced``, by default.
     where
         One thread for a case whose components call Python or an FMU, which need not bear several
         calls at a time.
@@ -48,7 +48,7 @@ def run_points(
     InputError
         Before the first run, also where so many strokes at a time do not fit into the memory.
     RunsInterrupted
-        On Ctrl-C, with the table of what was computed until then.
+        On Ctrl-C, with the table so far.
     """
     asked = ask(case, tree, points, measures, variant)
     rows: list[PointRow | None] = [None] * len(asked.points)
