@@ -1,14 +1,14 @@
 r"""Permeances of air gaps: faces, edges (fringing), guides, and the coil window.
 
-A permeance is ``flux / mmf`` [H].  Edge fields are two-dimensional near an edge, so they are given
-per length of edge, as a number ``c`` in :math:`P = \mu_0\, c \times` (length of the edge), and most
-follow exactly from a conformal map of the corner:
+A permeance is ``flux / mmf`` [H].  Edge fields are given per length of edge, as a number ``c`` in
+:math:`P = \mu_0\, c \times` (length of the edge), and most follow exactly from a conformal map of
+the corner:
 
-- *two equal poles*, lines from side face to side face, of shoulders with length ``t``
+- *two equal poles*, from side face to side face, with shoulders of length ``t``
   (:func:`equal_edges`): :math:`c = \tfrac1\pi\bigl[1 - \ln 2 + \ln\tfrac\pi2(1 + 2t/g)\bigr]`,
 - *a pole on a plane* (:func:`edge_on_plane`): twice that with ``t/g`` in place of ``2 t/g``,
 - *two equal poles beside a wall* at a distance ``D`` at the mean potential, as in a coil window
-  inside a yoke (:func:`edges_beside_wall`), in excess of the flux that the wall takes anyway,
+  inside a yoke (:func:`edges_beside_wall`), in excess of the flux without the edges,
 - *a step of a duct* from height ``g`` to ``D`` (:func:`step_excess`), Marcuvitz 1951, 5.34.
 
 Roters (1941, ch. 5) estimates the first two by arcs: 0.26 + (1/pi) ln(1 + 2t/g) and
@@ -63,7 +63,6 @@ def equal_edges(gap: ArrayLike, shoulder: float) -> tuple[Vector, Vector]:
 
     Parameters
     ----------
-    gap [m]
     shoulder [m]
         Length ``t`` of the side faces behind the edges.
 
@@ -91,8 +90,8 @@ def edge_on_plane(gap: ArrayLike, shoulder: float) -> tuple[Vector, Vector]:
 def edges_beside_wall(gap: ArrayLike, wall: float) -> tuple[Vector, Vector]:
     r"""Edge number of two equal poles beside a wall, and its derivative by the gap [1/m].
 
-    The wall is parallel to the side faces, at a distance ``D``, and lies at the mean of the two
-    potentials.  The number counts what goes beyond the uniform field between side face and wall:
+    The wall, parallel to the side faces at a distance ``D``, has the mean potential.  The number
+    counts what exceeds the uniform field between side face and wall:
 
     .. math::
 
@@ -123,7 +122,7 @@ def slot_loss(gap: ArrayLike, wall: float) -> tuple[Vector, Vector]:
 
     .. math:: \tfrac{2 g}{\pi}\Bigl[\arctan u - \tfrac{\ln(1 + u^2)}{2u}\Bigr], \quad u = g/(2D)
 
-    (Carter 1901): a slot of width ``g`` before a wall at the distance ``D``.
+    (Carter 1901) for a width ``g`` and a wall at the distance ``D``.
     """
     g = np.asarray(gap, dtype=float)
     u = g / (2.0 * wall)
@@ -147,9 +146,9 @@ def step_excess(low: float, high: float) -> float:
 def outer_ring(gap: float, reach: ArrayLike, radius: float) -> tuple[Vector, Vector]:
     r"""Edge number of a rod that leaves a hole in a plate, and its derivative by the reach [1/m].
 
-    :func:`edge_on_plane` up to arcs of radius ``reach``, and the wider circle on which the outer
-    ones lie: a quarter arc of radius ``s`` has the mean distance ``radius + 2 s/pi`` from the axis
-    (Roters' mean path), which adds :math:`(2/\pi)^2\, s/r`.
+    :func:`edge_on_plane` up to arcs of radius ``reach``, and the wider circle of the outer ones: a
+    quarter arc of radius ``s`` has the mean distance ``radius + 2 s/pi`` from the axis (Roters'
+    mean path), which adds :math:`(2/\pi)^2\, s/r`.
     """
     s = np.asarray(reach, dtype=float)
     c = edge_on_plane(gap, 1.0)[0] + 2.0 / pi * np.log((1.0 + s / gap) / (1.0 + 1.0 / gap))
@@ -169,12 +168,11 @@ def round_excess(gap: ArrayLike, inner: float, outer: float) -> tuple[Vector, Ve
         y = k\,\frac{I_1(k r_i) K_0(k r_o) + K_1(k r_i) I_0(k r_o)}
                      {K_0(k r_i) I_0(k r_o) - I_0(k r_i) K_0(k r_o)}
 
-    ``y`` is the flux that a harmonic potential on the core sends out (both modified Bessel
-    functions), ``D`` the flat wall of :func:`cylinder_wall`.
+    with the flux ``y`` of a harmonic potential on the core (modified Bessel functions) and the flat
+    wall ``D`` of :func:`cylinder_wall`.
 
     Parameters
     ----------
-    gap [m]
     inner, outer [m]
         Radii of core and tube.
     """
@@ -187,7 +185,7 @@ def round_excess(gap: ArrayLike, inner: float, outer: float) -> tuple[Vector, Ve
 
 @cache
 def _round_spectrum(q: float) -> tuple[Vector, Vector]:
-    """Wave numbers (core radius 1) and the weights of their share in the integral over ``k``."""
+    """Wave numbers (core radius 1) and weights in the integral over ``k``."""
     wall = cylinder_wall(1.0, q)
     nodes, weights = np.polynomial.legendre.leggauss(12)
     edges = np.linspace(np.log(1e-4), np.log(1e4), 161)

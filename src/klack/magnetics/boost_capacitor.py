@@ -21,10 +21,9 @@ class BoostCapacitor(Component):
     .. math:: C\,\dot U = -\sum_k d_k\,i_k + i_r
 
     Each boost-driver whose port ``supply`` is joined to its ``outlet`` draws the current of its
-    coil, :math:`d_k = 1`, or returns it, :math:`d_k = -1`, as its state says.  The converter works
-    all the time up to ``voltage``, at constant power with a largest current.  The magnets of these
-    drivers are solved together, and what the converter draws from the battery is counted once,
-    here.
+    coil, :math:`d_k = 1`, or returns it, :math:`d_k = -1`, by its state.  The converter works all
+    the time up to ``voltage``, at constant power with a largest current.  The magnets of these
+    drivers are solved together; what the converter draws from the battery is counted here.
 
     Limits: those of :mod:`klack.magnetics.output_stage`; at most 8 coils in all.
     Source: charge balance of a capacitor; converter as in boost-driver.

@@ -40,13 +40,13 @@ class BoostDriver(Driver):
                    or one diode and the clamp               open
     =============  =======================================  ======================================
 
-    The capacitor gives and takes :math:`C\,\dot U = -i`; a converter recharges it from the battery
-    at constant power, :math:`U = \sqrt{U_0^2 + 2 P t/C}`, with a largest current, all the time.  A
-    second shot that comes before it has recovered starts from a lower voltage and is late.
-    Recuperated energy may raise it above ``boost_voltage``; then the converter rests.
+    The capacitor gives and takes :math:`C\,\dot U = -i`; a converter always recharges it from the
+    battery at constant power, :math:`U = \sqrt{U_0^2 + 2 P t/C}`, with a largest current.  A second
+    shot before it has recovered starts from a lower voltage and is late.  Recuperated energy may
+    raise it above ``boost_voltage``; then the converter rests.
 
-    Without ``capacitance`` the driver draws from the boost-capacitor that its port ``supply`` is
-    joined to, perhaps together with others.
+    Without ``capacitance`` the driver draws from the boost-capacitor at its port ``supply``, which
+    others may share.
 
     Limits: those of :mod:`klack.magnetics.output_stage`.
     """
@@ -231,7 +231,6 @@ class BoostDriver(Driver):
         )
 
     def _paths(self) -> Mapping[str, StagePath]:
-        """Path of the current by what drives it."""
         two = 2.0 * self.switch_resistance
         diode, slope = self.diode_voltage, self.diode_resistance
         freewheel = StagePath(

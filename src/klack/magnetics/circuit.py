@@ -1,12 +1,12 @@
-r"""A magnetic circuit as branches and loops: what a solenoid is before any time passes.
+r"""A magnetic circuit as branches and loops.
 
 Branch fluxes follow from loop fluxes, :math:`\varphi_b = C\,\varphi`; each loop balances
 
 .. math:: C^T\bigl[\Theta_b(\varphi_b, x) - \Theta_{0,b} + S_b\,\dot\varphi_b - N_b\, i\bigr] = 0 ,
 
-and the coil sees the linkage :math:`\psi = N_b^T C \varphi`.  ``x`` is the working gap, one number
-for the whole circuit; ``C`` is :attr:`MagneticCircuit.loops`.  Loop fluxes as unknowns satisfy
-Kirchhoff's node law by construction, and make the stored energy a convex function of the unknowns.
+with the linkage of the coil :math:`\psi = N_b^T C \varphi`, one working gap ``x`` for the whole
+circuit, and ``C``, :attr:`MagneticCircuit.loops`.  Loop fluxes satisfy Kirchhoff's node law by
+construction and make the stored energy a convex function of the unknowns.
 
 Further coils, in electric circuits of their own, add their ``N_b i``: mutual induction follows
 from the fluxes that they share.
@@ -39,22 +39,18 @@ class MagneticBranch:
 
     Parameters
     ----------
-    name
-        Such as ``"main gap"`` or ``"leakage"``.
-    law : LinearReluctance, GapReluctance or IronReluctance
-        :math:`\Theta_b` as callables (``law.mmf``, ``law.slope``, ``law.energy``,
-        ``law.energy_slope``, each of flux and gap) and as flat numbers (``law.table()``): ``[R]``
-        or piecewise cubics with six numbers per interval, see :mod:`klack.magnetics.reluctance`.
+    law
+        :math:`\Theta_b`, see :mod:`klack.magnetics.reluctance`.
     eddy [S]
-        ``S``: eddy currents around the tube oppose its change with the mmf ``S dflux/dt``
-        (``1/R_e`` of a shorted turn); the loss is ``S (dflux/dt)^2``.
+        ``S``: eddy currents around the tube oppose its change (``1/R_e`` of a shorted turn); the
+        loss is ``S (dflux/dt)^2``.
     turns [-]
-        ``N``: turns of the coil around this branch, signed by the direction of the branch.
+        ``N``: of the coil around this branch, signed by its direction.
     circuit
-        Electric circuit that these turns belong to; empty: that of the magnet's terminals.
+        Electric circuit of these turns; empty: that of the magnet's terminals.
     remanence [A]
-        :math:`\Theta_0`: constant magnetomotive force along the branch (remanence of the iron, a
-        magnet).  It belongs to the stored energy: ``law.energy - remanence * flux``.
+        :math:`\Theta_0`: constant mmf along the branch (remanence of the iron, a magnet), part of
+        the stored energy: ``law.energy - remanence * flux``.
     stops
         Hysteresis of iron, beside ``law`` as its mean curve.
     """
@@ -167,7 +163,7 @@ class MagneticCircuit:
         return [branch.name for branch in self.branches].index(name)
 
     def mmf(self, fluxes: NDArray[np.float64], gap: float) -> NDArray[np.float64]:
-        """Magnetomotive force of each branch [A] at branch fluxes [Wb], without eddy currents."""
+        """Mmf of each branch [A] at branch fluxes [Wb], without eddy currents."""
         pairs = zip(self.branches, fluxes, strict=True)
         return np.array([float(b.law.mmf(f, gap)) - b.remanence for b, f in pairs])
 

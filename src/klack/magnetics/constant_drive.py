@@ -42,11 +42,9 @@ class Coil:
     ----------
     component
         Its magnet.
-    magnet : Solenoid, MagneticNetwork or ForceMapSolenoid
     resistance [ohm]
         At the temperature of the winding.
     start_current [A]
-        With which a run begins.
     """
 
     component: str
@@ -67,7 +65,7 @@ def coils_of(network: Network) -> dict[str, Coil]:
     Raises
     ------
     InputError
-        For a coil of the user's own, whose constant current klack cannot set.
+        For a coil of the user's own, whose current klack cannot set.
     """
     found: dict[str, Coil] = {}
     for name, part in network.components.items():
@@ -93,7 +91,7 @@ def coils_of(network: Network) -> dict[str, Coil]:
 
 
 def hysteretic_coils(network: Network) -> list[str]:
-    """Magnets whose flux at a constant current depends on what was before."""
+    """Magnets whose flux at a constant current depends on their history."""
     return [
         coil.component
         for coil in coils_of(network).values()
@@ -104,20 +102,20 @@ def hysteretic_coils(network: Network) -> list[str]:
 
 
 def start_currents(network: Network) -> dict[str, float]:
-    """Steady current [A] with which a run of each coil begins."""
+    """Steady current [A] of each coil at the start of a run."""
     return {name: coil.start_current for name, coil in coils_of(network).items()}
 
 
 def driven(network: Network, currents: Mapping[str, float]) -> Network:
-    r"""Return a network whose coils have carried constant currents for long.
+    r"""Network whose coils have carried constant currents for long.
 
-    Each gets an ideal source of the voltage :math:`u = R\,i` in place of its driver, so that a run
-    of this network keeps the current.
+    An ideal source of the voltage :math:`u = R\,i` replaces the driver of each, so that a run keeps
+    the current.
 
     Parameters
     ----------
     currents [A]
-        By coil, all of them; from 0.
+        Of all coils, from 0.
 
     Raises
     ------
@@ -157,7 +155,7 @@ def driven(network: Network, currents: Mapping[str, float]) -> Network:
 
 
 def _with_sources(network: Network, changed: Mapping[str, Component]) -> Network:
-    """Network with constant sources in place of drivers: no capacitor feeds them any more."""
+    """Network with constant sources in place of drivers, which no capacitor feeds."""
     shared = [name for name, part in network.components.items() if isinstance(part, BoostCapacitor)]
     if not shared:
         return network.with_components(changed)
@@ -168,7 +166,7 @@ def _with_sources(network: Network, changed: Mapping[str, Component]) -> Network
 
 
 def _starting(part: Component, port: str, current: float) -> dict[str, object]:
-    """What of a magnet changes for another current of one of its coils at the start."""
+    """Changed keys of a magnet for another current of one of its coils at the start."""
     if port == "terminals":
         return {"start_current": current}
     circuits = dict(getattr(part, "circuits", {}))
@@ -177,11 +175,10 @@ def _starting(part: Component, port: str, current: float) -> dict[str, object]:
 
 
 def current_left(magnet: Magnet, currents: Mapping[str, float], gap: float) -> float:
-    """Current that the steady fluxes of a magnet carry at a gap [m], less the wanted one [A].
+    """Current of the steady fluxes of a magnet at a gap [m], less the wanted one [A].
 
-    ``currents`` [A] are those of its coils by port.  The fluxes are those of
-    :func:`~klack.magnetics.steady_coil.steady_fluxes`; here they are put into the circuit, or the
-    map, again.
+    ``currents`` [A] are those of its coils by port.  The fluxes of
+    :func:`~klack.magnetics.steady_coil.steady_fluxes` are put into the circuit, or the map, again.
     """
     others = dict(currents)
     current = others.pop("terminals")

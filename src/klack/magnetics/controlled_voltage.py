@@ -18,8 +18,7 @@ class ControlledVoltage(Controlled, Driver):
     ``diode`` the current cannot turn negative, as in a half bridge: a negative output drives it
     down, and then the coil is open.
 
-    Limits: an ideal source without inner resistance; a pulse-width modulation is the mean voltage
-    of its period.
+    Limits: an ideal source; a pulse-width modulation is the mean voltage of its period.
     """
 
     type: ClassVar[str] = "controlled-voltage"

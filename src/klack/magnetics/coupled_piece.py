@@ -8,9 +8,8 @@ magnet eliminated, the currents of those that conduct follow from one small symm
     \sum_b \Bigl[\frac{n_a^T A^{-1} n_b}{h} + R_a\,\delta_{ab} + k_a k_b\frac{h}{2 C}\Bigr] i_b
     = u_a - \frac{n_a^T \Delta\varphi}{h} ,
 
-``A`` being the derivative of the loop balances.  The first term is there for windings of one
-magnet, the last one for those at one capacitor: the symmetry of the first is that of the mutual
-inductance.
+with the derivative ``A`` of the loop balances.  The first term couples windings of one magnet (its
+symmetry is that of the mutual inductance), the last one those at one capacitor.
 
 Arrays are pointers: ``phi`` and ``change`` have 6 numbers for each magnet, ``hints`` have ``KEPT``,
 ``middle``, ``final`` and ``slope`` have ``MOST_TUBES``.  Layout of ``par``:
@@ -73,7 +72,7 @@ def winding_row(par: Any, w: int) -> int:
 
 @inner(error_model="numpy", forceinline=True)
 def winding_path(par: Any, row: int, mode: float) -> int:
-    """Where the path of the current of a winding starts, of those in its output stage."""
+    """Where the present path of a winding starts in its output stage."""
     return stage_path(int(par[row + 3]), mode)
 
 
@@ -177,7 +176,7 @@ def coupled_solve(
     """Find the changes of all fluxes over a piece (in: a guess) and the mean currents [A].
 
     ``shut`` is 1 for windings that conduct, ``charged`` are the capacitors after the first half of
-    their converters' work.  False if the iteration does not settle.
+    their converters' work.  False without convergence.
     """
     g, z = stack(phi, 48), stack(phi, 48)
     B = stack(phi, 64)
@@ -263,7 +262,7 @@ def coupled_current(par: Any, row: int, hints: Any, phi: Any, change: Any, final
 def coupled_discharged(
     par: Any, c: int, modes: Any, charged: float, mean: Any, size: float
 ) -> tuple[float, float]:
-    """Return a capacitor after the currents of a piece, and after its converter as well."""
+    """Capacitor after the currents of a piece, and after its converter as well."""
     capacitor = int(par[6]) + CAPACITOR_ROW * c
     drawn = 0.0 * charged
     for w in range(int(par[1])):
@@ -298,7 +297,7 @@ def coupled_locate(
     """Length of the piece at whose end a winding, or its capacitor, meets a target.
 
     ``before`` and ``after`` are the values at both ends of the whole piece; the target rises
-    evenly by ``rise`` over it.  Negative if that fails; ``change`` and ``mean`` leave with those of
+    evenly by ``rise`` over it.  Negative on failure; ``change`` and ``mean`` leave with those of
     the located piece.
     """
     middle, final, slope = stack(phi, 144), stack(phi, 144), stack(phi, 144)
@@ -343,8 +342,8 @@ def coupled_settle(
 ) -> tuple[float, float]:
     """Let the fluxes of a magnet spread among loops without eddy currents.
 
-    At constant linkage of all windings but those that ``opens`` names, which have no current then.
-    Returns the energy released and the heat of hysteresis [J]; all pointers are those of the whole
+    At constant linkage of all windings but those in ``opens``, which have no current then.
+    Returns the energy released and the heat of hysteresis [J]; pointers are those of the whole
     system but ``move``, the changes of the loop fluxes of this magnet.
     """
     row = magnet_row(par, m)

@@ -43,7 +43,7 @@ class PlacedMagnet:
     nodes
         Electric node of each winding.
     remanent
-        Whether hysteretic iron starts as saturation has left it.
+        Whether hysteretic iron starts as saturation left it.
     names_loops
         Whether the flux of every loop is recorded.
     """
@@ -64,11 +64,8 @@ def coupled_rows(
 ) -> None:
     """Add windings that share magnets or capacitors to a network, as one row.
 
-    Parameters
-    ----------
-    shared : mapping of int to (str, Capacitor), optional
-        Of the windings that draw from a capacitor which is a component, by electric node: its
-        name, and its numbers.
+    ``shared`` has, by electric node of a winding, the name and numbers of its capacitor that is a
+    component.
     """
     _tell_remanence(placed)
     system, capacitors = _system(placed, shared or {})
@@ -131,7 +128,7 @@ def coupled_rows(
 def _system(
     placed: Sequence[PlacedMagnet], shared: Mapping[int, tuple[str, Capacitor]]
 ) -> tuple[CoupledSystem, list[tuple[str, str]]]:
-    """System, and of each of its capacitors the component and the name in it, perhaps empty."""
+    """System, and of each capacitor the component and its name there, perhaps empty."""
     names, capacitors = list[tuple[str, str]](), list[Capacitor]()
     magnets = []
     for part in placed:

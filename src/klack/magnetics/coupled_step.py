@@ -1,15 +1,14 @@
-r"""The step of windings that share a magnet, or a boost capacitor, each with its own driver.
+r"""The step of windings that share a magnet or a boost capacitor.
 
-The same pieces, fluxes and energies as in the step of one coil (:mod:`klack.magnetics.flux_step`);
-what differs is that a piece ends at the first event of any winding, and that the currents are
-solved together (:mod:`klack.magnetics.coupled_piece`).  An event found is looked at again from
-its own end: where another winding has met a target before, the piece ends there.  The energies
-balance exactly,
+As in the step of one coil (:mod:`klack.magnetics.flux_step`), but a piece ends at the first event
+of any winding, and the currents are solved together (:mod:`klack.magnetics.coupled_piece`).  An
+event found is checked again from its own end: where another winding has met a target before, the
+piece ends there.  The energies balance exactly,
 
 .. math:: \sum_m \int u_m i_m\,dt = \sum_m \int R_m i_m^2 dt + \text{eddy loss} + \Delta W
           + \sum \bar F\,\Delta y ,
 
-with the work of each source counted by itself.
+with the work of each source by itself.
 """
 
 from klack.machine.compiling.constant import constant
@@ -62,7 +61,7 @@ _LATE = 4  # times that a piece is shortened to an event before the one found
 
 @step_function
 def coupled_step(par, state, inp, out):  # type: ignore[no-untyped-def]
-    """Step of windings: ports armature and base of each magnet; see the module text."""
+    """Step of windings: ports armature and base of each magnet."""
     t, h = inp[0], inp[1]
     magnets, windings, capacitors = int(par[0]), int(par[1]), int(par[2])
     size = int(par[3])

@@ -1,14 +1,13 @@
 r"""Windings that share magnets and boost capacitors, as flat numbers for the compiled step.
 
-Of each winding the current must follow from the fluxes alone.  In directions ``v`` of the loop
-fluxes without eddy currents the balance holds at every instant,
+The currents must follow from the fluxes alone.  In directions ``v`` of the loop fluxes without eddy
+currents the balance holds at every instant,
 
 .. math:: v^T C^T \Theta = v^T N i, \qquad C^T S C\,v = 0 ,
 
-with one column of ``N`` for each winding.  The directions :math:`v_m` with
-:math:`N^T v_m = e_m` give the currents, :math:`i_m = v_m^T C^T\Theta`; they exist if
-the windings are linked with the free loops independently: each has leakage of its own.  Without it
-the currents of an ideal transformer would jump with the voltage.
+with a column of ``N`` per winding.  The directions :math:`v_m` with :math:`N^T v_m = e_m` give the
+currents, :math:`i_m = v_m^T C^T\Theta`; they exist if each winding has leakage of its own, without
+which the currents of an ideal transformer would jump with the voltage.
 """
 
 from collections.abc import Sequence
@@ -57,9 +56,9 @@ class Winding:
     Parameters
     ----------
     name
-        What its channels and energies are called after; may be empty.
+        Of its channels and energies; may be empty.
     owner
-        Component that its magnet is.
+        Component of its magnet.
     circuit
         That of the branches with its turns.
     resistance [ohm]
@@ -67,7 +66,7 @@ class Winding:
     current [A]
         At the start.
     capacitor
-        Number of the boost capacitor of its output stage; one of its own by default.
+        Number of the boost capacitor of its output stage; by default its own.
     """
 
     name: str
@@ -121,7 +120,7 @@ class CoupledSystem:
 
     @property
     def hysteretic(self) -> list[bool]:
-        """Whether a magnet has iron with hysteresis, for each."""
+        """Whether each magnet has iron with hysteresis."""
         return [magnet.circuit.hysteretic for magnet in self.magnets]
 
     def numbers(self) -> Vector:
@@ -203,8 +202,7 @@ class CoupledSystem:
     ) -> Vector:
         """State at the start: drivers in their first states, coils without current open.
 
-        ``fluxes`` are those of the loops [Wb] and ``stops`` those of hysteretic iron [A], of each
-        magnet.
+        ``fluxes`` of the loops [Wb] and ``stops`` of hysteretic iron [A] are those of each magnet.
         """
         state = np.zeros(int(parameters[3]))
         for w, winding in enumerate(self.windings):
@@ -233,8 +231,8 @@ def _magnet_states(numbers: Vector) -> int:
 def independent_ways(circuit: MagneticCircuit, names: Sequence[str]) -> tuple[Vector, Vector]:
     """Directions of the loop fluxes that no eddy term opposes, shape (k, n_loops).
 
-    Those that change no linkage of the electric circuits ``names``, and those of which each changes
-    that of one of them by 1 Wb.
+    First those that change no linkage of the electric circuits ``names``, then those that each
+    change that of one of them by 1 Wb.
 
     Raises
     ------

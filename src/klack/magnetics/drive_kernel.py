@@ -26,7 +26,6 @@ def state_block(par: Any, drive: int, state: int) -> int:
 
 @inner(error_model="numpy")
 def _point_after(par: Any, course: int, time: float) -> int:
-    """Return the first point of a course that is later than ``time``."""
     low, high = 0, int(par[course])
     while low < high:
         middle = (low + high) // 2
@@ -39,7 +38,6 @@ def _point_after(par: Any, course: int, time: float) -> int:
 
 @inner(error_model="numpy")
 def _value_at(par: Any, course: int, time: float) -> float:
-    """Return the value of a course at a time since the start of the cycle."""
     n = int(par[course])
     i = _point_after(par, course, time)
     if i == 0:
@@ -53,7 +51,7 @@ def _value_at(par: Any, course: int, time: float) -> float:
 
 @inner(error_model="numpy", forceinline=True)
 def state_voltage(par: Any, block: int, time: float) -> float:
-    """Return the voltage of a state at a time since the start of the cycle [V]."""
+    """Voltage of a state at a time since the start of the cycle [V]."""
     source = block + 3 + 4 * int(par[block + 2])
     if par[block] == 1.0:
         return _value_at(par, source, time)
@@ -62,7 +60,7 @@ def state_voltage(par: Any, block: int, time: float) -> float:
 
 @inner(error_model="numpy", forceinline=True)
 def switch_current(par: Any, block: int, switch: int, time: float) -> float:
-    """Return the current of a switch [A] at a time since the start of the cycle."""
+    """Current of a switch [A] at a time since the start of the cycle."""
     value = par[block + 4 + 4 * switch]
     if par[block] == 2.0:
         value += _value_at(par, block + 4 + 4 * int(par[block + 2]), time)
@@ -73,7 +71,7 @@ def switch_current(par: Any, block: int, switch: int, time: float) -> float:
 def due_switch(
     par: Any, block: int, time: float, entered: float, cycle: float, current: float, close: float
 ) -> int:
-    """Return the first switch that is due now, by ``close`` at the latest; -1 if none.
+    """First switch that is due now, by ``close`` at the latest; -1 if none.
 
     A target that jumps now has its later value.
     """
@@ -95,7 +93,7 @@ def due_switch(
 
 @inner(error_model="numpy", forceinline=True)
 def next_time(par: Any, block: int, time: float, entered: float, cycle: float) -> float:
-    """Return the next time at which a course of a state bends or a switch is due."""
+    """Next time at which a course of a state bends or a switch is due."""
     due = NEVER
     count = int(par[block + 2])
     for k in range(count):
@@ -116,7 +114,7 @@ def next_time(par: Any, block: int, time: float, entered: float, cycle: float) -
 
 @inner(error_model="numpy", forceinline=True)
 def crossed_switch(par: Any, block: int, before: int, current: float, time: float) -> int:
-    """Return the first switch from ``before`` on that an end current calls for; -1 if none."""
+    """First switch from ``before`` on that an end current calls for; -1 if none."""
     for k in range(before, int(par[block + 2])):
         when = par[block + 3 + 4 * k]
         if when > 1.0:

@@ -25,11 +25,11 @@ _USUAL_BAND = 0.05  # of the largest current
 class DriveProfile(DiodeDriver):
     r"""Straight lines between points of time: of the current, or of the voltage.
 
-    A **current** is followed by switching, as drivers do: the supply below the target by half of
-    the band, freewheeling above it by half of the band, the decay voltage above it by the whole
-    band, where the target falls faster than the coil freewheels.  Where the target is zero the
-    driver is off.  The current lags where the supply is too low for the slope,
-    :math:`L\,di/dt > u - R\,i`; the run does not say so, look at the current.
+    A **current** is followed by switching: the supply below the target by half of the band,
+    freewheeling above it by half of the band, the decay voltage above it by the whole band, where
+    the target falls faster than the coil freewheels.  At a target of zero the driver is off.  The
+    current lags, without notice, where the supply is too low for the slope, :math:`L\,di/dt > u -
+    R\,i`.
 
     A **voltage** is applied as it is; a diode keeps the current from turning negative.
 
@@ -152,7 +152,7 @@ class DriveProfile(DiodeDriver):
 
 
 def _pieces(time: tuple[float, ...], current: tuple[float, ...]) -> Iterator[tuple[float, bool]]:
-    """End of each stretch in which the target is zero, or is not: time, whether it is not."""
+    """End of each stretch with or without a zero target: time, whether it is not zero."""
     works: bool | None = None
     for k in range(1, len(time)):
         if time[k] == time[k - 1]:

@@ -1,16 +1,14 @@
 r"""Driver of a coil: a small state machine, compiled from every driver component.
 
-A driver is in one *state* at a time.  The state says which voltage the terminals see (constant, or
-a course over time) and whether a diode keeps the current from turning negative; its *switches* say
-when it goes over into another one: current above or below a value, time in the state, or time
-since the start of the cycle.  Switches are looked at in their order; the first that is due wins.
-A state may have a *target*, a current over time: the currents of its switches count from there.
+A *state* has a voltage (constant, or a course over time), perhaps a diode that keeps the current
+from turning negative, and *switches* into other states: current above or below a value, time in the
+state, or time since the start of the cycle; the first that is due wins.  With a *target*, a current
+over time, the currents of the switches count from there.
 
 With a diode the coil is left open once its current has come down to zero, and is connected again
-when the driver offers more than the coil induces, :math:`u > \dot\psi`.  Freewheeling is a state
-of a small negative voltage (the forward voltage of a diode), fast decay one of a large negative
-voltage (the zener diode or the boost capacitor that the current is driven back into): what flows
-back is a negative supply.
+when the driver offers more than the coil induces, :math:`u > \dot\psi`.  Freewheeling is a state of
+a small negative voltage (the forward voltage of a diode), fast decay one of a large negative
+voltage (zener diode or boost capacitor): what flows back is a negative supply.
 
 Limits: ideal switches without transients of their own; sources without inner resistance (add a
 harness to the resistance of the coil).
@@ -62,13 +60,10 @@ class Switch:
 
     Parameters
     ----------
-    value : float [A] or [s]
-        Times in the state count from entering it, ``When.TIME`` from the start of the cycle;
-        currents count from the target of the state, if it has one.
-    to
-        Name of the next state.
+    value [A] or [s]
+        Times in the state count from entering it, ``When.TIME`` from the start of the cycle.
     new_cycle
-        Whether a new cycle starts with it (``When.TIME`` only): exactly ``value`` after the last.
+        A new cycle starts (``When.TIME`` only), exactly ``value`` after the last.
     """
 
     when: When
@@ -85,7 +80,7 @@ class DriveCourse:
     ----------
     time (n,) [s]
         Not falling; a time that stands twice is a jump.
-    value : array, shape (n,) [V] or [A]
+    value (n,) [V] or [A]
         Constant before the first and after the last point.
     """
 
@@ -116,13 +111,9 @@ class DriveState:
 
     Parameters
     ----------
-    voltage : float [V] or DriveCourse
-    switches
-        The first that is due wins.
-    diode
-        Whether the current cannot turn negative.
-    target : DriveCourse [A], optional
-        Where the currents of the switches count from; with a constant voltage only.
+    voltage [V]
+    target [A]
+        With a constant voltage only.
     """
 
     name: str
@@ -139,8 +130,7 @@ class DriveProgram:
     Parameters
     ----------
     stage
-        What the current flows through in each state; the voltages of the states are then those
-        without current.
+        Paths of the current by state; the voltages of the states are then those without current.
 
     Examples
     --------
@@ -246,8 +236,8 @@ def _block(state: DriveState, names: Sequence[str]) -> NDArray[np.float64]:
 class Driver(Component):
     """Something with two terminals that drives a coil; joined to the terminals of a solenoid.
 
-    A driver adds no rows: the coil that it is joined to runs its program in its own step, because
-    a switching instant is a matter of the current in the coil.
+    It adds no rows: its coil runs its program, because switching depends on the current in the
+    coil.
     """
 
     ports: ClassVar[Mapping[str, Port]] = {"terminals": VOLTAGE}
@@ -257,10 +247,10 @@ class Driver(Component):
         """States and switches of this driver."""
 
     def commands(self) -> tuple[tuple[float, float | None], ...]:
-        """When it is switched on, and off again, in its first cycle [s]; none if it does not say.
+        """When it is switched on, and off again, in its first cycle [s].
 
-        A course over time and a controller do not: which of their changes opens the valve is not
-        known.
+        None for a course over time and a controller: which of their changes opens the valve is
+        unknown.
         """
         return ()
 
@@ -271,8 +261,8 @@ class Driver(Component):
 class DiodeDriver(Driver):
     """A driver that works from some time to another, perhaps again and again.
 
-    Before and after, the coil sees the decay voltage against its current through a diode: what
-    flows comes down fast, and then the coil is open.
+    Before and after, the decay voltage drives the current down through a diode, until the coil is
+    open.
     """
 
     freewheel: Voltage = Field(
@@ -307,12 +297,7 @@ class DiodeDriver(Driver):
         return DriveProgram(tuple(states))
 
     def require_period(self, end: float | None) -> None:
-        """Raise if the driver would start again before its end.
-
-        Raises
-        ------
-        CaseProblem
-        """
+        """Reject a driver that would start again before its end."""
         if self.repeat_every is not None and (end is None or self.repeat_every < end):
             raise CaseProblem(
                 ("repeat_every",),
@@ -350,7 +335,7 @@ class TimedDriver(DiodeDriver):
 
 
 def driver_of(rows: Rows, port: str = "terminals") -> DriveProgram:
-    """Program of the driver that the coil ``port`` of the present component is joined to."""
+    """Program of the driver at the coil ``port`` of the present component."""
     drivers = [partner for partner in rows.partner(port) if isinstance(partner, Driver)]
     if len(drivers) != 1:
         raise InputError(

@@ -1,7 +1,7 @@
 r"""Eddy currents in solid iron as a ladder of flux paths with shorted turns.
 
-A change of flux enters a solid core from its surface.  With ``tau = mu sigma a^2`` and
-``z^2 = s tau`` the magnetomotive force per flux of a core of static reluctance ``R`` is
+A change of flux enters a solid core from its surface.  With ``tau = mu sigma a^2`` and ``z^2 = s
+tau`` the mmf per flux of a core of static reluctance ``R`` is
 
 .. math::
 
@@ -10,8 +10,8 @@ A change of flux enters a solid core from its surface.  With ``tau = mu sigma a^
         + \cfrac{1}{5 + \dots}}}} \quad\text{(cylinder of radius a)}, \qquad
     \frac{\Theta}{R\varphi} = \frac z2 \coth\frac z2 \quad\text{(sheet of thickness a)} .
 
-Both are continued fractions (Gauss) and therefore Cauer ladders: a shorted turn ``S_1``, beside it
-a reluctance ``R_1`` in series with the next shorted turn ``S_2``, and so on:
+As continued fractions (Gauss) both are Cauer ladders: a shorted turn ``S_1``, beside it a
+reluctance ``R_1`` in series with the next shorted turn ``S_2``, and so on:
 
 ========  =======================  ======================
 core      ``S_k``                  ``R_k`` (k = 1, 2, ..)
@@ -20,11 +20,10 @@ cylinder  ``R tau/(8 k)``          ``(2 k + 1) R``
 sheet     ``R tau/(4 (4 k - 1))``  ``(4 k + 1) R``
 ========  =======================  ======================
 
-``R tau = sigma l/pi`` for the cylinder: the shorted turns do not depend on the permeability, the
-reluctances do, so one term needs no permeability.  Error of ``|Theta/phi|`` of a cylinder at
-``omega tau`` = 1, 10, 100: 1 term -0.5, -7, +142 %; 2 terms 0.0, -0.2, -4.6 %; 3 terms 0.0, 0.0,
--5.6 %; 4 terms 0.0, 0.0, 0.3 %.
-The ladder passes on the static flux exactly and dissipates ``S_k (dphi_k/dt)^2`` in each turn.
+``R tau = sigma l/pi`` for the cylinder: the shorted turns do not depend on the permeability, so one
+term needs none.  Error of ``|Theta/phi|`` of a cylinder at ``omega tau`` = 1, 10, 100: 1 term -0.5,
+-7, +142 %; 2 terms 0.0, -0.2, -4.6 %; 3 terms 0.0, 0.0, -5.6 %; 4 terms 0.0, 0.0, 0.3 %.  The
+ladder passes on the static flux exactly and dissipates ``S_k (dphi_k/dt)^2`` in each turn.
 
 Limits: one differential permeability; iron that saturates from the surface inwards is followed in
 its mean only.  Sources: Stoll, The Analysis of Eddy Currents, 1974; the coefficients were
@@ -41,7 +40,7 @@ from klack.magnetics.iron import VACUUM_PERMEABILITY
 __all__ = ["MOST_TERMS", "EddyLadder", "EddyShape", "cylinder_ladder", "sheet_ladder"]
 
 MOST_TERMS = 4
-"""Most terms of a ladder: each one after the first is one more flux state."""
+"""Most terms of a ladder; each after the first is one more flux state."""
 
 EddyShape = Literal["cylinder", "sheet"]
 
@@ -62,10 +61,7 @@ class EddyLadder:
     reluctances: tuple[float, ...]
 
     def mmf_per_flux(self, s: complex) -> complex:
-        """Magnetomotive force of the ladder per flux [A/Wb] at the complex frequency ``s`` [1/s].
-
-        To be added to the static reluctance.
-        """
+        """Mmf per flux [A/Wb] at the complex frequency ``s`` [1/s], besides the static one."""
         value = s * self.conductances[-1]
         pairs = zip(self.conductances[-2::-1], self.reluctances[::-1], strict=True)
         for conductance, reluctance in pairs:
@@ -122,7 +118,7 @@ def sheet_ladder(
     ----------
     conductivity [S/m]
     length, thickness, width [m]
-        Along the flux, across, and along the face (circumference of a tube).
+        Along the flux, across, and along the face (circumference).
     permeability [-]
         Relative, differential; only for more than one term.
     terms

@@ -1,4 +1,4 @@
-"""Where within a piece an event lies: false position with halving of the end that stays.
+"""Where within a piece an event lies: false position, halving the value of the end that stays.
 
 Source: Dowell and Jarratt, BIT 11 (1971) 168, the Illinois rule.
 """
@@ -8,7 +8,7 @@ from klack.machine.compiling.jit import inner
 __all__ = ["LOCATED", "between", "narrowed"]
 
 LOCATED = 1e-12
-"""Instants within a step are found to this share of the current, and of the piece."""
+"""Share of the current, and of the piece, to which instants within a step are found."""
 
 
 @inner(error_model="numpy", forceinline=True)
@@ -22,7 +22,7 @@ def between(low: float, high: float, f_low: float, f_high: float, length: float)
 def narrowed(
     low: float, high: float, f_low: float, f_high: float, side: int, size: float, f: float
 ) -> tuple[float, float, float, float, int]:
-    """Both ends, their values, and which end was replaced (1 high, -1 low) by ``f`` at ``size``.
+    """Both ends, their values, and which end ``f`` at ``size`` replaced (1 high, -1 low).
 
     The value of an end that stays twice is halved, so that it moves too.
     """

@@ -1,6 +1,6 @@
 r"""One stretch of time of a magnetic circuit at constant voltage, compiled.
 
-From the fluxes :math:`\varphi_0` and gaps ``x0 -> x1`` the step finds the fluxes at its end from
+A step over gaps ``x0 -> x1`` solves
 
 .. math::
 
@@ -8,10 +8,10 @@ From the fluxes :math:`\varphi_0` and gaps ``x0 -> x1`` the step finds the fluxe
     \frac{n^T \Delta\varphi}{h} + R\,\bar\imath = \bar u .
 
 :math:`\bar\Theta` is a discrete gradient of the stored energy (Gonzalez 1996; Itoh and Abe 1988):
-of iron the mean of ``H`` between both fluxes, of a gap the mean of both reluctances times the
-mean flux.  With the force ``-(R1 - R0)/(x1 - x0) (b0^2 + b1^2)/4`` every step balances exactly:
-``u i h = R i^2 h + eddy loss + change of energy + F (x1 - x0)``.  Means and quotients of cubics
-are formed without subtraction, so nothing is lost when a step is short.
+of iron the mean of ``H`` between both fluxes, of a gap the mean of both reluctances times the mean
+flux.  With the force ``-(R1 - R0)/(x1 - x0) (b0^2 + b1^2)/4`` every step balances exactly: ``u i h
+= R i^2 h + eddy loss + change of energy + F (x1 - x0)``.  Means and quotients of cubics are formed
+without subtraction, so short steps lose no digits.
 
 All arrays are pointers to ``float64``; ``at`` is the start of the circuit in ``par`` (layout:
 :func:`klack.magnetics.flux_table.circuit_numbers`).  Work space lies on the stack.
@@ -57,10 +57,7 @@ _STOPS = 2 * MOST_TUBES  # of what a circuit keeps: places in tables, then the s
 
 @intrinsic(prefer_literal=True)
 def stack(typingctx: Any, of: Any, size: Any) -> Any:
-    """Return ``size`` (a literal) numbers of work space on the stack of the calling function.
-
-    They are of the kind that ``of``, a pointer, points to.
-    """
+    """Work space of ``size`` (a literal) numbers like ``of`` on the stack of the caller."""
     from numba import types
     from numba.core import cgutils
 
@@ -78,7 +75,7 @@ def stack(typingctx: Any, of: Any, size: Any) -> Any:
 
 @inner(error_model="numpy", forceinline=True)
 def interval(par: Any, table: int, hint: int, value: float) -> int:
-    """Number of the interval that holds ``value``, searched from where it was last."""
+    """Interval that holds ``value``, searched from ``hint`` on."""
     last = int(par[table]) - 1
     i = hint
     while i > 0 and value < par[table + 1 + 6 * i]:
@@ -139,7 +136,6 @@ def _iron_mean_far(par: Any, table: int, hint: int, b0: float, b1: float) -> tup
 
 @inner(error_model="numpy", forceinline=True)
 def _mean_of(par: Any, row: int, s0: float, s1: float) -> float:
-    """Mean of a cubic between ``s0`` and ``s1``."""
     total, squares = s0 + s1, s0 * s0 + s1 * s1
     return (
         par[row + 1]
@@ -179,7 +175,6 @@ def gap_reluctance(par: Any, table: int, hint: int, x: float) -> float:
 
 @inner(error_model="numpy", forceinline=True)
 def _quotient_of(par: Any, row: int, s0: float, s1: float) -> float:
-    """Difference quotient of a cubic between ``s0`` and ``s1``."""
     total = s0 + s1
     return par[row + 2] + par[row + 3] * total + par[row + 4] * (total * total - s0 * s1)
 
@@ -264,7 +259,7 @@ def circuit_current(par: Any, at: int, hints: Any, phi: Any, change: Any, end: A
 def weighted_mmf(
     par: Any, at: int, hints: Any, phi: Any, change: Any, end: Any, weights: int, stride: int
 ) -> float:
-    """Sum of the mmfs of the tubes at ``phi + change``, each by its weight.
+    """Sum of the mmfs of the tubes at ``phi + change``, weighted.
 
     The weights [-] stand in ``par`` from ``weights`` on, ``stride`` apart.
     """
@@ -294,7 +289,7 @@ def weighted_mmf(
 
 @inner(error_model="numpy", forceinline=True)
 def circuit_energy(par: Any, at: int, hints: Any, phi: Any, end: Any) -> float:
-    """Stored energy [J]; notes in ``hints`` where in the tables of iron it was found."""
+    """Stored energy [J]; ``hints`` keeps the places in the tables of iron."""
     loops = int(par[at])
     p = at + _HEADER + loops
     energy = 0.0
@@ -351,7 +346,7 @@ def circuit_heat(par: Any, at: int, hints: Any, phi: Any, change: Any) -> float:
 
 @inner(error_model="numpy")
 def factorise(A: Any, n: int) -> bool:
-    """Replace the lower half of ``A`` by its Cholesky factor; False if it is not positive."""
+    """Replace the lower half of ``A`` by its Cholesky factor; False if not positive definite."""
     for j in range(n):
         d = A[j * n + j]
         for m in range(j):
@@ -396,9 +391,10 @@ def assemble(
     A: Any,
     g: Any,
 ) -> None:
-    """Take the mean mmfs of all tubes from ``g``, and add their slopes to the lower half of ``A``.
+    """Subtract the mean mmfs of all tubes from ``g``, and add their slopes to the half ``A``.
 
-    ``g`` has the balance of each loop, ``A`` its derivative by the changes of the loop fluxes.
+    ``g`` has the balance of each loop, ``A`` its derivative by the changes of the loop fluxes
+    (lower half).
     """
     loops, tubes = int(par[at]), int(par[at + 1])
     for k in range(tubes):
@@ -443,8 +439,8 @@ def circuit_step(
     """Find the change of the loop fluxes (in: a guess) and the mean current [A].
 
     ``reluctance`` are the means of the tubes and ``per_time = 1/h``.  Without ``conducts`` the coil
-    is open: no current, whatever the voltage.  The current is eliminated last, so that a small
-    resistance does no harm.  False if the iteration does not settle.
+    is open.  The current is eliminated last, so that a small resistance does no harm.  False
+    without convergence.
     """
     A, g, z = stack(phi, 36), stack(phi, 6), stack(phi, 6)
     loops = int(par[at])
@@ -481,15 +477,15 @@ def circuit_step(
 def circuit_settle(
     par: Any, at: int, hints: Any, phi: Any, end: Any, is_open: bool, move: Any
 ) -> tuple[float, float]:
-    r"""Let the flux spread among loops without eddy currents; return energies [J].
+    """Let the flux spread among loops without eddy currents; return energies [J].
 
-    Such loops balance at every instant.  A step balances their mean only, so that what they lack
-    at its start has the opposite sign at its end, and so on: the fluxes ring, and with them the
-    voltage of an open coil.  ``move`` becomes the change of the loop fluxes ``phi`` that makes
-    them balance at the reluctances ``end``, at constant linkage, or without current if the coil
-    is open.  The stored energy is least there: its change is minus a loss, the mean mmf times
-    ``move``, and of the second order in what was lacking.  Zero, and no move, where nothing is
-    gained.  Returns the energy released and the heat of hysteresis.
+    Such loops balance at every instant.  A step balances their mean only, so that a defect at its
+    start has the opposite sign at its end: the fluxes ring, and with them the voltage of an open
+    coil.  ``move`` becomes the change of the loop fluxes ``phi`` that makes them balance at the
+    reluctances ``end``, at constant linkage, or without current if the coil is open.  The stored
+    energy is least there: its change is minus a loss, the mean mmf times ``move``, of the second
+    order in the defect.  Zero, and no move, where nothing is gained.  Returns the energy released
+    and the heat of hysteresis.
     """
     table = at + int(par[at + SETTLES])
     count = int(par[table]) + (1 if is_open else 0)
@@ -508,7 +504,7 @@ def settle_along(
     count: int,
     move: Any,
 ) -> tuple[float, float]:
-    """Do what :func:`circuit_settle` does along ``count`` directions, ``ways`` from ``first`` on.
+    """:func:`circuit_settle` along ``count`` directions, ``ways`` from ``first`` on.
 
     A direction is one number for each loop.
     """

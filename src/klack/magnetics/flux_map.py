@@ -4,13 +4,12 @@ Everything follows from the stored energy :math:`W(\psi, x)`,
 
 .. math:: i = \frac{\partial W}{\partial \psi}, \qquad F = -\frac{\partial W}{\partial x} ,
 
-so a force that was given besides is not used, only compared (:class:`ForceComparison`): two tables
-that contradict each other would make a machine that creates energy.  Per gap of the table,
-``psi(i)`` is a monotone cubic; its inverse ``i(psi)`` is tabulated on common linkages, integrated
-exactly, and joined over the gap by cubic splines.  The result is one bicubic surface, C1: current
-and force are continuous.  The current rises with the linkage everywhere on it, :math:`\partial^2
-W/\partial\psi^2 > 0`, so a voltage leads to one current only; a table whose splines fall between
-two gaps is refused.
+so a given force is only compared (:class:`ForceComparison`): two contradicting tables would create
+energy.  Per gap of the table, ``psi(i)`` is a monotone cubic; its inverse ``i(psi)`` is tabulated
+on common linkages, integrated exactly, and joined over the gap by cubic splines into one bicubic
+surface, C1: current and force are continuous.  The current rises with the linkage,
+:math:`\partial^2 W/\partial\psi^2 > 0`, so a voltage leads to one current only; a table whose
+splines fall between two gaps is rejected.
 
 Limits: no eddy currents (add them as a resistance, or describe the circuit); beyond the table
 the surface continues linearly in each direction, in ``psi`` with the last differential inductance.
@@ -38,7 +37,7 @@ _PLACES = 33  # looked at between two gaps
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ForceComparison:
-    r"""How far a given force is from that of the linkage: virtual work.
+    r"""Difference of a given force from that of the linkage, by virtual work.
 
     Force and linkage are slopes of one co-energy, so at constant current
 
@@ -55,9 +54,9 @@ class ForceComparison:
         Their difference over the largest given force.
     ratio [-]
         Given over derived force on the whole (least squares).
-    step : tuple of float [A], [A], [m]
-        Two neighbouring currents of the table and the gap between which ``dF`` and
-        ``(dpsi/dx) di`` differ most: there the contradiction arises.
+    step [A], [A], [m]
+        Two neighbouring currents and the gap where ``dF`` and ``(dpsi/dx) di`` differ most: there
+        the contradiction arises.
     step_share [-]
         That difference over the largest given force.
     """
@@ -120,18 +119,13 @@ class FluxMap:
         linkage (k, n) [Wb]
             Increasing with the current.
         force (k, n) [N]
-            Negative where it closes the gap; compared only.
-
-        Warns
-        -----
-        AccuracyWarning
-            If the given force differs by more than 5 % of its peak.
+            Negative where it closes the gap; a deviation above 5 % of its peak is warned of.
 
         Raises
         ------
         InputError
-            If the table is not increasing, or too rough over the gap: the current would fall with
-            rising linkage between two of its gaps.
+            If the table is not increasing, or so rough over the gap that the current would fall
+            with rising linkage between two of its gaps.
         """
         i, x, psi = _checked(current, gap, linkage)
         common = np.linspace(0.0, float(psi.max()), _LINKAGES)
@@ -162,15 +156,15 @@ class FluxMap:
         return float(np.copysign(1.0, linkage)) * self._evaluate(linkage, gap)[1]
 
     def force_at(self, linkage: float, gap: float) -> float:
-        """Return the force along the gap [N]; negative closes it."""
+        """Force along the gap [N]; negative closes it."""
         return -self._evaluate(linkage, gap)[2]
 
     def table(self) -> Vector:
-        """Return flat numbers for a compiled loop.
+        """Flat numbers for a compiled loop.
 
         ``[m, n, step of psi]``, the ``n`` gaps, then for each cell ``(k, j)``, ``k`` slowest, 16
-        numbers ``c[a, b]``, ``b`` fastest: ``W = sum c[a, b] u^a v^b`` with ``u`` and ``v`` the
-        linkage and the gap from the corner of the cell, in the cell's lengths (0 to 1).
+        numbers ``c[a, b]``, ``b`` fastest: ``W = sum c[a, b] u^a v^b`` with linkage ``u`` and gap
+        ``v`` from 0 to 1 within the cell.
         """
         step = float(self.linkage[1])
         head = np.array([float(self.linkage.size), float(self.gap.size), step])
@@ -217,7 +211,7 @@ class FluxMap:
         return float(energy), float(current), float(slope)
 
     def _require_rising(self) -> None:
-        """Refuse a surface on which the current falls somewhere as the linkage rises."""
+        """Reject a surface on which the current falls as the linkage rises."""
         values = _bending(self.energy, self.linkage[1] * self.current)
         slopes = _bending(self.slope, self.linkage[1] * self.mixed)
         wide = np.diff(self.gap)
@@ -242,9 +236,9 @@ class FluxMap:
     def compare_force(
         self, current: ArrayLike, linkage: ArrayLike, force: ArrayLike
     ) -> ForceComparison:
-        """Compare a force table, shape (k, n), with the map of a linkage table, by virtual work.
+        """Compare a force table (k, n) with the map of a linkage table, by virtual work.
 
-        ``current`` are the ``k`` currents, the gaps are those of the map.
+        ``current`` are the ``k`` currents; gaps are those of the map.
         """
         i, psi, given = (np.array(v, dtype=float) for v in (current, linkage, force))
         derived = np.array(
@@ -285,14 +279,13 @@ class FluxMap:
 _HERMITE = np.array(
     [[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [-3.0, 3.0, -2.0, -1.0], [2.0, -2.0, 1.0, 1.0]]
 )
-"""Values and slopes at 0 and 1 -> coefficients of a cubic."""
+"""Coefficients of a cubic from values and slopes at 0 and 1."""
 
 
 def _bending(W: Vector, i: Vector) -> Vector:
     """Second derivative by the linkage at both ends of all cells, shape (2, m - 1, n).
 
-    ``W`` and ``i`` are values and slopes at the linkages, in lengths of a cell; between its ends
-    the second derivative of a cubic is straight.
+    ``W`` and ``i`` are values and slopes at the linkages, in lengths of a cell.
     """
     rise = 6.0 * np.diff(W, axis=0)
     return np.stack([rise - 4.0 * i[:-1] - 2.0 * i[1:], 4.0 * i[1:] + 2.0 * i[:-1] - rise])
@@ -340,8 +333,8 @@ def _column(i: Vector, psi: Vector, common: Vector) -> tuple[Vector, Vector]:
 def _convex(energy: Vector, current: Vector, step: float) -> Vector:
     """Energies between which a cubic with the slopes ``current`` bends upwards everywhere.
 
-    A current like ``psi^p`` with ``p > 2`` within one cell would not: above straight lines the
-    energy of a cell must be one to two thirds of what the rise of the current would give.
+    A current like ``psi^p`` with ``p > 2`` within one cell would not: the energy of a cell above a
+    straight line must be one to two thirds of what the rise of the current would give.
     """
     rise = step * np.diff(current)
     least, most = _SHARE * rise, (1.0 - _SHARE) * rise

@@ -1,8 +1,6 @@
 """Pieces of the step of a coil: from one switching instant to the next.
 
-A piece has a constant voltage at its source and an even motion of the armature.  The step of one
-coil (:mod:`klack.magnetics.flux_step`) and that of several windings
-(:mod:`klack.magnetics.coupled_step`) are made of them.
+A piece has a constant voltage at its source and an even motion of the armature.
 """
 
 from typing import Any
@@ -44,10 +42,10 @@ __all__ = [
 ]
 
 NO_SWITCH, DIODE_BLOCKS, CAPACITOR_EMPTY = -1, -2, -3
-"""What ends a piece beside the switches of a state."""
+"""Ends of a piece beside the switches of a state."""
 
 SPOTS = 2 * MOST_TUBES
-"""Places in tables that are kept from step to step, at most."""
+"""Most places in tables that are kept from step to step."""
 
 KEPT = SPOTS + MOST_STOPS
 """The same with the stops of hysteretic iron."""
@@ -56,10 +54,10 @@ MOST_EVENTS = 30
 """Switchings in a step, at most."""
 
 TELLING = 1e-6
-"""Of a step: shorter pieces say nothing of the rates of the fluxes."""
+"""Share of a step below which a piece says nothing of the rates of the fluxes."""
 
 FIRST_PIECE, LEAST_PIECE = 1 / 4, 1 / 64
-"""Of a step: the piece after a switch, and one that is not cut further for its bend."""
+"""Shares of a step: the piece after a switch, and one that is not cut further for its bend."""
 
 
 @inner(error_model="numpy", forceinline=True)
@@ -77,10 +75,10 @@ def piece_gaps(
 def piece_source(
     par: Any, block: int, stage: int, path: int, charged: float, size: float, time: float
 ) -> tuple[float, float]:
-    """Voltage [V] at a coil without current over a piece, and resistance [ohm] of the whole way.
+    """Voltage [V] at a coil without current over a piece, and resistance [ohm] of its path.
 
     Behind an output stage ``charged`` is the capacitor after the first half of the converter's
-    work; else ``time`` is that since the start of the cycle.
+    work; else ``time`` counts from the start of the cycle.
     """
     if stage == 0:
         return state_voltage(par, block, time), par[1]
@@ -102,7 +100,7 @@ def piece_advance(
     source: tuple[float, float],
     conducts: bool,
 ) -> tuple[bool, float]:
-    """Find the change of the fluxes over a piece, and its mean current; a source as above."""
+    """Find the change of the fluxes over a piece, and its mean current."""
     voltage, resistance = source
     if par[at + MAP] != 0.0:
         return map_step(
@@ -125,7 +123,7 @@ def piece_current(par: Any, at: int, hints: Any, phi: Any, change: Any, end: Any
 def discharged(
     par: Any, stage: int, path: int, charged: float, mean: float, size: float
 ) -> tuple[float, float]:
-    """Return the capacitor after the current of a piece, and after the converter as well."""
+    """Capacitor after the current of a piece, and after the converter as well."""
     passed = charged - par[path + 2] * mean * size / par[stage]
     return passed, recharged(par, stage, passed, 0.5 * size)
 
@@ -154,10 +152,10 @@ def piece_to_event(
     """Length of the piece at whose end current or capacitor meet a target, and its mean current.
 
     ``before`` and ``after`` are their values at both ends of the whole piece, ``held`` is the
-    capacitor at its start, ``time`` the middle of it since the start of the cycle: the voltage of a
-    course is that of the whole piece, straight as it is.  The target is ``target`` now and rises
-    evenly by ``rise`` over ``length``.  The length is negative if that fails; ``change`` comes with
-    the change over ``length`` and leaves with that of the located piece.
+    capacitor at its start, ``time`` its middle since the start of the cycle (a course has the
+    voltage of the whole piece).  The target is ``target`` now and rises evenly by ``rise`` over
+    ``length``.  The length is negative on failure; ``change`` is that over ``length``, then that of
+    the located piece.
     """
     middle, end, slope = stack(phi, MOST_TUBES), stack(phi, MOST_TUBES), stack(phi, MOST_TUBES)
     loops = int(par[at])
@@ -195,9 +193,9 @@ def piece_to_event(
 def first_crossing(
     par: Any, block: int, current: float, end: float, begin: float, over: float
 ) -> tuple[float, float, int]:
-    """Return the first transition before ``end``, its current now, and how far that rises.
+    """First transition before ``end``, its current now, and how far that rises.
 
-    ``begin`` and ``over`` are the times of the two ends since the start of the cycle.
+    ``begin`` and ``over`` are the times of both ends since the start of the cycle.
     """
     target, rise, which, earliest = 0.0, 0.0, NO_SWITCH, 2.0
     if par[block + 1] != 0.0 and end < 0.0:

@@ -1,30 +1,28 @@
-r"""The step of a solenoid: its driver, its coil, its magnetic circuit, its force.
+r"""The step of a solenoid: driver, coil, magnetic circuit, force.
 
-Within a step the driver may switch, the diode may block, the voltage may bend: the step is cut
-there, and each piece solved by itself (:mod:`klack.magnetics.flux_kernel`).  It is also cut where
-the fluxes bend: a piece whose change differs from what the rates so far tell, by more than a small
-share of the flux, is halved; after a switch pieces begin short and may double.  Instants of the
-clock are known beforehand; instants of the current are found by repeating the piece with other
-lengths until its end current is the wanted one, to 1e-12.  The armature moves evenly through all
-pieces, so the force of the step is the mean of theirs, weighted by their lengths, and the energy
-identity stays exact:
+The step is cut where the driver switches, the diode blocks or the voltage bends, and each piece is
+solved by itself (:mod:`klack.magnetics.flux_kernel`).  It is also cut where the fluxes bend: a
+piece whose change differs from that by the rates so far, by more than a small share of the flux, is
+halved; after a switch pieces begin short and may double.  Instants of the current are found by
+repeating the piece with other lengths until its end current is right to 1e-12.  The armature moves
+evenly, so the force of the step is the mean of the pieces, weighted by their lengths, and the
+energy identity stays exact:
 
 .. math:: \int u\,i\,dt = \int R\,i^2 dt + \text{eddy loss} + \Delta W
           + \bar F_a\,\Delta y_a + \bar F_b\,\Delta y_b
 
 (armature a, base b).
 
-Behind an output stage (:mod:`klack.magnetics.output_stage`) the source alone differs.  Within a
-piece of length h and mean current :math:`\bar\imath` the capacitor falls from :math:`U_0` to
-:math:`U_1 = U_0 - k\,\bar\imath\,h/C`, and its mean voltage is exactly that of its energy,
+Behind an output stage (:mod:`klack.magnetics.output_stage`), within a piece of length h and mean
+current :math:`\bar\imath` the capacitor falls from :math:`U_0` to :math:`U_1 = U_0 -
+k\,\bar\imath\,h/C`, and its mean voltage is exactly that of its energy,
 
 .. math:: \tfrac12 C (U_0^2 - U_1^2) = k\,\tfrac12 (U_0 + U_1)\,\bar\imath\,h ,
 
 so that it acts as a source :math:`k\,U_0` with a resistance :math:`h/2C` in series: the piece stays
-linear in the current, of order two, and its energy balances.  The converter works for half of
-the piece before and half of it after (Strang 1968), each in closed form.  Besides its switches a
-state ends when the capacitor has fallen to a voltage; that instant is located as those of the
-current are.
+linear in the current, of order two, and its energy balances.  The converter works for half of the
+piece before and half of it after (Strang 1968), each in closed form.  A state also ends when the
+capacitor has fallen to a voltage; that instant is located likewise.
 """
 
 import numpy as np
@@ -143,7 +141,7 @@ _HEADER = 8
 
 @step_function
 def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
-    """Step of a solenoid: ports armature and base; see the module text."""
+    """Step of a solenoid: ports armature and base."""
     stage = int(par[7])
     if stage == 0 and quiet_step(par, state, inp, out):
         return 0
@@ -412,8 +410,7 @@ def flux_state(
 ) -> NDArray[np.float64]:
     """State at the start: the driver in its first state, the coil open if it carries no current.
 
-    ``fluxes`` are those of the loops [Wb], ``stops`` those of hysteretic iron [A], ``current`` that
-    of the coil [A].
+    ``fluxes`` of the loops [Wb], ``stops`` of hysteretic iron [A], ``current`` of the coil [A].
     """
     state = np.zeros(int(parameters[6]))
     state[3] = 1.0 if current == 0.0 else 0.0
@@ -449,7 +446,7 @@ def flux_rows(
 
     Parameters
     ----------
-    plant : MagneticCircuit or FluxMap
+    plant
         Of a map, the recorded flux is the linkage.
     resistance [ohm]
         Of coil and harness, at temperature.
@@ -462,14 +459,13 @@ def flux_rows(
     armature, base
         Mechanical ports, perhaps :data:`klack.network.rows.GROUND`.
     current [A]
-        At the start; the fluxes are those that belong to it at the gap at which the armature rests,
-        with remanence.
+        At the start; the fluxes are those of this current at the gap at rest, with remanence.
     gap_range
-        That of the tables of the plant by default.
+        By default that of the tables of the plant.
     channels
         Recorded besides.
     remanent
-        Whether hysteretic iron starts as saturation has left it, instead of demagnetised.
+        Whether hysteretic iron starts as saturation left it, instead of demagnetised.
 
     Raises
     ------

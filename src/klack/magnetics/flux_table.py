@@ -1,14 +1,14 @@
 r"""A magnetic circuit as flat numbers for the compiled step.
 
-Branches that carry the same flux are one: their reluctances, eddy terms and magnetisation curves
-add up.  The sum of piecewise cubics is again one on the union of their intervals, so nothing is
-lost by it; a solenoid of ten tubes often comes down to two or three.
+Branches with the same flux are one: their reluctances, eddy terms and magnetisation curves add up
+exactly, as piecewise cubics on the union of their intervals; a solenoid of ten tubes often becomes
+two or three.
 
-The current must follow from the fluxes alone.  Where a loop has no eddy term, its balance says
+The current must follow from the fluxes alone.  Where a loop has no eddy term,
 
 .. math:: i = \frac{v^T C^T \Theta(\varphi, x)}{v^T n}, \qquad C^T S C\,v = 0 ,
 
-with ``n`` the turns linked with each loop.  Without such a loop the current would jump with the
+with the turns ``n`` linked with each loop.  Without such a loop the current would jump with the
 voltage, and a two-point driver would switch in every step.
 """
 
@@ -44,7 +44,7 @@ HEADER = 12
 """Numbers in front of a plant; see :func:`circuit_numbers`."""
 
 MAP = 7
-"""Number of the header that says that a map follows instead of a circuit."""
+"""Header number that tells a map from a circuit."""
 
 BRANCH_SIZE = 8
 """Numbers of a branch in front of its row of loops."""
@@ -59,10 +59,10 @@ STOPS = 8
 """Number of the header that counts the stops."""
 
 SETTLES = 9
-"""Number of the header that says where the directions without eddy currents stand, or 0."""
+"""Header number of the place of the directions without eddy currents, or 0."""
 
 CLOSE = 1e-8
-"""Newton step, over the flux at which the iron's curve ends, that leaves round-off: its square."""
+"""Newton step, over the flux at which the iron's curve ends, whose square is round-off."""
 
 _SAFE = 1e-9
 
@@ -188,7 +188,7 @@ def circuit_numbers(circuit: MagneticCircuit) -> Vector:
 def free_directions(circuit: MagneticCircuit) -> Vector:
     """Changes of the loop fluxes that no eddy term opposes, shape (k, n_loops).
 
-    The last one changes the linkage of the coil, the ones before it do not.
+    Only the last one changes the linkage of the coil.
     """
     n, null = circuit.loop_turns, free_loops(circuit)
     along = null.T @ n

@@ -34,13 +34,11 @@ class ForceMapSolenoid(Component):
 
     with one stored energy :math:`W(\psi, x)` built from the table, so that a stroke neither makes
     nor loses energy; see :class:`~klack.magnetics.flux_map.FluxMap`.  A force table is compared
-    with that, and a disagreement above 5 % of its peak is warned of.
+    with it, and a deviation above 5 % of its peak is warned of.
 
-    The table stands in the case or in a file of a finite-element program
-    (:class:`~klack.magnetics.map_choice.MapFile`).
-
-    It must hold every gap that the stops allow, and every current: beyond the last current
-    the linkage continues linearly, with a warning.
+    The table, in the case or in a file of a finite-element program
+    (:class:`~klack.magnetics.map_choice.MapFile`), must hold every gap that the stops allow, and
+    every current: beyond the last one the linkage continues linearly, with a warning.
 
     Limits: static map, so no eddy currents and no hysteresis; use
     :class:`~klack.magnetics.solenoid.Solenoid` where the first 100 us matter.
@@ -105,7 +103,6 @@ class ForceMapSolenoid(Component):
         return self
 
     def _whole_table(self) -> None:
-        """Refuse a table in the case that lacks a part."""
         for name in _TABLE[:3]:
             if getattr(self, name) is None:
                 raise CaseProblem(
@@ -127,7 +124,7 @@ class ForceMapSolenoid(Component):
                 )
 
     def table(self) -> MapTable:
-        """Return the table of the case or of the file."""
+        """Table of the case or of the file."""
         if self.map is not None:
             return self.map.table()
         return MapTable(

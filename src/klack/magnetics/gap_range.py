@@ -19,11 +19,11 @@ class GapRange:
 
     Parameters
     ----------
-    valid : (float, float)
+    valid
         Where its law holds; stops must keep the armature inside.
     slack
-        What a contact may give way beyond that before it is warned of.
-    usable : (float, float)
+        By which a contact may exceed that before it is warned of.
+    usable
         Beyond it a run stops.
     """
 

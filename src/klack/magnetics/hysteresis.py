@@ -1,21 +1,20 @@
 r"""Hysteresis of iron: elastic-plastic elements in the flux density beside the mean curve.
 
-With the flux as the unknown, the field strength is that of the mean (anhysteretic) curve and of
-``n`` stops, each elastic up to a yield that may fall with the flux density:
+The field strength is that of the mean (anhysteretic) curve and of ``n`` stops, each elastic up to a
+yield that may fall with the flux density:
 
 .. math::
 
     H = H_\text{an}(B) + \sum_k s_k, \qquad
     \mathrm ds_k = c\,\mathrm dB \;\text{ within }\; |s_k| \le \rho_k\,w(B), \qquad \sum\rho_k = 1 .
 
-This is the stop model [1], the form of the energy-based hysteresis models [2] that takes ``B`` as
-its input.  ``w`` is half the width of the major loop, ``w(0) = H_c``: once all stops have yielded,
-``H = H_an + w`` on the rising branch and ``H_an - w`` on the falling one.  The stored energy
-density is :math:`\int H_\text{an}\mathrm dB + \sum s_k^2/2c`, the rest of :math:`H\,\mathrm dB` is
-heat, never negative.  With equal stiffnesses :math:`c = 2H_c/(nb)` and shares
-:math:`\rho_k = (2k-1)/n^2` the curve from the demagnetised state is
-:math:`H_\text{an} + H_c[1 - (1 - B/b)^2]` up to ``b``, in ``n`` straight pieces: the Rayleigh
-law with ``B`` as its argument [3].
+This is the stop model [1], the energy-based hysteresis model [2] with ``B`` as input.  ``w`` is
+half the width of the major loop, ``w(0) = H_c``: once all stops have yielded, ``H = H_an + w`` on
+the rising branch and ``H_an - w`` on the falling one.  The stored energy density is :math:`\int
+H_\text{an}\mathrm dB + \sum s_k^2/2c`, the rest of :math:`H\,\mathrm dB` is heat, never negative.
+With equal stiffnesses :math:`c = 2H_c/(nb)` and shares :math:`\rho_k = (2k-1)/n^2` the curve from
+the demagnetised state is :math:`H_\text{an} + H_c[1 - (1 - B/b)^2]` up to ``b``, in ``n`` straight
+pieces: the Rayleigh law with ``B`` as its argument [3].
 
 Minor loops close exactly at their return points, and loops between equal limits are congruent
 where ``w`` is constant.  Tellinen's model [4] has the same major loop, but its minor loops drift,
@@ -66,11 +65,11 @@ class LoopWidth:
     Parameters
     ----------
     flux_density (k,) [T]
-        From 0, evenly spaced; beyond the last point the width stays as it is there.
+        From 0, evenly spaced; constant beyond the last point.
     width, slope (k,) [A/m], [m/H]
         ``w`` and ``dw/dB`` there: a cubic between.
     reversal [T]
-        ``b``: flux density from the demagnetised state at which the last stop yields.
+        ``b``: where the last stop yields from the demagnetised state.
     """
 
     flux_density: Vector
@@ -147,16 +146,14 @@ class IronStops:
 
 
 def constant_width(curve: IronCurve, coercivity: float, initial_permeability: float) -> LoopWidth:
-    """Loop of the same width everywhere: the mean curve moved by ``H_c`` to both sides.
+    """Loop of the same width everywhere: the mean ``curve`` moved by ``H_c`` to both sides.
 
     Parameters
     ----------
-    curve
-        Mean (anhysteretic) curve.
     coercivity [A/m]
         ``H_c``.
     initial_permeability [-]
-        Relative permeability of the demagnetised iron for small changes, below that of the curve.
+        Relative, of the demagnetised iron for small changes, below that of the curve.
     """
     require_positive("hysteresis: coercivity", coercivity, "A/m")
     end = float(curve.flux_density[-1])
@@ -203,19 +200,19 @@ def falling_width(
 
 
 def measured_loop(flux_density: ArrayLike, field_strength: ArrayLike) -> IronCurve:
-    """Mean curve of a major loop of which the falling branch was measured, tip to tip.
+    """Mean curve of a major loop from its measured falling branch, tip to tip.
 
     Parameters
     ----------
     flux_density [T]
-        From the positive tip to the negative one (or the other way round).
+        From the positive tip to the negative one, or back.
     field_strength [A/m]
         There, on the branch of falling flux density.
 
     Raises
     ------
     InputError
-        If the branch does not fall, is not one of a loop about the origin, or is the rising one.
+        If the branch does not fall, belongs to no loop about the origin, or is the rising one.
     """
     branch, tip = _branch(flux_density, field_strength)
     B = np.linspace(0.0, tip, _INTERVALS + 1)
@@ -284,7 +281,7 @@ def _branch(
 
 
 def _reversal(curve: IronCurve, coercivity: float, initial_permeability: float) -> float:
-    """Return ``b`` [T], so that the slope at the origin is that of the initial permeability."""
+    """``b`` [T], so that the slope at the origin is that of the initial permeability."""
     steep = float(curve.field_slope(0.0))
     most = 1.0 / (VACUUM_PERMEABILITY * steep)
     if not 1.0 < initial_permeability < most:
@@ -306,7 +303,7 @@ def _require_rising(
     grid: Vector,
     remanence: float,
 ) -> None:
-    """Refuse a loop on whose branches the field strength falls as the flux density rises."""
+    """Reject a loop on whose branches the field strength falls as the flux density rises."""
     fine = np.linspace(0.0, float(grid[-1]), 10 * grid.size)
     least = curve.field_slope(fine) - np.abs(law(fine)[1])
     if np.min(least) <= 0.0:

@@ -1,4 +1,4 @@
-"""Thermal classes of electrical insulation: how warm the copper of a coil may get."""
+"""Thermal classes of electrical insulation."""
 
 from collections.abc import Mapping
 from typing import Annotated, Literal
@@ -27,7 +27,7 @@ thermal class ratings", Essex Group.
 """
 
 USUAL_CLASS = "H"
-"""Class of the enamelled wire of most solenoids of valves: what a coil without a class may have."""
+"""Class of the enamelled wire of most solenoids of valves, for a coil without a class."""
 
 InsulationClass = Annotated[
     Literal["Y", "A", "E", "B", "F", "H", "N", "R", "250"] | None,

@@ -1,8 +1,7 @@
-r"""Soft magnetic iron: field strength over flux density, ``H(B)``, without hysteresis.
+"""Soft magnetic iron: field strength over flux density, ``H(B)``, without hysteresis.
 
-With the flux as unknown a circuit needs ``H`` *of* ``B``, so every law is kept that way: points
-with slopes, a cubic between them (C1), odd in ``B``, and beyond the last point a straight line.
-Energy density and co-energy follow exactly from the same cubics.
+With the flux as unknown a circuit needs ``H`` *of* ``B``: points with slopes, a cubic between them
+(C1), odd in ``B``, straight beyond the last point.  Energy density and co-energy follow exactly.
 
 ====================== ========================================================================= ===
 law                    equation                                                                  ref
@@ -18,8 +17,8 @@ law                    equation                                                 
 [3] Roschke 2000, as used in the FluxTubes package of the Modelica Standard Library.
 [4] Fritsch and Carlson, SIAM J. Numer. Anal. 17 (1980) 238.
 
-Limits: no hysteresis, no anisotropy, no temperature. Where a formula would fall below the slope of
-the vacuum (``dB/dH < mu0``, far above any use) the vacuum takes over.
+Limits: no hysteresis, no anisotropy, no temperature.  Far above any use, where ``dB/dH < mu0``, the
+vacuum takes over.
 """
 
 from collections.abc import Callable
@@ -106,9 +105,9 @@ def froehlich(saturation: float, permeability: float) -> IronCurve:
     Parameters
     ----------
     saturation [T]
-        Polarisation ``B_s`` at saturation.
+        Polarisation ``B_s``.
     permeability [-]
-        Initial relative permeability, above 1.
+        Initial, relative, above 1.
 
     Examples
     --------
@@ -136,7 +135,7 @@ def tanh_curve(saturation: float, permeability: float) -> IronCurve:
     ----------
     saturation [T]
     permeability [-]
-        Initial relative permeability, above 1.
+        Initial, relative, above 1.
     """
     _check_saturation("tanh_curve", saturation, permeability)
     rise = _MU0 * (permeability - 1.0) / saturation

@@ -25,7 +25,7 @@ class IronEntry:
     initial, peak_density, rise, width, exponent
         Of :func:`klack.magnetics.iron.rational_curve`.
     verified
-        True where the numbers were read in the named source.
+        The numbers were read in the named source.
     """
 
     description: str

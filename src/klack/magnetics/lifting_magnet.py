@@ -1,9 +1,9 @@
 r"""The lifting magnet of the Modelica Standard Library as a network of flux tubes.
 
 A plunger of 10 mm in a pot with a flat pole, 957 turns, published with static finite-element
-results (force, armature flux, inductance over a gap of 0.25 to 5 mm at 1.2 A).  It is the most
-complete public static reference, and it is hard: at 5 mm most of the flux leaks through the coil.
-Nothing here is fitted; every permeance comes from the drawing.
+results (force, armature flux, inductance over a gap of 0.25 to 5 mm at 1.2 A): the most complete
+public static reference, and a hard one, since at 5 mm most of the flux leaks through the coil.
+Nothing is fitted; every permeance comes from the drawing.
 
 Partition, along the axis (bottom of the pot at z = 0)::
 
@@ -13,12 +13,12 @@ Partition, along the axis (bottom of the pot at z = 0)::
            |      |       |       |        |        |
            ------ leak 1  2 ----- 3 ------ 4 ------ 5 -                  yoke (r = 13.5 mm)
 
-The mmf between core and yoke rises linearly along the coil, so the radial leakage between two
-sections is weighted by Simpson's rule, which is exact for its energy.  The armature side between
-its moving end and z = 15 mm, where the mmf is ``(31.5 mm - z)/16.5 mm`` times that at z = 15 mm,
-counts with the square of this ratio: a leakage that depends on the gap, and pulls.  The field
-around the gap is :func:`~klack.magnetics.air_gap.edges_beside_wall` with its correction for round
-cores; the part of it that both poles send to the yoke together is the slot of Carter.
+The mmf between core and yoke rises linearly along the coil, so Simpson's rule for the radial
+leakage between two sections is exact for its energy.  The armature side between its moving end and
+z = 15 mm, where the mmf is ``(31.5 mm - z)/16.5 mm`` times that at z = 15 mm, counts with the
+square of this ratio: a leakage that depends on the gap, and pulls.  The field around the gap is
+:func:`~klack.magnetics.air_gap.edges_beside_wall` with its correction for round cores; the part of
+it that both poles send to the yoke together is the slot of Carter.
 
 The coil itself: with a current density ``J`` in the window and a radial field ``~1/r`` the axial
 field is ``n I f(r)``, ``f = ln(r/r_i)/ln(r_o/r_i) - (r - r_c)/(r_o - r_c)`` (the second term only
@@ -74,13 +74,7 @@ Vector = NDArray[np.float64]
 
 
 def lifting_magnet(iron: IronCurve | None = None) -> MagneticCircuit:
-    """Network of the lifting magnet; the working gap is its ``x``.
-
-    Parameters
-    ----------
-    iron
-        Another material than 9SMnPb28 for all parts.
-    """
+    """Network of the lifting magnet, of another ``iron`` than 9SMnPb28 if given; gap ``x``."""
     iron = iron or iron_curve(MATERIAL)
     core = np.array([POLE / 2, POLE / 2, MOST_GAP, _SIDE / 2, _SIDE / 2])
     turns = TURNS * core / _WINDOW
@@ -120,7 +114,7 @@ def lifting_magnet(iron: IronCurve | None = None) -> MagneticCircuit:
 
 
 def _plate(iron: IronCurve, inner: float) -> IronReluctance:
-    """End plate: radial flux; the area whose reluctance is exact for constant permeability."""
+    """End plate: the area whose reluctance of radial flux is exact for constant permeability."""
     length = YOKE_INNER - inner
     return iron.law(length, 2.0 * pi * PLATE * length / np.log(YOKE_INNER / inner))
 

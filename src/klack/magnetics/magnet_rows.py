@@ -62,7 +62,7 @@ def magnet_rows(
     remanent: bool,
     names_loops: bool = False,
 ) -> bool:
-    """Add a magnet to the rows of a network: one coil by itself, or several solved together.
+    """Add a magnet to a network; whether by itself, with one coil, or solved with others.
 
     Parameters
     ----------
@@ -72,15 +72,8 @@ def magnet_rows(
         Working gap while both ports are at rest.
     closing
         Whether it closes as the armature moves along +z.
-    remanent
-        Whether hysteretic iron starts as saturation has left it.
-    names_loops
-        Whether the flux of every loop is recorded.
-
-    Returns
-    -------
-    bool
-        Whether its element was added by itself, with one coil; else it is solved with others.
+    remanent, names_loops
+        As of :class:`klack.magnetics.coupled_rows.PlacedMagnet`.
     """
     made = {
         port: Winding(

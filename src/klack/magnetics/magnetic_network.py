@@ -38,11 +38,10 @@ class MagneticNetwork(Component):
         u = R i + \sum_b N_b \dot\varphi_b, \qquad
         F = -\tfrac12\sum_b R_b'(x)\,\varphi_b^2 .
 
-    The force is the slope of the co-energy at constant current, and of the energy at constant
-    fluxes.  Elements ``coil`` of one electric circuit are in series with its driver, at
-    ``terminals`` or at the port of one of the ``circuits``.  The circuits, windings closed
-    through a resistance (``shorted-coil``) and with a constant current (``bias-coil``) are coupled
-    by the fluxes they share, which is their mutual inductance.
+    Elements ``coil`` of one electric circuit are in series with its driver, at ``terminals`` or at
+    the port of one of the ``circuits``.  The circuits, windings closed through a resistance
+    (``shorted-coil``) and with a constant current (``bias-coil``) are coupled by the fluxes they
+    share, which is their mutual inductance.
 
     Every circuit must drive some loop without eddy currents that no other drives alike, its
     leakage; otherwise its current would jump with the voltage.
@@ -127,7 +126,7 @@ class MagneticNetwork(Component):
         return self
 
     def _check_circuits(self) -> None:
-        """Refuse circuits without coils, coils of no circuit, and names of other ports."""
+        """Reject circuits without coils, coils of no circuit, and names of other ports."""
         wound: dict[str, list[str]] = {"": [], **{name: [] for name in self.circuits}}
         for name, element in self.elements.items():
             if isinstance(element, CoilElement):
@@ -160,7 +159,7 @@ class MagneticNetwork(Component):
                 )
 
     def circuit(self) -> MagneticCircuit:
-        """Return the magnetic circuit; its ``x`` is the working gap without residual gaps."""
+        """Magnetic circuit; its ``x`` is the working gap without residual gaps."""
         gaps = WorkingGaps(start=self.gap, usable=self.gap_range().usable)
         tubes = [tube for name, part in self.elements.items() for tube in part.tubes(name, gaps)]
         return circuit_of_network(tubes, next(iter(self._moving())), self.gap)
@@ -168,8 +167,8 @@ class MagneticNetwork(Component):
     def gap_range(self) -> GapRange:
         """Working gaps [m] at which every moving gap is open and narrower than its face.
 
-        A contact that gives way closes some of a residual gap as well: warned of from a quarter,
-        at half of it the run stops.
+        A contact that yields closes some of a residual gap as well: warned of from a quarter, at
+        half of it the run stops.
         """
         moving = self._moving().values()
         bounds = [part.bounds(self.gap) for part in moving]

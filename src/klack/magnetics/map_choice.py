@@ -1,4 +1,4 @@
-"""A map from files, as a case describes it: which columns, which units, which signs."""
+"""A map from files, as a case describes it: columns, units, signs."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -99,7 +99,7 @@ class MapFile(Section):
         return self
 
     def table(self) -> MapTable:
-        """Return the map in the signs of klack: linkage with the current, force with the gap.
+        """Map in the signs of klack: linkage with the current, force with the gap.
 
         Raises
         ------
@@ -144,7 +144,7 @@ def _same(a: np.ndarray, b: np.ndarray) -> bool:
 
 
 def _require_coil(where: str, table: MapTable) -> None:
-    """Refuse what no coil does, naming the point."""
+    """Reject what no coil does, naming the point."""
     i, x, psi = table.current, table.gap, table.linkage
     if i.size < 2 or x.size < 3:
         raise InputError(

@@ -1,4 +1,4 @@
-r"""Maps of a magnet from the files of finite-element programs: linkage and force over a grid.
+"""Maps of a magnet from the files of finite-element programs: linkage and force over a grid.
 
 Three layouts come out of FEMM scripts, JMAG and Ansys Maxwell:
 
@@ -8,7 +8,7 @@ Three layouts come out of FEMM scripts, JMAG and Ansys Maxwell:
 - *matrix*: one quantity, gaps down and currents across.
 
 Units are those of the head, ``Current [A]``, ``Force (N)``, unless the case gives them.  The points
-have to fill a grid of currents and gaps; a missing one is an error that names it.
+have to fill a grid of currents and gaps.
 """
 
 import re
@@ -61,7 +61,7 @@ class MapTable:
 
 @dataclass(frozen=True, slots=True)
 class _Column:
-    """A column of a table: its quantity, its factor to SI, and what varies in its head."""
+    """A column of a table: quantity, factor to SI, and what varies in its head."""
 
     quantity: str
     factor: float
@@ -74,9 +74,9 @@ def read_map(path: Path, *, columns: Mapping[str, str | int], units: Mapping[str
     Parameters
     ----------
     columns
-        Quantity -> name or number (from 1) of its column, where the head does not tell.
+        Name or number (from 1) of the column of a quantity, where the head does not tell.
     units
-        Quantity -> unit, in place of that of the head.
+        Of quantities, in place of those of the head.
 
     Raises
     ------
@@ -93,8 +93,7 @@ def read_map(path: Path, *, columns: Mapping[str, str | int], units: Mapping[str
 def read_matrix(path: Path, quantity: str, units: Mapping[str, str]) -> tuple[Vector, ...]:
     """Read gaps down, currents across, and one quantity; return currents, gaps, values (k, n).
 
-    The corner may name the units, ``gap [mm] / current [A] / linkage [mWb]``; what it does not name
-    the case has to give.
+    The corner may name the units, ``gap [mm] / current [A] / linkage [mWb]``, or else the case.
     """
     cells = read_cells(path, f"force map '{path.name}'")
     if not any(cells.head):  # the currents are a row of numbers as well
@@ -340,7 +339,7 @@ def _grid(where: str, points: Mapping[str, Vector]) -> MapTable:
 
 
 def _distinct(values: Vector) -> tuple[Vector, NDArray[np.intp]]:
-    """Different values, increasing, and which of them each is."""
+    """Different values, increasing, and which of them each one is."""
     order = np.argsort(values, kind="stable")
     apart = np.diff(values[order]) > _SAME * float(np.max(np.abs(values), initial=0.0))
     number = np.concatenate(([0], np.cumsum(apart)))

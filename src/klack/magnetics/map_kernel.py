@@ -11,8 +11,8 @@ mean force as its discrete gradient, coordinate by coordinate and both ways roun
     \bar F = -\tfrac12 \sum_{\psi \in \{\psi_0, \psi_1\}}
         \frac{W(\psi, x_1) - W(\psi, x_0)}{x_1 - x_0} .
 
-Quotients of cubics are formed without subtraction, cell by cell.  Beyond the map the surface
-continues by one more unbounded cell on each side.
+Quotients of cubics are formed without subtraction.  Beyond the map there is one more unbounded cell
+on each side.
 """
 
 from typing import Any
@@ -217,10 +217,7 @@ def map_step(
     resistance: float,
     conducts: bool,
 ) -> tuple[bool, float]:
-    """Find the change of the linkage (in: a guess) and the mean current [A].
-
-    False if the iteration does not settle.
-    """
+    """Find the change of the linkage (in: a guess) and the mean current [A]; False: none found."""
     d = change[0]
     scale = par[at + _TABLE] * par[at + _TABLE + 2]
     for _ in range(_MOST):

@@ -1,8 +1,8 @@
-"""Cells of a text table as finite-element programs write it: separator, decimal sign and head.
+"""Cells of a text table as finite-element programs write it.
 
-Semicolons, tabs, commas or blanks separate; where it is not the comma, numbers may have a decimal
-comma.  The head is the last line above the first row of numbers, or the last two if the lower one
-holds units; lines above it are skipped.
+Semicolons, tabs, commas or blanks separate; without the comma, numbers may have a decimal comma.
+The head is the last line above the first row of numbers, or the last two if the lower one holds
+units; lines above it are skipped.
 """
 
 import csv
@@ -19,7 +19,7 @@ KINDS = {"current": CURRENT, "gap": LENGTH, "linkage": FLUX, "force": FORCE}
 """Quantities of a map; their names are keys of a case."""
 
 LARGEST = 4_000_000
-"""Bytes of a file: some hundred currents and gaps with all digits are a tenth of it."""
+"""Bytes of a file, ten times some hundred currents and gaps with all digits."""
 
 _SEPARATORS = (";", "\t", ",", "")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
@@ -38,7 +38,7 @@ class CellTable:
         File, for errors.
     head
         Names of the columns; empty cells where the file has no head.
-    rows : tuple of (int, tuple of str)
+    rows
         Number of the line in the file, and its cells, as many as the head has.
     """
 
@@ -83,13 +83,13 @@ def read_cells(path: Path, where: str) -> CellTable:
 
 
 def read_number(cell: str) -> float | None:
-    """Number in a cell, with a decimal point or comma; None if there is none."""
+    """Number in a cell, with a decimal point or comma, or None."""
     text = cell.strip().replace(",", ".")
     return float(text) if _NUMBER.fullmatch(text) else None
 
 
 def read_unit(text: str) -> str | None:
-    """Spelling that :mod:`klack.units` knows for a unit of any quantity of a map; None if none."""
+    """Spelling of :mod:`klack.units` for a unit of any quantity of a map, or None."""
     unit = text.strip(" []()").replace("µ", "u").replace("μ", "u")
     unit = _WORDS.get(unit, _WORDS.get(unit.lower(), unit))
     for kind in KINDS.values():
@@ -140,7 +140,7 @@ def _split(line: str, separator: str) -> list[str]:
 
 
 def _is_row(cells: list[str], separator: str) -> bool:
-    """True for at least two cells that are numbers or missing ones, the first a number."""
+    """Whether at least two cells are numbers or missing ones, the first a number."""
     if separator == "," and any("," in cell for cell in cells):
         return False
     known = [read_number(cell) is not None for cell in cells]

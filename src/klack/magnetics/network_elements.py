@@ -1,4 +1,4 @@
-r"""Elements of a magnetic network as a case describes them, each between two magnetic nodes.
+"""Elements of a magnetic network as a case describes them.
 
 The flux of an element counts from its first node to its second.  A gap that moves has the width
 :math:`g = x + g_r`, or, with ``opens_from``, :math:`g = g_o + (x_0 - x) + g_r`, with ``x`` the
@@ -122,7 +122,7 @@ class MovingGap(_Element):
 
     @property
     def width(self) -> float:
-        """Size of the face [m]; a gap that wide is no gap any more."""
+        """Size of the face [m], at which a gap is none any more."""
         raise NotImplementedError
 
     def reluctance(self, gap: Vector) -> tuple[Vector, Vector]:

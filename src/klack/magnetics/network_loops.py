@@ -1,9 +1,8 @@
-r"""From magnetic nodes to loops: a network of flux tubes as a :class:`MagneticCircuit`.
+"""From magnetic nodes to loops: a network of flux tubes as a :class:`MagneticCircuit`.
 
-A spanning tree joins the nodes; each tube that is not in it closes one loop with the tree.  The
-flux of that tube is the loop flux, so that the fluxes into every node add up to zero whatever they
-are.  The tree takes tubes in their given order of preference: what comes last becomes a loop of its
-own, and its flux an unknown that a run can record.
+A spanning tree joins the nodes; each other tube closes a loop with the tree, and its flux is the
+loop flux, so that the fluxes into every node add up to zero.  The tree takes tubes in their order
+of preference: the last ones become loops of their own, whose flux a run can record.
 """
 
 from collections.abc import Sequence
@@ -23,7 +22,7 @@ _SINGULAR = 1e-12  # of the largest reluctance of a loop
 class Tube:
     """A branch between two nodes; its flux counts from ``start`` to ``end``.
 
-    ``rank`` says how soon the spanning tree takes it.
+    The spanning tree takes the tubes by ``rank``.
     """
 
     branch: MagneticBranch
@@ -33,7 +32,7 @@ class Tube:
 
 
 def circuit_of_network(tubes: Sequence[Tube], main: str, gap: float) -> MagneticCircuit:
-    """Return the circuit; ``main`` names the branch whose flux is recorded as *the* flux.
+    """Circuit; ``main`` names the branch whose flux is recorded as *the* flux.
 
     Parameters
     ----------
@@ -43,7 +42,7 @@ def circuit_of_network(tubes: Sequence[Tube], main: str, gap: float) -> Magnetic
     Raises
     ------
     InputError
-        For nodes that hang loose, parts that are not joined, loops without reluctance, too many.
+        For loose nodes, parts that are not joined, loops without reluctance, too many loops.
     """
     tree, chords = _spanning_tree(tubes)
     if not 1 <= len(chords) <= MOST_LOOPS:
@@ -74,7 +73,7 @@ def circuit_of_network(tubes: Sequence[Tube], main: str, gap: float) -> Magnetic
 
 
 def loop_names(circuit: MagneticCircuit) -> tuple[str, ...]:
-    """Name of the branch that each loop flux is the flux of."""
+    """Branch of each loop flux."""
     names = []
     for column in range(circuit.loops.shape[1]):
         unit = np.zeros(circuit.loops.shape[1])
@@ -135,7 +134,7 @@ def _way(tubes: Sequence[Tube], tree: Sequence[int], start: str, end: str) -> li
 
 
 def _require_reluctance(circuit: MagneticCircuit, gap: float) -> None:
-    """Refuse loops through coils and eddy terms only: any flux would pass them."""
+    """Reject loops through coils and eddy terms only, which any flux would pass."""
     C = circuit.loops
     slope = circuit.slope(np.zeros(C.shape[0]), gap)
     values, vectors = np.linalg.eigh((C.T * slope) @ C)

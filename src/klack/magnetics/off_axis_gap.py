@@ -6,8 +6,7 @@ and the force along any coordinate ``q`` of the armature is
 .. math:: F_q = \tfrac12 V^2\, \frac{\partial P}{\partial q}
     = \tfrac12 \frac{\varphi^2}{P^2}\, \frac{\partial P}{\partial q} .
 
-Forces that increase ``q`` are positive.  P is least centred and parallel, so an offset and a tilt
-increase themselves: a negative stiffness of guide and needle.
+P is least centred and parallel, so offset and tilt increase themselves: a negative stiffness.
 
 Limits: unsaturated iron (one mmf for the whole face), no edge fields, gaps small against the radii
 where a function says so.  Saturation spreads the flux evenly and makes both weaker.
@@ -71,12 +70,12 @@ def guide_ring(
 ) -> tuple[float, Vector]:
     r"""Permeance [H] of a radial gap whose armature is off-axis and tilted, and its slopes.
 
-    Cross sections in parallel along the axis, each an :func:`eccentric_ring` with
+    Parallel cross sections along the axis, each an :func:`eccentric_ring` with
 
     .. math:: e(z) = |(e_x - t_x z,\; e_y - t_y z)|
 
-    by Gauss's rule.  Half of the squared mmf times the slopes are force and moment: with ``t_x`` as
-    the slope of the armature's face, ``z = t_x x + t_y y``, the moment does its work on ``t_x``.
+    by Gauss's rule.  Half of the squared mmf times the slopes are force and moment; with the
+    armature's face ``z = t_x x + t_y y`` the moment does its work on ``t_x``.
 
     Parameters
     ----------
@@ -84,8 +83,8 @@ def guide_ring(
     place (4,) [m], [m], [-], [-]
         Offset in the middle of the ring, and tilt.
     stations
-        Cross sections; with 32 the slopes are within 1e-8 where an end comes to 90 % of the
-        clearance, within 4e-6 at 95 %.
+        Of 32 the slopes are within 1e-8 where an end comes to 90 % of the clearance, within 4e-6 at
+        95 %.
 
     Returns
     -------
@@ -120,8 +119,7 @@ def tilted_ring_face(
     .. math:: P = \mu_0 \int \frac{dA}{g + t\,r\cos\varphi} = 2\pi\mu_0
         \left[\frac{r_o^2}{g + s_o} - \frac{r_i^2}{g + s_i}\right], \qquad s = \sqrt{g^2 - (t r)^2}
 
-    Parallel it is :func:`~klack.magnetics.air_gap.face_permeance`.  The slope with the gap is the
-    pull, that with the tilt the moment that tilts further.
+    The slope with the gap is the pull, that with the tilt the moment that tilts further.
 
     Limits: the field of parallel faces at every point; a tilt of 0.1 changes it by 0.3 %
     (:func:`tilted_strip`).
@@ -186,7 +184,7 @@ def tilted_strip(
 def ring_sectors(inner: float, outer: float, length: float, sectors: int) -> Vector:
     """Areas [m^2] of the sectors of a radial gap, shape (S,), for :func:`sector_pulls`.
 
-    At the geometric mean of the radii: the sum of sectors then differs from the exact permeance by
+    At the geometric mean of the radii their sum differs from the exact permeance by
     ``(c^2 - e^2)/(24 r^2)`` only.
     """
     return np.full(sectors, 2.0 * pi * np.sqrt(inner * outer) * length / sectors)
@@ -197,8 +195,8 @@ def sector_pulls(areas: Vector, gaps: Vector, mmf: float) -> tuple[Vector, Vecto
 
     .. math:: P_k = \mu_0 \frac{A_k}{g_k}, \qquad N_k = \tfrac12 V^2 \mu_0 \frac{A_k}{g_k^2}
 
-    For faces of any form: with the row of a gap over the coordinates of the armature, the pulls
-    times the rows are force and moments with the same work.
+    For faces of any form: the pulls times the rows of the gaps over the coordinates of the armature
+    are force and moments with the same work.
 
     Parameters
     ----------

@@ -1,21 +1,18 @@
 r"""Output stage of a driver: battery, boost capacitor, switches, diodes and a clamp.
 
-In every state of the driver the current of the coil takes one *path*.  At its terminals the coil
-then sees
+In every state of the driver the current takes one *path*, with the voltage at the coil
 
 .. math:: u = U_b - U_z + k\,U_c - U_d - (R_s + R_d + R_z)\,i, \qquad
           C\,\dot U_c = -k\,i + i_r , \qquad i > 0,
 
 with the battery :math:`U_b`, a clamp :math:`U_z` (a Zener diode, or a transistor in avalanche), the
-forward voltage :math:`U_d` of the diodes in the path, the resistance of its switches, diodes and
-clamp, and the boost capacitor: :math:`k = 1` discharges it into the coil, :math:`k = -1` takes
-the energy of the coil back, :math:`k = 0` leaves it alone.  A converter recharges it at constant
-power, with at most a constant current, up to its nominal voltage; both have closed solutions
-(:func:`recharged`).
+forward voltage :math:`U_d` of the diodes, the resistances of switches, diodes and clamp, and the
+boost capacitor: :math:`k = 1` discharges it into the coil, :math:`k = -1` takes the energy of the
+coil back.  A converter recharges it up to its nominal voltage (:func:`recharged`).
 
 Limits: switches are ideal apart from their resistance, diodes apart from forward voltage and
 resistance (no reverse recovery); no resistance in series with the capacitor, no inductance of the
-wires; the battery is ideal.
+wires; an ideal battery.
 """
 
 from collections.abc import Mapping, Sequence
@@ -52,7 +49,7 @@ STAGE_ROW = 9
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StagePath:
-    """Way of the current in one state of the driver.
+    """Path of the current in one state of the driver.
 
     Parameters
     ----------
@@ -61,12 +58,12 @@ class StagePath:
     clamp [V]
         Against the current; its energy is lost.
     capacitor
-        1 if the boost capacitor drives the current, -1 if the current charges it, else 0.
+        ``k``.
     diodes [V]
         Sum of the forward voltages.
     switch_resistance, diode_resistance, clamp_resistance [ohm]
-    empty : tuple of float [V] and str, optional
-        The driver leaves for that state once the capacitor has fallen to that voltage.
+    empty
+        Voltage [V] of the capacitor, and the state for which the driver leaves at it.
     """
 
     battery: float = 0.0
@@ -92,14 +89,13 @@ class Capacitor:
     ----------
     capacitance [F]
     start [V]
-        Voltage of the capacitor at the start.
     nominal [V]
         Up to which it is recharged.
     power [W]
         Into the capacitor; 0: no recharge.
     current [A]
         Largest one into the capacitor; 0: no limit.
-    efficiency
+    efficiency [-]
         Of the converter.
     """
 
@@ -118,15 +114,7 @@ class Capacitor:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OutputStage:
-    """A stage and the paths of all states of its driver.
-
-    Parameters
-    ----------
-    capacitor
-        None: the one that the driver shares with others.
-    paths
-        By state.
-    """
+    """A stage with the paths of all states of its driver; ``capacitor`` None: a shared one."""
 
     capacitor: Capacitor | None
     paths: Mapping[str, StagePath]

@@ -14,8 +14,7 @@ class PulseWidth(TimedDriver):
     r"""Pulse-width modulation: supply for ``duty`` of every period, freewheeling for the rest.
 
     Once settled the mean voltage is :math:`d\,u - (1 - d)\,u_\text{freewheel}` while the current
-    does not come down to zero.  The clock does not drift: each period begins exactly one period
-    after the last.
+    stays above zero.  The clock does not drift.
     """
 
     type: ClassVar[str] = "pwm"

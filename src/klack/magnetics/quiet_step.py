@@ -1,9 +1,8 @@
-"""The usual step of the usual coil in one go: two loops, one gap, nothing switches.
+"""The usual step of the usual coil: two loops, one gap, nothing switches.
 
-Same equations and energies as the general step (:mod:`klack.magnetics.flux_step`), three times
-faster, because all numbers stay in registers.  Whatever is unusual (a switch or the diode, a
-course of voltage, a table interval left, a second Newton step, fluxes that bend) it leaves to the
-general step.
+Three times as fast as the general step (:mod:`klack.magnetics.flux_step`), because all numbers stay
+in registers.  Whatever is unusual (a switch or the diode, a course of voltage, a table interval
+left, a second Newton step, fluxes that bend) is left to the general step.
 """
 
 from typing import Any
@@ -19,8 +18,8 @@ __all__ = ["DIODE", "FRONT", "allowed_bend", "quiet_step"]
 FRONT = 8
 """States in front: drive state, entered, cycle, open, current, voltage, main flux, last step.
 
-Then the fluxes of the loops, their rates, how these bend, places in tables, and the largest flux
-so far."""
+Then loop fluxes, their rates, how these bend, places in tables, and the largest flux so far.
+"""
 
 DIODE = 1e-6
 """Voltage [V] by which a driver must offer more than an open coil induces."""
@@ -38,7 +37,7 @@ _THIRD = 1.0 / 3.0
 
 @inner(error_model="numpy", forceinline=True)
 def allowed_bend(h: float) -> float:
-    """Change of a flux in a piece that its rates do not tell, over the largest flux so far.
+    """Change of a flux in a piece beyond that by its rates, over the largest flux so far.
 
     The trapezoidal rule errs by about a fifth of it.  Below 0.64 us it falls with the square of the
     step ``h`` [s]: shorter steps stay more accurate than longer ones that are cut.
@@ -64,7 +63,7 @@ def _quiet_about(
 def _quiet_until(
     par: Any, block: int, state: Any, begin: float, end: float, current: float
 ) -> bool:
-    """Whether no switch of a state is due from now up to the time ``end`` and its current."""
+    """Whether no switch of a state is due up to the time ``end`` and its current."""
     if par[block] == 1.0:
         return False
     if par[block] == 2.0:

@@ -8,9 +8,8 @@ Three laws are enough for an actuator,
     \Theta = R(x)\,\varphi \;\text{(air gap)}, \qquad
     \Theta = l\,H(\varphi / A) \;\text{(iron)} ,
 
-and every law has the stored energy as an exact potential,
-:math:`W = \int_0^\varphi \Theta\,\mathrm d\varphi`.  ``x`` is one number for the whole circuit: the
-length of its working gap.
+with the exact potential :math:`W = \int_0^\varphi \Theta\,\mathrm d\varphi` and one working gap
+``x`` for the whole circuit.
 
 A compiled loop reads the same laws as flat numbers (:meth:`~GapReluctance.table`):
 
@@ -56,7 +55,7 @@ class LinearReluctance:
         require_nonnegative("LinearReluctance.reluctance", self.reluctance, "A/Wb")
 
     def mmf(self, flux: ArrayLike, gap: ArrayLike) -> Vector:
-        """Return the magnetomotive force [A] at a flux [Wb]; the gap [m] does not matter."""
+        """Mmf [A] at a flux [Wb], whatever the gap [m]."""
         return self.reluctance * np.asarray(flux, dtype=float)
 
     def slope(self, flux: ArrayLike, gap: ArrayLike) -> Vector:
@@ -80,8 +79,7 @@ class LinearReluctance:
 class GapReluctance:
     r"""Air gap, :math:`\Theta = R(x)\,\varphi`, :math:`W = R(x)\,\varphi^2/2`.
 
-    The force along ``x`` is :math:`-\partial W/\partial x = -\tfrac12 \varphi^2 R'(x)`: the only
-    place where a magnetic circuit pulls.
+    The force along ``x``, the only one of a circuit, is :math:`-\tfrac12 \varphi^2 R'(x)`.
 
     Parameters
     ----------
@@ -132,15 +130,15 @@ class GapReluctance:
         return cls(x, *law(x))
 
     def reluctance_at(self, gap: ArrayLike) -> Vector:
-        """Return ``R`` [A/Wb] at a working gap [m]."""
+        """``R`` [A/Wb] at a working gap [m]."""
         return _value(self.rows, np.asarray(gap, dtype=float))
 
     def reluctance_slope_at(self, gap: ArrayLike) -> Vector:
-        """Return ``dR/dx`` [A/(Wb m)] at a working gap [m]."""
+        """``dR/dx`` [A/(Wb m)] at a working gap [m]."""
         return _slope(self.rows, np.asarray(gap, dtype=float))
 
     def mmf(self, flux: ArrayLike, gap: ArrayLike) -> Vector:
-        """Return the magnetomotive force [A] at a flux [Wb] and a working gap [m]."""
+        """Mmf [A] at a flux [Wb] and a working gap [m]."""
         return np.asarray(self.reluctance_at(gap) * np.asarray(flux, dtype=float))
 
     def slope(self, flux: ArrayLike, gap: ArrayLike) -> Vector:
@@ -152,11 +150,11 @@ class GapReluctance:
         return np.asarray(0.5 * self.reluctance_at(gap) * np.asarray(flux, dtype=float) ** 2)
 
     def energy_slope(self, flux: ArrayLike, gap: ArrayLike) -> Vector:
-        """Return dW/dx at constant flux [N]: minus the force along the gap."""
+        """``dW/dx`` at constant flux [N]: minus the force along the gap."""
         return np.asarray(0.5 * self.reluctance_slope_at(gap) * np.asarray(flux, dtype=float) ** 2)
 
     def table(self) -> Vector:
-        """Return ``[n]`` and six numbers per interval; see the module text."""
+        """``[n]`` and six numbers per interval, as above."""
         return _flat(self.rows)
 
 
@@ -169,8 +167,8 @@ class IronReluctance:
     points (k,) [Wb]
         Fluxes, increasing from 0.
     mmf_points, slope_points (k,) [A], [A/Wb]
-        Magnetomotive force and its slope there; a cubic between, straight beyond the last point.
-        Both must rise: the solver relies on one solution.
+        Mmf and its slope there; a cubic between, straight beyond the last point.  Both must rise:
+        the solver relies on one solution.
     """
 
     points: Vector
@@ -201,7 +199,7 @@ class IronReluctance:
         object.__setattr__(self, "rows", rows)
 
     def mmf(self, flux: ArrayLike, gap: ArrayLike) -> Vector:
-        """Return the magnetomotive force [A] at a flux [Wb]; the gap [m] does not matter."""
+        """Mmf [A] at a flux [Wb], whatever the gap [m]."""
         phi = np.asarray(flux, dtype=float)
         return np.asarray(np.sign(phi) * _value(self.rows, np.abs(phi)))
 
@@ -218,7 +216,7 @@ class IronReluctance:
         return np.zeros(np.shape(flux))
 
     def table(self) -> Vector:
-        """Return ``[n]`` and six numbers per interval; see the module text."""
+        """``[n]`` and six numbers per interval, as above."""
         return _flat(self.rows)
 
 
@@ -228,8 +226,8 @@ ReluctanceLaw = LinearReluctance | GapReluctance | IronReluctance
 def _cubic_rows(x: Vector, y: Vector, dy: Vector) -> Vector:
     """Hermite cubics between the points: start, value, three factors; shape (n-1, 5).
 
-    Factors that are nothing but round-off of the values are zero: they would change by leaps with
-    the parameters of the curve, and its derivatives be taken for those of a jump.
+    Factors that are only round-off of the values are zero: they would jump with the parameters of
+    the curve, and spoil its derivatives.
     """
     h = np.diff(x)
     secant = np.diff(y) / h
@@ -254,7 +252,7 @@ def _one_sided_rows(x: Vector, y: Vector, dy: Vector) -> Vector:
 
 
 def _two_sided_rows(x: Vector, y: Vector, dy: Vector) -> Vector:
-    """One more straight interval in front, one step long; it also holds below its start."""
+    """One more straight interval in front, one step long, which also holds below its start."""
     step = x[1] - x[0]
     line = np.array([[x[0] - step, y[0] - dy[0] * step, dy[0], 0.0, 0.0]])
     last = np.array([[x[-1], y[-1], dy[-1], 0.0, 0.0]])

@@ -1,13 +1,13 @@
-r"""Where a magnet stands after it was saturated once: iron on the falling branch of its loop.
+r"""State of a magnet after saturation: iron on the falling branch of its loop.
 
-After a strong positive current has gone, every stop rests at its yield on the other side,
-:math:`s_k = -\rho_k w(B)`, so that iron follows :math:`H = H_\text{an}(B) - w(B)`.  The fluxes
-balance with that at the gap and the current of the start:
+After a strong positive current every stop rests at its yield on the other side, :math:`s_k =
+-\rho_k w(B)`, so that iron follows :math:`H = H_\text{an}(B) - w(B)`.  At the gap and the current
+of the start:
 
 .. math:: C^T\bigl[\Theta_b(\varphi_b, x) - \Theta_{0,b} - w_b(\varphi_b) - N_b i\bigr] = 0 .
 
-Limits: iron that came back from its tip by less than twice the flux density of a reversal is a
-little beside that branch.  The strong current is that of the terminals alone: iron that another
+Limits: iron that came back from its tip by less than twice the flux density of a reversal is
+slightly off that branch.  The strong current is that of the terminals alone: iron that another
 circuit magnetises the other way, or that the terminals do not reach, depends on which acted last
 (:func:`magnetised_otherwise`).
 """
@@ -47,13 +47,12 @@ def remanent_state(
     current [A]
         That remains.
     gap [m]
-    others : mapping of str to float [A], optional
-        Currents of further electric circuits that remain; saturated by that of the terminals.
+    others [A]
+        Currents of further electric circuits that remain.
 
     Raises
     ------
     ConvergenceError
-        If the fluxes do not settle.
     """
     strong = _saturated(circuit, "", gap)
     signs = np.sign(strong.branch_fluxes)
@@ -101,7 +100,7 @@ def magnetised_otherwise(
     """Hysteretic parts that a strong current of each other circuit leaves otherwise, by circuit.
 
     That is with a flux against the one that a strong current of the terminals leaves, or with one
-    where the terminals drive none.  Circuits without such parts are not in it.
+    where the terminals drive none.  Circuits without such parts are left out.
     """
     main = _saturated(circuit, "", gap).branch_fluxes
     least = 1e-9 * float(np.max(np.abs(main)))

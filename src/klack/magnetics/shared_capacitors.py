@@ -15,14 +15,14 @@ _KEY = "boost capacitors"
 
 @dataclass(eq=False)
 class SharedCapacitors:
-    """Capacitors, drivers and magnets of a network that wait until all have been named.
+    """Capacitors, drivers and magnets of a network, collected until all have been named.
 
     Parameters
     ----------
-    capacitors : dict of int to (str, Capacitor)
+    capacitors
         Component and numbers, by electric node.
     drawing
-        Node of a coil -> node of the capacitor that its driver draws from.
+        Node of the capacitor that the driver of a coil draws from, by node of the coil.
     magnets
         With a coil behind such a driver.
     """
@@ -53,7 +53,7 @@ class SharedCapacitors:
             coupled_rows(rows, together, shared)
 
     def _check(self, magnets: list[PlacedMagnet]) -> None:
-        """Refuse a capacitor that is no boost for one of its drivers."""
+        """Reject a capacitor that is no boost for one of its drivers."""
         for part in magnets:
             for node, winding in zip(part.nodes, part.magnet.windings, strict=True):
                 if node not in self.drawing or winding.driver.stage is None:
@@ -71,7 +71,7 @@ class SharedCapacitors:
 
 
 def shared_capacitors(rows: Rows) -> SharedCapacitors:
-    """Return what the capacitors, drivers and magnets of a network say of each other."""
+    """Shared capacitors of a network."""
     found = rows.closing.setdefault(_KEY, SharedCapacitors())
     assert isinstance(found, SharedCapacitors)
     return found

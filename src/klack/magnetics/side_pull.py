@@ -1,7 +1,7 @@
 r"""Force of a solenoid across the axis of its armature.
 
-The main flux passes rings round the armature and working gaps in front of it in series.  At this
-flux each of them pulls across by the slope of its own energy,
+The main flux passes rings round the armature and working gaps in series.  Each pulls across by the
+slope of its own energy,
 
 .. math:: F = \tfrac12 \frac{\varphi^2}{P^2}\,\frac{\partial P}{\partial q}
 
@@ -12,8 +12,7 @@ gap carry their part of the flux and no moment.
 Limits: flux and axial force are those of an armature on the axis of its guide.  An offset ``e`` in
 the clearance ``c`` takes the share :math:`e^2/2c^2` of the reluctance of a ring, a tilt ``t`` takes
 :math:`(r_o^2 + r_i^2) t^2/4g^2` of that of a face, to second order (:meth:`ArmaturePull.left_out`).
-The work of the force is therefore not taken from the magnetic energy but counted as a source of its
-own.
+So the work of the force is not taken from the magnetic energy but counted as a source.
 """
 
 from dataclasses import dataclass
@@ -43,7 +42,7 @@ class ArmatureRing:
         Radii, and length along the axis.
     height [m]
         Of its middle, in the drawing of the needle.
-    centre : (float, float) [m]
+    centre [m]
         Axis of the bore, from that of the guide.
     """
 
@@ -72,16 +71,16 @@ class ArmatureRing:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ArmaturePull:
-    """Rings and tilting working gaps of a solenoid: see the module text.
+    """Rings and tilting working gaps of a solenoid.
 
     Parameters
     ----------
     loops
-        Fluxes in the state of the element; the first one is that of the gaps.
+        Fluxes in the state; the first one is that of the gaps.
     gap [m]
         Working gap while both ports are at rest, with the residual gap.
     way
-        Its change per way of the armature: -1 if that closes it.
+        Its change per displacement of the armature: -1 if that closes it.
     """
 
     rings: tuple[ArmatureRing, ...]
@@ -136,7 +135,7 @@ class ArmaturePull:
         return 1.0 - here / on_axis
 
     def placement(self, axis: Vector) -> Vector:
-        """Nothing: the circuit is that of the centred armature."""
+        """Zero: the circuit is that of the centred armature."""
         return np.zeros(0)
 
 

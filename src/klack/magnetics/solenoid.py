@@ -52,29 +52,27 @@ class Solenoid(Component):
         N i = \varphi_\text{leak}/\Lambda, \qquad
         u = R i + N\,\frac{\mathrm d}{\mathrm dt}(\varphi + \varphi_\text{leak}) .
 
-    The force on the armature is :math:`-\tfrac12\varphi^2\,\sum R_k'(x)` along the gap ``x``, which
-    is shared by all poles; ``base`` feels the opposite one.  The leakage is a state of its own
-    because without it the current would jump with the voltage (eddy currents carry no inductance),
-    and a two-point driver would switch without end.
+    The force on the armature is :math:`-\tfrac12\varphi^2\,\sum R_k'(x)` along the gap ``x`` of all
+    poles; ``base`` feels the opposite one.  The leakage is a state of its own because without it
+    the current would jump with the voltage (eddy currents carry no inductance), and a two-point
+    driver would switch without end.
 
     ``residual_gap`` is what stays open when iron would touch: coating, shim, roughness.
-    ``residual_flux`` sets a constant remanence such that this flux passes the closed gap without
-    current; it lets an armature stick. Instead, ``hysteresis`` of an iron part follows its loop
-    from the demagnetised state at the start: remanence depends on what the iron has been through.
-    ``magnets`` are permanent ones in series with the main flux. Eddy currents are a ladder beside
-    the iron (``eddy``), or of an iron part itself, with its permeability of the moment
-    (:mod:`klack.magnetics.solid_iron`).
+    ``residual_flux`` sets a constant remanence with this flux through the closed gap without
+    current; it lets an armature stick.  Instead, ``hysteresis`` of an iron part follows its loop
+    from the demagnetised state.  ``magnets`` are permanent ones in series with the main flux.  Eddy
+    currents are a ladder beside the iron (``eddy``), or of an iron part itself, with its present
+    permeability (:mod:`klack.magnetics.solid_iron`).
 
-    The stops have to end the stroke before the working gap is closed: a case in which they let the
-    armature pass through its pole is refused, and a run stops where contacts give way by half of
-    the residual gap.
+    The stops have to end the stroke before the working gap is closed, or the case is rejected; a
+    run stops where contacts yield by half of the residual gap.
 
     A ring of ``parasitic`` with a section ``off_axis`` and a pole with ``tilts`` act across the
     axis of a needle that moves in three dimensions: :mod:`klack.magnetics.side_pull`.
 
-    Limits: one-dimensional flux tubes; flux between armature side and housing (large strokes)
-    is a matter of a :class:`~klack.magnetics.circuit.MagneticCircuit` of your own, as
-    :mod:`klack.magnetics.lifting_magnet` shows.
+    Limits: one-dimensional flux tubes; flux between armature side and housing (large strokes) needs
+    a :class:`~klack.magnetics.circuit.MagneticCircuit` of your own, as in
+    :mod:`klack.magnetics.lifting_magnet`.
     Sources: Woodson & Melcher 1968; Roters 1941; Stoll 1974 (eddy currents).
     """
 
@@ -166,7 +164,7 @@ class Solenoid(Component):
         return self
 
     def circuit(self) -> MagneticCircuit:
-        """Return the magnetic circuit; its ``x`` is the gap without the residual gap."""
+        """Magnetic circuit; its ``x`` is the gap without the residual gap."""
         return _kept_circuit(self) if type(self) is Solenoid else _circuit(self)
 
     def add_rows(self, rows: Rows) -> None:
@@ -192,7 +190,7 @@ class Solenoid(Component):
             rows.side_of_element(self._side_pull(circuit.loops.shape[1]))
 
     def off_axis_parts(self) -> tuple[OffAxisPart, ...]:
-        """Return the rings and working gaps that act across the axis."""
+        """Rings and working gaps that act across the axis."""
         parts = []
         for k, ring in enumerate(self.parasitic):
             if ring.off_axis is not None and ring.length is not None:
@@ -213,7 +211,6 @@ class Solenoid(Component):
         return tuple(parts)
 
     def _side_pull(self, loops: int) -> ArmaturePull:
-        """Return the force across the axis, for a circuit of so many loops."""
         rings = []
         for gap in self.parasitic:
             if gap.off_axis is None or gap.radius is None:
@@ -239,8 +236,8 @@ class Solenoid(Component):
     def gap_range(self) -> GapRange:
         """Gaps [m] from touching poles to where a pole is no wider than its gap.
 
-        A contact that gives way closes some of the residual gap as well: warned of from a quarter,
-        at half of it the run stops.
+        A contact that yields closes some of the residual gap as well: warned of from a quarter, at
+        half of it the run stops.
         """
         widest = max(pole.outer_radius for pole in self.poles)
         end = max(widest, 2.0 * self.gap + self.residual_gap)
@@ -265,7 +262,7 @@ class Solenoid(Component):
 
 @lru_cache(maxsize=100)
 def _kept_circuit(solenoid: Solenoid) -> MagneticCircuit:
-    """Circuit that strokes of one valve share as long as they keep its solenoid."""
+    """Cached circuit: strokes of one valve share it while they keep its solenoid."""
     return _circuit(solenoid)
 
 
@@ -317,7 +314,7 @@ def _gap_law(
 ) -> GapReluctance:
     """All poles in series, over the whole range of gaps; finest around the working gap.
 
-    Kept, because strokes of one valve mostly differ in other numbers.
+    Cached, because strokes of one valve mostly differ in other numbers.
     """
 
     def reluctance(x: Any) -> tuple[Any, Any]:
@@ -337,7 +334,7 @@ def _add_ladders(
 ) -> None:
     """Put the ladders in series with the main flux; each term after the first is a loop more.
 
-    The first shorted turn sees the main flux less that of the inner loop, and so on inwards.
+    The first shorted turn encloses the main flux less that of the inner loop, and so on inwards.
     """
     width = 2
     for k, part in enumerate(parts):

@@ -63,7 +63,7 @@ class PoleGap(Section):
 
     .. math:: P = \mu_0 \frac{A}{g} + \mu_0\, c(g)\, l_\text{edge}
 
-    with ``g`` the gap plus the residual gap, and ``c`` an edge number of
+    with the gap plus the residual gap ``g``, and an edge number ``c`` of
     :mod:`klack.magnetics.air_gap`.
     """
 
@@ -209,8 +209,7 @@ class Hysteresis(Section):
 class SolidIron(Section):
     """Eddy currents of a solid piece of iron, with its own magnetisation curve.
 
-    In shells from the surface inwards, see :mod:`klack.magnetics.solid_iron`; not together with an
-    entry of ``eddy`` for the same piece.
+    In shells (:mod:`klack.magnetics.solid_iron`); not with an entry of ``eddy`` for the same piece.
     """
 
     shape: Literal["cylinder", "sheet"] = Field(
@@ -294,7 +293,7 @@ class IronPart(Section):
         return self
 
     def width(self) -> LoopWidth | None:
-        """Return half the width of the loop; None without hysteresis."""
+        """Half the width of the loop; None without hysteresis."""
         given = self.hysteresis
         if given is None:
             return None
@@ -308,12 +307,12 @@ class IronPart(Section):
         return falling_width(curve, given.coercivity, given.remanence, mu)
 
     def stops(self, share: float = 1.0) -> IronStops | None:
-        """Return the stops of a share of the section; None without hysteresis."""
+        """Stops of a share of the section; None without hysteresis."""
         width = self.width()
         return None if width is None else width.stops(self.length, share * self.area)
 
     def shells(self) -> tuple[IronShell, ...]:
-        """Return the shells of solid iron from the surface inwards; none without ``eddy``."""
+        """Shells of solid iron from the surface inwards; none without ``eddy``."""
         solid = self.eddy
         if solid is None:
             return ()
@@ -335,7 +334,7 @@ class PermanentMagnet(Section):
     .. math:: B = B_r + \mu_0\mu_r H, \qquad
               \Theta = \frac{l}{\mu_0\mu_r A}\,\varphi - \frac{B_r l}{\mu_0\mu_r}
 
-    Limits: no knee. Whether the working point stays above it is for the user to check.
+    Limits: no knee; check that the working point stays above it.
     """
 
     remanence: FluxDensity = Field(gt=0, description="B_r at its temperature; NdFeB 1.0 to 1.4 T.")

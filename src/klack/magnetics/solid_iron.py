@@ -1,19 +1,18 @@
-r"""Solid iron in which flux spreads with the permeability that it has: shells of a ladder.
+r"""Solid iron in which flux spreads with the local permeability: shells of a ladder.
 
-The ladder of :mod:`klack.magnetics.eddy` beside a linear core of reluctance ``R`` is one rational
-function. Written the other way round it is a string of shells, from the surface inwards, with
-shorted turns between them:
+The rational function of the ladder of :mod:`klack.magnetics.eddy` beside a linear core of
+reluctance ``R`` is also a string of shells, from the surface inwards, with shorted turns between:
 
 .. math::
 
     \frac{\Theta}{R\varphi} = s\tau\,q_1 + \cfrac{1}{w_1 + \cfrac{1}{s\tau\,q_2
         + \cfrac{1}{w_2 + \dots}}} , \qquad \sum_k w_k = 1 .
 
-A shell holds the share ``w_k`` of the section, the turn between two of them encloses all that lies
-further in: :math:`S_k = q_k R\tau`, which does not depend on the permeability.  Each shell now gets
-the magnetisation curve, :math:`\Theta_k = l\,H(\varphi_k/w_kA)`.  Near any uniform state that is
-the ladder with the *differential* permeability there, as exact as it was; and iron that saturates
-from its surface inwards does so shell by shell.  One term is the whole section behind one turn.
+A shell holds the share ``w_k`` of the section; a turn encloses all that lies further in, :math:`S_k
+= q_k R\tau`, whatever the permeability.  Each shell has the magnetisation curve, :math:`\Theta_k =
+l\,H(\varphi_k/w_kA)`.  Near any uniform state that is the ladder with the *differential*
+permeability there, and iron saturates from its surface inwards shell by shell.  One term is the
+whole section behind one turn.
 
 Limits: the field within a shell is uniform, so that a sharp front passes in as many steps as there
 are terms.  Sources: Stoll 1974 (diffusion); Stieltjes 1894 (strings); rederived.

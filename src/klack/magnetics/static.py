@@ -29,7 +29,7 @@ class StaticState:
     force [N]
         Along the working gap; negative pulls it shut.
     energy, coenergy [J]
-        Their sum is ``psi i``, summed over all circuits.
+        Their sum is ``psi i`` of all circuits.
     """
 
     current: float
@@ -57,14 +57,13 @@ def static_state(
 ) -> StaticState:
     """Solve the circuit for a constant current [A] at a working gap [m].
 
-    ``others`` are the currents [A] of further electric circuits, by name, none by default.
-    The loop fluxes minimise the convex function ``W(phi) - psi(phi) i``; damped Newton steps find
-    the minimum from any ``start`` (loop fluxes [Wb], zero by default).
+    ``others`` are the currents [A] of further electric circuits, by name.  The loop fluxes minimise
+    the convex function ``W(phi) - psi(phi) i`` by damped Newton steps, from any ``start`` [Wb].
 
     Raises
     ------
     ConvergenceError
-        If the minimum is not found, which needs a law that does not rise.
+        For a law that does not rise.
     """
     C, drive = circuit.loops, current * circuit.loop_turns
     linked = [(i, circuit.turns_of(name)) for name, i in (others or {}).items()]

@@ -27,12 +27,11 @@ def steady_fluxes(
 
     Parameters
     ----------
-    plant : MagneticCircuit or FluxMap
     current [A]
     gap [m]
-        As the circuit or the map counts it.
-    others : mapping of str to float [A], optional
-        Currents of further electric circuits of a magnetic circuit.
+        Of the circuit or the map.
+    others [A]
+        Currents of further electric circuits.
 
     Raises
     ------

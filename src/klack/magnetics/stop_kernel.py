@@ -1,8 +1,8 @@
 r"""Stops of hysteretic iron over one piece of time, compiled.
 
-The law is in :mod:`klack.magnetics.hysteresis`.  While the flux of a tube goes from ``b0`` to
-``b1`` a stop is elastic up to its yield and follows the yield from there, which is
-taken as straight between both fluxes.  The mean mmf is that of this very path, so that
+While the flux of a tube goes from ``b0`` to ``b1`` a stop of :mod:`klack.magnetics.hysteresis` is
+elastic up to its yield and then follows the yield, straight between both fluxes.  The mean mmf is
+that of this path, so that
 
 .. math:: \bar s\,(b_1 - b_0) = \frac{s_1^2 - s_0^2}{2c} + \text{heat}, \qquad \text{heat} \ge 0
 
@@ -78,10 +78,7 @@ def stops_mean(
 def stops_end(
     par: Any, at: int, table: int, kept: Any, first: int, b0: float, db: float
 ) -> tuple[float, float]:
-    """Sum of the stops of a tube [A] after a change of its flux, and stiffness of the elastic ones.
-
-    The stiffness is in [A/Wb].
-    """
+    """Sum of the stops of a tube [A] after a change of its flux; elastic stiffness [A/Wb]."""
     total = stiffness = 0.0
     q = table + 1
     for _ in range(int(par[table])):

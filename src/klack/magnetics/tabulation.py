@@ -1,4 +1,4 @@
-"""Grids on which a smooth curve is safely replaced by cubics between its points."""
+"""Grids for cubics in place of a smooth curve."""
 
 from collections.abc import Callable
 
@@ -19,10 +19,10 @@ def hermite_grid(
     tolerance: float,
     first: int = 17,
 ) -> Vector:
-    """Points between which Hermite cubics follow a curve and its slope.
+    """Increasing points between which Hermite cubics follow a curve and its slope.
 
-    Every interval is halved until the cubic through the values and slopes at its ends meets value
-    and slope at its quarter points within ``tolerance``, relative to their size there.
+    Every interval is halved until the cubic meets value and slope at its quarter points within
+    ``tolerance``, relative to their size there.
 
     Parameters
     ----------
@@ -31,10 +31,6 @@ def hermite_grid(
     tolerance [-]
     first
         Points to begin with.
-
-    Returns
-    -------
-    array, increasing
     """
     x = np.linspace(start, end, first)
     while x.size < _MOST_POINTS:

@@ -14,9 +14,8 @@ __all__ = ["TwoPoint"]
 class TwoPoint(TimedDriver):
     """Two-point control: supply until the upper current, freewheeling down to the lower one.
 
-    The instants of switching are those of the current in the coil, not of a clock, and are located
-    inside the steps.  A band narrower than what the current moves in a few steps makes the driver
-    chatter; the run then stops and says so.
+    Switching instants are located inside the steps.  A band narrower than the change of the current
+    in a few steps makes the driver chatter, which stops the run.
     """
 
     type: ClassVar[str] = "two-point"

@@ -13,8 +13,8 @@ __all__ = ["VoltageStep"]
 class VoltageStep(TimedDriver):
     r"""Constant voltage from ``start`` to ``end``.
 
-    The current of a coil of constant inductance rises as :math:`u/R\,(1 - e^{-Rt/L})`.  It cannot
-    turn negative: what the coil drives back meets a diode.
+    The current of a coil of constant inductance rises as :math:`u/R\,(1 - e^{-Rt/L})`.  A diode
+    keeps it from turning negative.
 
     Examples
     --------

@@ -14,8 +14,8 @@ __all__ = ["VoltageTable"]
 class VoltageTable(Driver):
     """Voltage over time from a table, such as a measured one; straight between the points.
 
-    An ideal source: the current may have either sign.  A time that stands twice is a jump; the
-    steps are cut at every point, so jumps need no fine step.
+    An ideal source: the current may have either sign.  A time that stands twice is a jump; jumps
+    need no fine step.
     """
 
     type: ClassVar[str] = "voltage-table"
