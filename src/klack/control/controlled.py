@@ -28,11 +28,11 @@ class Controlled(Component):
     """A component with one output that a controller sets at its sampling instants.
 
     The output is constant from one instant to the next; the first one is time zero.  No step is
-    longer than the sample time.  In Python a function can be the controller: :meth:`by`.  A case
-    file runs no code, so there it is one of the laws.
+    longer than the sample time.  In Python a function can be the controller: :meth:`by`; in a case
+    file, which runs no code, one of the laws is.
 
-    A run continues from a stored state where the controller can be stored: laws are, a function is
-    if it has the two methods of :class:`klack.control.memory.Remembering`, an FMU is not.
+    A run can continue from a stored state with a law, with a function that is a
+    :class:`klack.control.memory.Remembering`, but not with an FMU.
 
     Limits: a run with a controller has no derivatives.
     """
@@ -63,14 +63,14 @@ class Controlled(Component):
         return self
 
     def by(self, function: Law | LawMaker) -> Self:
-        """Return this component with a function as its controller.
+        """Same component with a function as its controller.
 
         Parameters
         ----------
-        function : callable, or an object with ``begin``
+        function
             ``function(time, signals) -> output``: time [s], signals by the names of the sensors in
             their units, output [V], [N] or [Pa].  Called once at every sampling instant from time
-            zero.  ``begin(sample_time)`` of an object returns such a function, fresh for each run.
+            zero.  An object has ``begin(sample_time)``, which returns such a function for each run.
         """
         result = self.model_copy()
         result._function = function

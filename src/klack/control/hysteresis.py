@@ -14,7 +14,7 @@ __all__ = ["HysteresisController", "RunningHysteresis"]
 
 
 class HysteresisController(Section):
-    """One output below a signal, another one above, and the last one in between.
+    """One output below, another one above, and the last one in between.
 
     Switches at its sampling instants; ``two-point`` switches at the very current.
     """
@@ -47,7 +47,7 @@ class HysteresisController(Section):
 
 
 class RunningHysteresis:
-    """A hysteresis controller that runs: its last output."""
+    """A running hysteresis controller: its last output."""
 
     def __init__(self, law: HysteresisController) -> None:
         self._law, self._output = law, law.low

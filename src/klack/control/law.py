@@ -14,4 +14,4 @@ class LawMaker(Protocol):
     """Something that gives each run a fresh law."""
 
     def begin(self, period: float) -> Law:
-        """Return a fresh law for a sample time [s]."""
+        """Fresh law for a sample time [s]."""

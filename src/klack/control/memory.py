@@ -1,4 +1,4 @@
-"""What a controller or a sensor remembers, as arrays that a run stores and continues from."""
+"""Memory of a controller or a sensor, as arrays that a run stores."""
 
 from collections.abc import Mapping
 from typing import Protocol, runtime_checkable
@@ -17,8 +17,7 @@ _WORD = 2**64
 class Remembering(Protocol):
     """A running controller or sensor that can be stored.
 
-    A function of the user becomes one by these two methods; without them a run with it cannot
-    continue from a stored state.
+    A function of the user becomes one by these two methods.
     """
 
     def memory(self) -> Memory:
@@ -29,13 +28,7 @@ class Remembering(Protocol):
 
 
 def remembered(memory: Memory, name: str, size: int | None = None) -> NDArray[np.generic]:
-    """Array of a memory, of a given size if one is given.
-
-    Raises
-    ------
-    KeyError
-        If it is missing or has another size.
-    """
+    """Array of a memory; KeyError if it is missing or not of ``size``."""
     found = np.asarray(memory[name])
     if found.ndim != 1 or (size is not None and found.size != size):
         raise KeyError(name)

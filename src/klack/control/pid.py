@@ -33,7 +33,7 @@ class Setpoint(Section):
         return self
 
     def at(self, time: float) -> float:
-        """Return the wanted signal at a time [s]; the later value at a jump."""
+        """Wanted signal at a time [s]; the later value at a jump."""
         k = int(np.searchsorted(self.time, time, side="right"))
         if k == 0 or k == len(self.time):
             return self.value[min(k, len(self.value) - 1)]
@@ -51,8 +51,8 @@ class PidController(Section):
 
     in [lower, upper], with the sample time T.  The derivative acts on the signal alone, so that a
     jump of the setpoint makes no pulse, through a first-order filter of ``derivative_filter``.
-    While the output is at a limit and the error would drive it further, the integral waits
-    (conditional integration; K. J. Astrom, T. Haegglund, Advanced PID Control, 2006, ch. 3.5).
+    While the error would drive the output beyond a limit, the integral waits (conditional
+    integration; K. J. Astrom, T. Haegglund, Advanced PID Control, 2006, ch. 3.5).
     """
 
     kind: Literal["pid"] = Field(description="Which law: pid.")
@@ -85,12 +85,12 @@ class PidController(Section):
         return (self.sensor,)
 
     def begin(self, period: float) -> "RunningPid":
-        """Return a fresh controller for a sample time [s]."""
+        """Fresh controller for a sample time [s]."""
         return RunningPid(self, period)
 
 
 class RunningPid:
-    """A PID controller that runs: its integral, its derivative and the last signal."""
+    """A running PID controller: its integral, its derivative and the last signal."""
 
     def __init__(self, law: PidController, period: float) -> None:
         self._law, self._period = law, period

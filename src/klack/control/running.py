@@ -43,13 +43,7 @@ class RunningControl:
         return {f"{part}.{key}": a for part, found in parts.items() for key, a in found.items()}
 
     def recall(self, memory: Memory) -> None:
-        """Continue from a memory.
-
-        Raises
-        ------
-        KeyError
-            For a memory of other laws or sensors.
-        """
+        """Continue from a memory; KeyError for one of other laws or sensors."""
         assert isinstance(self._act, Remembering)
         self._act.recall(_part(memory, _LAW))
         for name, sensor in self._sensors.items():

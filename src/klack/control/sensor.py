@@ -19,11 +19,11 @@ class Sensor(Section):
 
     .. math:: s_k = q\,\mathrm{round}\bigl([\,c(t_k - t_d) + \sigma\,n_k\,]/q\bigr)
 
-    ``channel`` is its name in the record of the run (``needle.tip displacement``, ``coil current``,
-    ``sac pressure``); the signal, its noise and its quantisation count in ``unit``, and so do the
-    numbers of the controller.  A channel that is a mean (a force, a flow) is that of the
-    last look before the instant.  A delay that is no multiple of the sample time is interpolated
-    between samples; before the start the channel is as at the start.
+    ``channel`` is a name of the record (``needle.tip displacement``, ``coil current``, ``sac
+    pressure``); the signal, its noise and its quantisation are in ``unit``, and so are the numbers
+    of the controller.  A channel that is a mean (a force, a flow) is that of the last look before
+    the instant.  A delay that is no multiple of the sample time is interpolated between samples;
+    before the start the channel is as at the start.
     """
 
     channel: Text = Field(description="Name of a recorded channel.")
@@ -34,12 +34,12 @@ class Sensor(Section):
     quantisation: Number = Field(default=0.0, ge=0, description="Step q of the signal; 0: none.")
 
     def begin(self) -> "RunningSensor":
-        """Return a fresh sensor: its signal from a time [s] and the value of the channel then."""
+        """Fresh sensor: its signal from a time [s] and the value of the channel then."""
         return RunningSensor(self)
 
 
 class RunningSensor:
-    """A sensor that runs: values on their way, and the generator of its noise."""
+    """A running sensor: values on their way, and the generator of its noise."""
 
     def __init__(self, sensor: Sensor) -> None:
         self._sensor = sensor

@@ -80,12 +80,12 @@ class StateMachine(Section):
         return tuple(dict.fromkeys(way.sensor for way in ways if way.sensor is not None))
 
     def begin(self, period: float) -> "RunningMachine":
-        """Return a fresh machine for a sample time [s]."""
+        """Fresh machine for a sample time [s]."""
         return RunningMachine(self, period)
 
 
 class RunningMachine:
-    """A state machine that runs: its state, and when it entered it."""
+    """A running state machine: its state, and when it entered it."""
 
     def __init__(self, law: StateMachine, period: float) -> None:
         self._states, self._period = law.states, period

@@ -13,7 +13,7 @@ __all__ = ["ControlledForce"]
 
 @step_function
 def controlled_force_step(par: Any, state: Any, inp: Any, out: Any) -> int:
-    """Force that is held; what it takes back is an entry of its own."""
+    """Held force; what it takes back is an entry of its own."""
     work = par[0] * (inp[3] - inp[2])
     out[0] = par[0]
     out[1], out[2] = max(0.0, work), max(0.0, -work)
@@ -24,8 +24,8 @@ class ControlledForce(Controlled):
     """Force along +z on one port that follows from signals, sampled and held.
 
     The controller's output is the force [N], constant over a sample time: an ideal actuator, such
-    as a voice coil or a piezo stack behind its amplifier.  Its work is counted as a supply;
-    what it takes back while it brakes, as a loss.
+    as a voice coil or a piezo stack with its amplifier.  Its work is a supply, what it takes back
+    while it brakes a loss.
     """
 
     type: ClassVar[str] = "controlled-force"

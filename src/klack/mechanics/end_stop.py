@@ -26,20 +26,19 @@ class EndStop(Component):
     .. math:: z = g + e, \qquad g = g_0 + y_\text{upper} - y_\text{lower}, \qquad e = D F, \qquad
               F = F_\text{contact}(-z) + F_\text{film}(z, \dot z)
 
-    ``upper`` is the part that lies in +z: the stop at the opening end (its ``lower`` is the
-    needle), the needle at the seat (its ``lower`` is the seat).  A force above zero presses the
-    parts asunder; only the film can pull.
+    ``upper`` is the part that lies in +z: the stop at the opening end, the needle at the seat.  A
+    force above zero presses the parts apart; only the film can pull.
 
-    The film lies on the rough faces, beside the asperities, and both press on the bulk of the
-    bodies, so the compliance ``D`` is in series.  With a film parallel to the whole spring, as in
-    simpler models, the fluid would be squeezed out of a gap that the elastic faces do not have.
+    Film and asperities press on the bulk of the bodies, so the compliance ``D`` is in series.  With
+    a film parallel to the whole spring, as in simpler models, the fluid would be squeezed out of a
+    gap that the elastic faces do not have.
 
-    ``restitution`` adds the dashpot of Hunt and Crossley with the factor of Gonthier et al. (2004);
-    for rigid bodies only: in modal bodies the waves take that energy already.
+    ``restitution`` adds the dashpot of Hunt and Crossley with the factor of Gonthier et al. (2004),
+    for rigid bodies only: in modal bodies the waves take that energy.
 
-    Faces with friction have a law with memory (:class:`klack.contact.rubbing_law.RubbingLaw`), and
-    so have faces that yield (:class:`klack.contact.yielding_law.YieldingLaw`): the gap is then that
-    of the faces as they are, larger by the set that impacts have left.
+    Faces with friction (:class:`klack.contact.rubbing_law.RubbingLaw`) or that yield
+    (:class:`klack.contact.yielding_law.YieldingLaw`) have a law with memory; the gap of the latter
+    is larger by the set of earlier impacts.
 
     Limits: parallel, centred faces.
     """
@@ -94,11 +93,10 @@ class EndStop(Component):
     def with_law(
         self, law: ContactLaw | RubbingLaw | YieldingLaw, series_compliance: float = 0.0
     ) -> Self:
-        """Return this end stop with a law that was computed, e.g. the consistent one.
+        """Same end stop with a law that was computed, e.g. the consistent one.
 
         Parameters
         ----------
-        law : ContactLaw, RubbingLaw or YieldingLaw
         series_compliance [m/N]
         """
         stop = self.model_copy(update={"series_compliance": series_compliance})
@@ -106,7 +104,7 @@ class EndStop(Component):
         return stop
 
     def contact_law(self) -> ContactLaw | RubbingLaw | YieldingLaw | None:
-        """Law that acts; raise :class:`InputError` if a consistent law was not filled in."""
+        """Law that acts; InputError if a consistent law was not filled in."""
         if self._computed is not None:
             law: ContactLaw | RubbingLaw | YieldingLaw = self._computed
         elif self.law is None:
@@ -133,7 +131,7 @@ class EndStop(Component):
         return HuntCrossley(law, gonthier_coefficient(self.restitution))
 
     def lumped(self, stiffness: float, restitution: float | None) -> Self:
-        """Return this end stop with one spring [N/m] and one dashpot; a film stays."""
+        """Same end stop with one spring [N/m] and one dashpot; a film stays."""
         law = LinearStopLaw(kind="linear", stiffness=LinearLaw(stiffness).stiffness)
         stop = self.model_copy(
             update={"law": law, "restitution": restitution, "series_compliance": 0.0}
@@ -142,7 +140,7 @@ class EndStop(Component):
         return stop
 
     def dry(self) -> Self | None:
-        """Return this end stop without its film; None if it had nothing else."""
+        """Same end stop without its film; None if it had nothing else."""
         if self.law is None:
             return None
         return self.model_copy(update={"film": None})

@@ -25,13 +25,12 @@ class FlexibleBody(Component):
     .. math:: \ddot q_i + 2 \zeta_i \omega_i \dot q_i + \omega_i^2 q_i = \sum_p \varphi_{ip} F_p,
               \qquad y_p = \sum_i \varphi_{ip} q_i
 
-    The solver propagates the modes exactly, whatever the step.  Forces and displacements of a port
-    share one shape, the mean over the surface under its pressure pattern, so the body can create no
-    energy.  What its modes miss of the compliance under a contact belongs into the law of the end
-    stop.
+    The modes are propagated exactly, whatever the step.  Forces and displacements of a port share
+    one shape, the mean over the surface under its pressure pattern, so the body can create no
+    energy.  The compliance under a contact that its modes miss belongs to the law of the end stop.
 
-    A case file names a body of the case; its reduced form is computed and filled in when the case
-    runs.  In Python: ``FlexibleBody.of(reduced)``.
+    A case names a body, whose reduced form is filled in when the case runs.  In Python:
+    ``FlexibleBody.of(reduced)``.
     """
 
     type: ClassVar[str] = "flexible-body"
@@ -66,15 +65,15 @@ class FlexibleBody(Component):
         Parameters
         ----------
         points
-            Those of its ports that the network uses; all by default.
+            Ports that the network uses; all by default.
         speed [m/s]
-            Of the whole body at the start, along +z; only a free body can have one.
+            Of the whole free body at the start, along +z.
         """
         chosen = tuple(reduced.port_names if points is None else points)
         return cls(body=reduced.name, points=chosen, speed=speed).with_reduced(reduced)
 
     def with_reduced(self, reduced: ReducedBody, port_map: Mapping[str, str] | None = None) -> Self:
-        """Return this component with its modes filled in.
+        """Same component with its modes filled in.
 
         Parameters
         ----------
@@ -84,7 +83,7 @@ class FlexibleBody(Component):
         Raises
         ------
         InputError
-            If the reduced body has no such port, or a fixed body shall start with a speed.
+            If the reduced body has no such port, or a fixed body has a speed.
         """
         names = [(port_map or {}).get(point, point) for point in self.points]
         for point, name in zip(self.points, names, strict=True):
@@ -135,7 +134,7 @@ class FlexibleBody(Component):
         return dict.fromkeys(self.points, MOTION)
 
     def lumped(self, stiffness: float, restitution: float | None) -> Component | None:
-        """Return a rigid mass, or the ground for a body that is held."""
+        """Rigid mass, or the ground for a body that is held."""
         if not self.reduced.rigid_count:
             return None
         return RigidMass(mass=self.mass, speed=self.speed, points=self.points)
@@ -146,7 +145,6 @@ class FlexibleBody(Component):
 
 
 def _with_ports(body: ReducedBody, chosen: list[int], names: tuple[str, ...]) -> ReducedBody:
-    """Return the same body with some of its ports, under new names."""
     values: dict[str, Any] = {key: getattr(body, key) for key in body.__dataclass_fields__}
     values |= {
         "port_names": names,

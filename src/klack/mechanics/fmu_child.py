@@ -1,11 +1,11 @@
 """The process that an imported FMU lives in: ``python -I -S fmu_child.py PARENT``.
 
-Loading the library of an FMU runs foreign code already, so that all of it happens here: a crash, an
-``exit`` or an endless loop ends or blocks this process and not klack.  Requests come through the
-standard input, answers go to the standard output; what the FMU itself prints is dropped.
+Foreign code, which already loading the library of an FMU runs, stays in here: a crash, an ``exit``
+or an endless loop ends or blocks this process and not klack.  Requests come through the standard
+input, answers go to the standard output; output of the FMU itself is dropped.
 
-Only the standard library is imported, so that the process stands after some hundredths of a second.
-The functions of FMI are called by ctypes, with arrays that are made once.
+Only the standard library is imported, so that the process starts in some hundredths of a second.
+The functions of FMI are called by ctypes.
 
 Source: Functional Mock-up Interface 2.0.4, sections 2.1 and 4.2; 3.0.1, sections 2.3 and 4.2.
 """
@@ -27,7 +27,7 @@ from typing import Any
 __all__ = ["ADVANCE", "ANSWER", "FORCE", "RUN", "Fmi2", "Fmi3", "Instance", "request"]
 
 ANSWER = Struct("<BdI")
-"""0 if all went well, output in the unit of the FMU, length of the text that follows."""
+"""0 for success, output in the unit of the FMU, length of the text that follows."""
 FORCE, RUN, ADVANCE = 1, 2, 3
 """Output in the initialisation; end of the initialisation; a step and the output after it."""
 
@@ -63,10 +63,7 @@ class _Callbacks2(ctypes.Structure):
 class Instance(ABC):
     """One instance of an FMU with some inputs, mostly a motion, and one output, mostly a force.
 
-    Parameters
-    ----------
-    library
-        Path of its shared library, which is loaded here.
+    ``library`` is the path of its shared library, which is loaded here.
     """
 
     version: int
@@ -305,7 +302,7 @@ def _line(reader: int) -> bytes:
 
 
 def _whole(reader: int, size: int) -> bytes:
-    """Read the given number of bytes; none if the other side closed."""
+    """Read ``size`` bytes; none if the other side closed."""
     data = os.read(reader, size)
     while 0 < len(data) < size:
         more = os.read(reader, size - len(data))

@@ -1,9 +1,9 @@
 """A co-simulation FMU of another tool as the controller of a controlled component.
 
-A case never names it: the binary of an FMU is a program that runs with the rights of the user, so
-that whoever runs the case gives it, on the command line or in Python.  It runs in a process of
-its own.  At time zero its output is read in its initialisation; at every later sampling instant it
-gets the signals, is led over one sample time, and its output holds until the next instant.
+A case never names it: its binary is a program with the rights of the user, so that whoever runs the
+case gives it, on the command line or in Python.  It runs in a process of its own.  At time zero its
+output is read in its initialisation; at every later sampling instant it gets the signals, advances
+by one sample time, and its output holds until the next instant.
 """
 
 import hashlib
@@ -38,9 +38,9 @@ class FmuController:
 
     Parameters
     ----------
-    inputs : mapping of str to tuple of str and float
-        Sensor -> input of the FMU, and the unit of the signal over that of the input.
-    output : tuple of str and float
+    inputs
+        Input of the FMU for each sensor, and the unit of the signal over that of the input.
+    output
         Output of the FMU, and its unit in V, N or Pa.
     parameters
         Parameters and start values, in the units of the FMU.
@@ -56,17 +56,17 @@ class FmuController:
 
     @property
     def told(self) -> str:
-        """Which file it is, for the record of a run."""
+        """Its file, for the record of a run."""
         digest = hashlib.sha256(self.fmu.path.read_bytes()).hexdigest()[:12]
         return f"the FMU {self.fmu.path.name} (SHA-256 {digest}...)"
 
     def begin(self, period: float) -> Law:
-        """Return a fresh instance as a function, led in steps of ``period`` [s]."""
+        """Fresh instance as a function, in steps of ``period`` [s]."""
         return _Running(self, period)
 
 
 class _Running:
-    """An instance of the FMU during a run; a new process for each."""
+    """An instance of the FMU during a run, in a new process."""
 
     def __init__(self, controller: FmuController, period: float) -> None:
         self._of, self._period = controller, period
@@ -136,23 +136,20 @@ def controlled_by_fmu(
     parameters: Mapping[str, float] | None = None,
     time_limit: float = TIME_LIMIT,
 ) -> AnyControlled:
-    """Return a controlled component whose controller is an FMU for co-simulation, 2.0 or 3.0.
+    """Controlled component whose controller is an FMU for co-simulation, 2.0 or 3.0.
 
     Parameters
     ----------
     component
         With its sensors and its sample time; a law that it has is replaced.
-    file : str or Path
     inputs
-        Sensor -> input of the FMU; the same names by default.  Signals are converted to the units
-        that the inputs declare.
+        Input of the FMU for each sensor, by default of the same name.  Signals are converted to the
+        units that the inputs declare.
     output
-        Output of the FMU; by default the only one, or the one called voltage, force or pressure.
-        One without a unit is in V, N or Pa.
-    parameters
-        Parameters and start values, in the units of the FMU.
-    time_limit [s]
-        Longest time that one call of the FMU may take on the clock.
+        By default the only one, or the one called voltage, force or pressure.  One without a unit
+        is in V, N or Pa.
+    parameters, time_limit
+        As of :class:`FmuController`.
 
     Raises
     ------
@@ -209,7 +206,7 @@ def _joined(
 
 
 def _output(fmu: FmuDescription, name: str | None, usual: str) -> FmuVariable:
-    """Output of that name; without one the only one, or the usual one."""
+    """Output of that name; by default the only one, or the usual one."""
     outputs = _reals(fmu, "output")
     if name is not None:
         return _named(fmu, "output", name, outputs)
@@ -262,7 +259,7 @@ def _named(fmu: FmuDescription, what: str, name: str, known: list[FmuVariable]) 
 
 
 def _size(fmu: FmuDescription, unit: str, variable: FmuVariable) -> float:
-    """A unit over that of a variable; 1 if the variable declares none."""
+    """A unit over that of a variable; 1 if it declares none."""
     other = variable.unit
     if other in ("", "1", unit):
         return 1.0

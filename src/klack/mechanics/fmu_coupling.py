@@ -1,17 +1,17 @@
 r"""Coupling of an FMU to the time loop: exchange at communication points, and what it costs.
 
-The loop goes first.  At a communication point :math:`t_{k+1}` the FMU is led from :math:`t_k` over
-the same time, with the displacement of its end and the mean velocity of the interval, and gives the
-force :math:`f_{k+1}`.  Until the next point the loop feels
+The loop goes first.  At a communication point :math:`t_{k+1}` the FMU advances from :math:`t_k`
+with the displacement of its end and the mean velocity of the interval, and gives the force
+:math:`f_{k+1}`.  Until the next point the loop feels
 
 .. math:: F(t) = f_{k+1} \quad\text{(hold)}, \qquad
           F(t) = f_{k+1} + \frac{f_{k+1} - f_k}{t_{k+1} - t_k}\,(t - t_{k+1}) \quad\text{(linear)}
 
 The FMU itself did the work :math:`W_k = \tfrac12 (f_k + f_{k+1})(y_{k+1} - y_k)`, the loop got
 :math:`\int F\,\mathrm dy`.  The difference is energy that coupling loses (above zero) or makes
-(below), as the residual energy of Sadjina et al. (2017); it falls with the coupling step, once for
-``hold`` and twice for ``linear``.  Both are entries of the energy balance: the work as a supply,
-the difference as a loss, so that the balance of the whole network still closes to round-off.
+(below), the residual energy of Sadjina et al. (2017), of first order in the coupling step for
+``hold`` and of second for ``linear``.  The work is a supply of the energy balance, the difference a
+loss, so that the balance of the whole network still closes to round-off.
 """
 
 from typing import Literal
@@ -40,7 +40,6 @@ class FmuCoupling:
     ----------
     coupling_step [s]
         Shortest time between two exchanges; rounded up to whole steps of the loop.
-    extrapolation : "hold" or "linear"
     """
 
     def __init__(self, slave: FmuSlave, coupling_step: float, extrapolation: Extrapolation) -> None:
@@ -85,7 +84,7 @@ class FmuCoupling:
         return state[0] == 0.0 or t - state[1] >= self.coupling_step * (1.0 - _ROUND_OFF)
 
     def _communicate(self, state: list[float], t: float, y: float, speed: float) -> None:
-        """Lead the FMU to ``t``; sets the exchange and the energy lost since the one before."""
+        """Advance the FMU to ``t``; sets the exchange and the energy lost since the last one."""
         if state[0] == 0.0:
             if not self._ready:
                 self.slave.begin()

@@ -1,8 +1,8 @@
 """Functional mock-up unit (FMU) as a file: its description and safe unpacking.
 
-The archive is an untrusted file: no member may leave the folder it is unpacked to, and sizes
-are checked before anything is written.  Its binary, though, is native code that runs with the
-rights of the user: take FMUs only from people that you would take a program from.
+The archive is an untrusted file: no member may leave the folder it is unpacked to, and sizes are
+checked before anything is written.  Its binary, though, runs with the rights of the user: take FMUs
+only from people that you would take a program from.
 """
 
 import lzma
@@ -57,12 +57,12 @@ class FmuDescription:
     ----------
     path
         Of the ``.fmu``.
-    version : 2 or 3
+    version
         Of FMI.
     identifier, token
-        Name of its library; the word that library and description must share.
+        Name of its library; word that library and description must share.
     model_exchange
-        True for an FMU without a solver of its own, which klack cannot run.
+        Without a solver of its own: klack cannot run it.
     variable_step
         Whether steps of communication may differ in length.
     """
@@ -98,15 +98,7 @@ def describe_fmu(path: Path) -> FmuDescription:
 
 
 def inspect_fmu(path: Path) -> FmuDescription:
-    """Read the description of any FMU of FMI 2.0 or 3.0, also of one for model exchange only.
-
-    Raises
-    ------
-    InputError
-        If the file is no FMU, or a damaged one.
-    MissingExtraError
-        Without the package fmpy.
-    """
+    """As :func:`describe_fmu`, also of an FMU for model exchange only."""
     refuse_lfs_pointer(path)
     status = path.stat()
     return _described(path, status.st_mtime_ns, status.st_size)
@@ -157,17 +149,7 @@ def _described(path: Path, _changed: int, _size: int) -> FmuDescription:
 
 
 def unpack_fmu(fmu: FmuDescription, folder: Path) -> Path:
-    """Unpack description, resources and the binary of this platform.
-
-    Parameters
-    ----------
-    folder
-        An empty one.
-
-    Returns
-    -------
-    Path
-        Of the shared library.
+    """Unpack an FMU into an empty folder for this platform; path of the shared library.
 
     Raises
     ------
@@ -217,7 +199,7 @@ def _archive(path: Path) -> Iterator[zipfile.ZipFile]:
 
 
 def _extract(path: Path, archive: zipfile.ZipFile, folder: Path, wanted: object) -> None:
-    """Unpack the needed files, after a check of all names and sizes."""
+    """Unpack the needed files after a check of names and sizes."""
     assert callable(wanted)
     members = archive.infolist()
     if len(members) > _MOST_MEMBERS or sum(item.file_size for item in members) > _LARGEST:

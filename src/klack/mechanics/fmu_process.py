@@ -1,8 +1,7 @@
 """Process that serves one FMU: start, calls and end.
 
-It ends with the process that started it, whatever happens to that.  A call that takes too long is
-ended by a thread that looks in from time to time; the calls themselves cost one round trip through
-two pipes and nothing else.
+It ends with the process that started it, whatever happens to that.  A thread ends calls that take
+too long; a call costs one round trip through two pipes.
 """
 
 import json
@@ -46,7 +45,7 @@ class FmuProcess(Closing):
     Raises
     ------
     FmuFailed
-        If the FMU cannot be loaded or fails, or takes too long; the process is gone then.
+        If the FMU cannot be loaded, fails, or takes too long; the process is gone then.
     """
 
     def __init__(self, given: Mapping[str, Any], time_limit: float) -> None:
@@ -76,12 +75,7 @@ class FmuProcess(Closing):
             raise
 
     def call(self, what: int, time: float, step: float, *inputs: float) -> float:
-        """Send a request; see :func:`klack.mechanics.fmu_child.request`.
-
-        Returns
-        -------
-        float
-            Output in the unit of the FMU.
+        """Send a :func:`klack.mechanics.fmu_child.request`; output in the unit of the FMU.
 
         Raises
         ------
@@ -138,8 +132,8 @@ class FmuProcess(Closing):
 class _Watch(threading.Thread):
     """Ends the process when one call takes longer than the limit.
 
-    It counts what it sees rather than reading a clock: time in which the whole of klack was stopped
-    (Ctrl-Z, a suspended computer) does not count.
+    It counts its own ticks: time in which klack was stopped (Ctrl-Z, a suspended computer) does not
+    count.
     """
 
     def __init__(self, process: subprocess.Popen[bytes], limit: float) -> None:
@@ -166,7 +160,7 @@ class _Watch(threading.Thread):
 
 
 def _end(process: subprocess.Popen[bytes], watch: _Watch) -> None:
-    """End and bury a process: it frees its instance when the pipes close, or is killed."""
+    """End and reap a process: it frees its instance when the pipes close, or is killed."""
     watch.stop()
     for pipe in (process.stdin, process.stdout):
         if pipe is not None:

@@ -15,20 +15,20 @@ from klack.units import format_si
 __all__ = ["TIME_LIMIT", "FmuSlave", "FmuWiring"]
 
 TIME_LIMIT = 30.0
-"""Time for one call of an FMU [s]; a step takes microseconds, an initialisation some seconds."""
+"""Time [s] for one call of an FMU; a step takes microseconds, an initialisation some seconds."""
 
 _LARGEST = 1e9  # [N], the weight of 100 000 t: no force in a valve
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FmuWiring:
-    """Which variables of the FMU are joined, and their size in SI.
+    """Variables of the FMU that are joined, and their size in SI.
 
     Parameters
     ----------
-    displacement, velocity : tuple of str and float, or None
-        Name of an input, and its unit in SI units [m or m/s per unit].
-    force : tuple of str and float
+    displacement, velocity
+        Name of an input, and its unit [m or m/s per unit].
+    force
         Name of an output, and its unit [N per unit].
     parameters
         Parameters and start values, in the units of the FMU.
@@ -41,11 +41,11 @@ class FmuWiring:
 
 
 class FmuSlave:
-    """One FMU in a process of its own; :meth:`begin` first, which may be repeated for a new run.
+    """One FMU in a process of its own; :meth:`begin` first, again for each new run.
 
-    All that the FMU does wrong becomes a :class:`~klack.errors.ConvergenceError` with its name and
-    the simulated time: a status of failure, a crash, an end of its process, no answer within the
-    time limit, and a force that is no number or above 1e9 N.
+    Every fault of the FMU becomes a :class:`~klack.errors.ConvergenceError` with its name and the
+    simulated time: a status of failure, a crash, an end of its process, no answer within the time
+    limit, and a force that is NaN or above 1e9 N.
 
     Parameters
     ----------
@@ -65,13 +65,7 @@ class FmuSlave:
         self._unit = wiring.force[1]
 
     def begin(self) -> None:
-        """Make a new instance and enter its initialisation, in which forces can be read.
-
-        Raises
-        ------
-        ConvergenceError
-            If it cannot be loaded, or fails.
-        """
+        """Make a new instance and enter its initialisation, in which forces can be read."""
         self.close()
         motion = (self.wiring.displacement, self.wiring.velocity)
         variables = self.fmu.variables
@@ -101,13 +95,7 @@ class FmuSlave:
         self._asked(RUN, 0.0, 0.0, 0.0, 0.0)
 
     def advance(self, time: float, step: float, displacement: float, velocity: float) -> float:
-        """Continue from ``time`` by ``step`` [s]; inputs hold from the start of the step.
-
-        Returns
-        -------
-        float
-            Force [N] at the end of the step.
-        """
+        """Continue from ``time`` by ``step`` [s] to a force [N]; inputs hold from the start."""
         return self._asked(ADVANCE, time, step, displacement, velocity)
 
     def close(self) -> None:

@@ -86,9 +86,8 @@ def timed_force_step(par: Any, state: Any, inp: Any, out: Any) -> int:
 class ForceOverTime(Component):
     """Force along +z on one port, straight lines between points in time.
 
-    Constant before the first and after the last point.  Every step sees the exact mean of the lines
-    over its length, so the impulse is right whatever the step, and a jump needs no resolving: give
-    it as two points a nanosecond apart.
+    Constant before the first and after the last point.  A step takes the exact mean, so the impulse
+    is right whatever the step; a jump is two points a nanosecond apart.
     """
 
     type: ClassVar[str] = "force-over-time"

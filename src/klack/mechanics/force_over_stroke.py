@@ -20,7 +20,7 @@ __all__ = ["ForceOverStroke"]
 def stroke_force_step(par: Any, state: Any, inp: Any, out: Any) -> int:
     """Mean over the way of straight lines between points; par: n, places, forces, their work.
 
-    The state is the interval that holds the start of the way: ``k`` ends at point ``k``.
+    The state is the interval that holds the start; ``k`` ends at point ``k``.
     """
     n = int(par[0])
     start, end = inp[2] - inp[4], inp[3] - inp[5]
@@ -75,8 +75,8 @@ class ForceOverStroke(Component):
     .. math:: F = F(y_\text{end} - y_\text{base}), \qquad
               \bar F = \frac{1}{x_1 - x_0} \int_{x_0}^{x_1} F(x)\,\mathrm dx
 
-    Disc springs, magnetic latches, springs with a kink.  A conservative force: the mean over the
-    way of a step keeps the energy to round-off.  Constant beyond the first and the last point.
+    Disc springs, magnetic latches, springs with a kink.  Conservative: the mean over a step keeps
+    the energy to round-off.  Constant beyond the first and the last point.
     """
 
     type: ClassVar[str] = "force-over-stroke"

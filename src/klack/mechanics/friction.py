@@ -17,7 +17,7 @@ __all__ = ["GuideFriction", "require_breakaway"]
 
 
 def require_breakaway(coulomb: float, breakaway: float | None) -> None:
-    """Refuse a friction at rest [N] below the sliding one."""
+    """Reject a friction at rest [N] below the sliding one."""
     if breakaway is not None and breakaway < coulomb:
         raise CaseProblem(
             ("breakaway",),
@@ -33,8 +33,8 @@ class GuideFriction(Component):
     .. math:: F = -\Bigl[F_c + (F_s - F_c)\, e^{-(v/v_s)^2}\Bigr] \mathrm{sign}\, v - b v,
               \qquad |F| \le F_s \text{ at rest}
 
-    Set-valued at rest: a body under a force below ``F_s`` stays where it is, however long, and
-    breaks away above it.  The loss of a step is never negative.
+    Set-valued at rest: a body stays, however long, under a force below ``F_s``, and breaks away
+    above it.  The loss of a step is never negative.
 
     Limits: no displacement while it sticks (pre-sliding), and no friction that grows with the time
     at rest.

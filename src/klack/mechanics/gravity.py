@@ -33,8 +33,8 @@ class Gravity(Component):
     .. math:: F = -m g \cos\vartheta
 
     Seldom matters in a valve (a needle of 3 g weighs 0.03 N, its spring pushes with 20 N).  At one
-    port of a flexible body the resultant and the motion of the centre of mass are right; that the
-    weight is spread over the volume is neglected (nanometres).
+    port of a flexible body the motion of the centre of mass is right; the spread of the weight over
+    the volume is neglected (nanometres).
     """
 
     type: ClassVar[str] = "gravity"

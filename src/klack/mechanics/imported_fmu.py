@@ -25,22 +25,21 @@ _MOST_NAMES = 20
 class ImportedFmu(Component):
     r"""Co-simulation FMU (FMI 2.0 or 3.0) that answers a motion with a force.
 
-    It gets the displacement of ``end`` against ``base`` along +z, from its place at the start, and
-    its rate, and gives the force along +z on ``end`` (and the opposite on ``base``): a spring
-    answers a positive displacement with a negative force.  Variables that declare a unit are
-    converted, all others are taken in m, m/s, N.
+    It gets the displacement of ``end`` against ``base`` along +z since the start, and its rate, and
+    gives the force along +z on ``end`` (and the opposite on ``base``): that of a spring is negative
+    for a positive displacement.  Variables without a declared unit are in m, m/s, N.
 
-    Exchange at every ``coupling_step``, as :mod:`klack.mechanics.fmu_coupling` tells; its energy
-    error is the entry ``<component> coupling error`` of the energy balance.
+    Exchange at every ``coupling_step`` (:mod:`klack.mechanics.fmu_coupling`); its energy error is
+    the entry ``<component> coupling error`` of the energy balance.
 
     Limits: a force that depends on the motion stiffly makes the explicit coupling unstable; for a
-    stiffness k against a mass m keep the coupling step well below :math:`\sqrt{m/k}`.  Before the
-    start the FMU is asked for its force at rest in its initialisation, which only forces without
-    memory answer rightly.  A run cannot continue from a stored state.
+    stiffness k against a mass m keep the coupling step well below :math:`\sqrt{m/k}`.  The static
+    equilibrium takes its force at rest from its initialisation, which is right only for forces
+    without memory.  A run cannot continue from a stored state.
 
-    The binary inside is native code with the rights of the user.  It runs in a process of its own:
-    a crash, an exit, a call longer than ``time_limit``, and a force that is no number or above
-    1e9 N stop the run with a message; see :class:`klack.mechanics.fmu_slave.FmuSlave`.
+    The binary has the rights of the user.  It runs in a process of its own: its faults, and a call
+    longer than ``time_limit``, stop the run with a message
+    (:class:`klack.mechanics.fmu_slave.FmuSlave`).
 
     Source: Functional Mock-up Interface 2.0.4 and 3.0.1; S. Sadjina et al., Engineering with
     Computers 33 (2017) 607.

@@ -24,10 +24,10 @@ class Lever(Component):
     .. math:: y_p = a_p\,\theta, \qquad
               \Bigl(m\,a_1^2 + \sum_p m_p a_p^2\Bigr)\,\ddot\theta = \sum_p a_p F_p
 
-    The ratio of two ports is exact and nothing is lost.  A negative arm moves the other way; a rack
-    and pinion or two gears have the radii of their pitch circles as arms.  A lever is a body:
-    springs, stops, faces and forces join it.  A needle that is fixed to it is its ``carried`` mass;
-    one that only touches it is a body of its own behind an end stop.
+    Ratios are exact and nothing is lost.  A negative arm moves the other way; a rack and pinion or
+    two gears have the radii of their pitch circles as arms.  A lever is a body: springs, stops,
+    faces and forces join it.  A needle that is fixed to it is its ``carried`` mass; one that only
+    touches it is a body of its own behind an end stop.
 
     Limits: small angles, arms stay at right angles to the axis; no play, no friction in the pivot,
     no elasticity of the arms (join them by a spring).

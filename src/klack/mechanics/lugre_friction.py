@@ -33,7 +33,7 @@ def _slip_share(z: float, elastic: float, largest: float) -> float:
 
 @inner(error_model="numpy")
 def _bent(z: float, elastic: float, largest: float) -> float:
-    """Change of the deflection over the way, elasto-plastic."""
+    """Change of the deflection, elasto-plastic."""
     return 1.0 - _slip_share(z, elastic, largest) * z / largest
 
 
@@ -112,11 +112,11 @@ class LuGreFriction(Component):
 
     With ``elastic_share`` above zero the bristles hold without any slip up to that share of their
     largest deflection: the elasto-plastic model of P. Dupont, V. Hayward, B. Armstrong, F. Altpeter
-    (IEEE Trans. Automat. Contr. 47 (2002) 787).  LuGre drifts under a vibrating force below
-    breakaway; this one does not.
+    (IEEE Trans. Automat. Contr. 47 (2002) 787).  Under a vibrating force below breakaway LuGre
+    drifts, this does not.
 
-    ``guide-friction`` sticks rigidly, needs no stiffness and costs nothing where it slides; take
-    this one where displacements of less than :math:`F_s/\sigma_0` matter.
+    Take it in place of ``guide-friction``, which sticks rigidly and needs no stiffness, where
+    displacements of less than :math:`F_s/\sigma_0` matter.
 
     Limits: :math:`\sigma_1` can release energy at speeds above :math:`4 g/\sigma_1`; its factor
     :math:`e^{-(v/v_d)^2}` (``damping_speed``, Olsson 1996) prevents that.

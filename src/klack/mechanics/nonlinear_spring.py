@@ -1,4 +1,4 @@
-"""Massless spring whose force is a polynomial or a table of its deflection."""
+"""Massless nonlinear spring."""
 
 from collections.abc import Mapping
 from itertools import pairwise
@@ -96,7 +96,7 @@ def curve_work(par: Any, at: int, s: float) -> float:
 
 @inner(error_model="numpy")
 def curve_mean(par: Any, at: int, s0: float, s1: float) -> float:
-    """Mean force of a curve over the way from ``s0`` to ``s1`` [N], without cancellation."""
+    """Mean force of a curve from ``s0`` to ``s1`` [N], without cancellation."""
     low, high = min(s0, s1), max(s0, s1)
     k = _piece(par, at, low)
     if high == low:
@@ -169,16 +169,14 @@ class NonlinearSpring(Component):
               f(s) = k\,s\,\Bigl[1 + \sum_{i \ge 1} a_i\,(s/s_r)^i\Bigr]
 
     or ``f`` through the points of a table, by the monotone cubics of Fritsch and Carlson (SIAM J.
-    Numer. Anal. 17 (1980) 238), which never overshoot.  Disc, wave and conical springs,
-    elastomers.  In a step the force is the mean over the way, from Gauss points that integrate each
-    polynomial exactly: the energy is kept to round-off at any step.
+    Numer. Anal. 17 (1980) 238), which never overshoot.  Disc, wave and conical springs, elastomers.
+    The force of a step is the exact mean: the energy is kept to round-off at any step.
 
     ``force-over-stroke`` instead gives a force along +z with straight lines and constant ends: a
     latch, not a spring.
 
-    Limits: no mass, no hysteresis (a disc spring with friction between its discs: put a friction
-    beside it).  Beyond the table the force continues in a straight line, with a
-    warning.
+    Limits: no mass, no hysteresis (for friction between discs put a friction beside it).  Beyond
+    the table the force continues in a straight line, with a warning.
     """
 
     type: ClassVar[str] = "nonlinear-spring"

@@ -25,23 +25,23 @@ _LARGEST = 10_000_000  # bytes of a table
 
 
 class PrescribedMotion(Component):
-    r"""Body that follows a lift curve exactly, whatever pushes it.
+    """Body that follows a lift curve exactly, whatever pushes it.
 
     .. math:: y(t) = c(t) - c(0)
 
     through the points of a table or of a file, by monotone cubics that do not overshoot (Fritsch
     and Carlson, SIAM J. Numer. Anal. 17 (1980) 238) or by straight lines; constant before the first
-    and after the last point.  Displacements count from that at time zero.  Drives seats, faces and
-    films with a measured lift, or with one of another program.
+    and after the last point.  Drives seats, faces and films with a lift that is measured or of
+    another program.
 
     The force that the motion needs is recorded as ``<component> drive force``, positive along +z;
     its work is the supply ``<component> motion`` of the energy balance, negative while the body is
     pushed along.  Displacements are exact at the end of every step, and in between the speed is
     constant.
 
-    Limits: it has no mass, so the force is that of its surroundings alone; an end stop or friction
-    may join it to a body that can give way, not to the ground.  The check of strokes before a run
-    does not know its travel.
+    Limits: no mass, so the force is that of its surroundings alone; an end stop or friction may
+    join it to a body that can move, not to the ground.  The check of strokes before a run does not
+    know its travel.
     """
 
     type: ClassVar[str] = "prescribed-motion"

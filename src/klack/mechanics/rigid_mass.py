@@ -23,9 +23,8 @@ class RigidMass(Component):
 
     .. math:: m \ddot y = \sum_p F_p
 
-    All its points move alike; several of them only let results tell apart what pushes where.  The
-    usual baseline for a valve needle.  It cannot ring and loses no energy to waves, so an impact on
-    it needs a prescribed restitution.
+    All its points move alike; several only let results tell apart what pushes where.  It loses no
+    energy to waves, so an impact on it needs a prescribed restitution.
     """
 
     type: ClassVar[str] = "rigid-mass"

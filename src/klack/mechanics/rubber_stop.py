@@ -124,12 +124,12 @@ class RubberStop(Component):
     Viscoelastic Properties of Polymers, 1980, ch. 3).  Elements a decade apart in time
     give a nearly constant loss over the band that they span.
 
-    It touches when ``gap`` is closed and never pulls: when the body leaves faster than the rubber
-    recovers, its surface stays behind, free of force, and is touched where it then is.  Forces of
-    the elements are integrated exactly over a step of constant speed.
+    It touches when ``gap`` is closed and never pulls: a surface that recovers more slowly than the
+    body leaves stays behind, free of force, and is touched where it then is.  The elements are
+    integrated exactly over a step of constant speed.
 
-    Limits: no mass in the rubber, no sticking, no film.  Touches are not listed among the
-    impacts, and the check of strokes before a run does not take it for an end of the stroke.
+    Limits: no mass, no sticking, no film.  Touches are no impacts of the results, and the check of
+    strokes before a run does not take it for an end of the stroke.
     """
 
     type: ClassVar[str] = "rubber-stop"

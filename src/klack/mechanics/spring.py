@@ -37,10 +37,9 @@ class Spring(Component):
 
     .. math:: F_\text{end} = -F_0 - k\,(y_\text{end} - y_\text{base}) - c\,\dot y_\text{rel}
 
-    The return spring of a normally closed valve: lifting the needle compresses it.  A negative
-    preload pushes the other way and makes the opening spring of a normally open valve.  In a step
-    the elastic force is that of the mean deflection, so the stored energy is balanced to round-off
-    and the frequency is right to second order.
+    The return spring of a normally closed valve; with a negative preload the opening spring of a
+    normally open one.  The elastic force of a step is that of the mean deflection, so the stored
+    energy is balanced to round-off and the frequency is right to second order.
 
     Limits: no mass, so no surge waves in its coils (its first surge frequency should be well above
     1/(opening time); add a third of its mass to the needle); it also pulls when it would be

@@ -82,7 +82,7 @@ class AsperityStopLaw(Section):
     height: Length = Field(gt=0, description="Height s over which the force grows by e.")
 
     def contact_law(self) -> TableLaw:
-        """Return the law as a table, within 2e-4 up to 100 kN and straight beyond."""
+        """Table within 2e-4 up to 100 kN and straight beyond."""
         most = max(log(1.0 + _LARGEST_FORCE / self.force), 1.0)
         x = np.linspace(0.0, most, int(_POINTS_PER_HEIGHT * most) + 2)
         return TableLaw(self.height * x, self.force * np.expm1(x))

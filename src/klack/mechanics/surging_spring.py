@@ -21,7 +21,7 @@ _MOST_MODES = 40
 
 @step_function
 def surging_spring_step(par: Any, state: Any, inp: Any, out: Any) -> int:
-    """Spring between two ports with oscillators that both carry, exact where these move evenly.
+    """Spring between two ports with oscillators that both carry, exact for ports of even motion.
 
     par: stiffness, preload, oscillators n, then stiffness, damping, mass and sign of each.  State:
     displacement and velocity of each.
@@ -80,13 +80,12 @@ class SurgingSpring(Component):
         m_i \ddot x_i = k_i (s_i - x_i), \qquad s_i = y_\text{end} - (-1)^i y_\text{base},
 
     an oscillator for each mode with :math:`k_i = 2 k`, :math:`m_i = 2 m / (i \pi)^2`.  The static
-    stiffness is exact with any number of them.  All modes above the ``modes`` first ones are two
-    more oscillators, one of the even and one of the odd modes, that have their mass and answer
-    right up to the fourth power of the frequency: the whole mass is there, and a third of it at an
-    end whose other end is held.
+    stiffness is exact.  All modes above the ``modes`` first ones are two more oscillators, even and
+    odd, with their mass and an answer that is right up to the fourth power of the frequency: the
+    whole mass is there, and a third of it at an end whose other end is held.
 
-    A step of any length is exact for ends that move evenly in it: :math:`s_i - x_i` then swings
-    freely.  ``damping`` is a share of critical damping, of each mode alike.
+    A step of any length is exact for ends of even motion.  ``damping`` is a share of critical
+    damping, of each mode alike.
 
     Limits: linear, no contact between coils (coil bind) nor of the coils at their seats; the twist
     of the wire is in the axial stiffness.

@@ -1,4 +1,4 @@
-"""The one choice between speed and accuracy of a stroke, and the steps that it begins with."""
+"""Accuracy of a stroke against speed, and the steps that it begins with."""
 
 from typing import Literal
 
@@ -17,5 +17,5 @@ PROMISED: dict[Accuracy, tuple[float, float]] = {"normal": (5e-4, 5e-8), "fine":
 
 
 def fine_step(accuracy: Accuracy, step: float | None = None) -> float:
-    """Fine step [s]: the one that is stated, or that of the accuracy."""
+    """Fine step [s]: stated, or that of the accuracy."""
     return ACCURACIES[accuracy][0] if step is None else step

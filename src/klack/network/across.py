@@ -1,8 +1,8 @@
 r"""Forces across the axis of a needle that moves in three dimensions.
 
-The axis of the needle is the line :math:`(a_x + s_x z,\; a_y + s_y z)`, with ``z`` as in the
-drawing of the needle: four numbers, position where z is zero and slopes.  A component whose force
-depends on them adds a :class:`SideLaw` to its rows.  A motion along the axis does not ask it.
+The axis of the needle is the line :math:`(a_x + s_x z,\; a_y + s_y z)`, with ``z`` as in its
+drawing.  A component whose force depends on these four numbers adds a :class:`SideLaw` to its rows,
+which axial motions ignore.
 """
 
 from dataclasses import dataclass
@@ -14,14 +14,14 @@ __all__ = ["OffAxisPart", "SideInputs", "SideLaw"]
 
 
 class SideInputs(NamedTuple):
-    """What a law of a force across the axis is told.
+    """Inputs of a force across the axis.
 
     Parameters
     ----------
     axis (4,) [m], [m], [-], [-]
         ``a_x, a_y, s_x, s_y``, in the middle of the step.
     ports [m]
-        Displacements of the ports of the row along z, in the middle of the step.
+        Axial displacements of the ports of the row, in the middle of the step.
     state
         Of the row, at the start of the step.
     ahead [s]
@@ -41,16 +41,16 @@ class SideLaw(Protocol):
     """Force across the axis of a needle."""
 
     def force(self, now: SideInputs) -> Vector:
-        """Force and moments of what the needle feels, shape (4,) [N], [N], [N m], [N m].
+        """Force and moments on the needle, shape (4,) [N], [N], [N m], [N m].
 
         Their work on a small change of ``now.axis`` is the scalar product of both.
         """
 
     def room(self, now: SideInputs) -> float:
-        """Distance [m] that is left until the faces meet, where the law ends."""
+        """Distance [m] left until the faces meet, where the law ends."""
 
     def left_out(self, now: SideInputs) -> float:
-        """Share of what acts along the axis that the position changes and the row does not [-]."""
+        """Share of the axial action that the position changes and the row does not [-]."""
 
     def placement(self, axis: Vector) -> Vector:
         """Numbers that the step function of the row takes of the position of the axis."""
@@ -62,15 +62,14 @@ class OffAxisPart:
 
     Parameters
     ----------
-    key : tuple of str or int
-        Where the component is told so.
+    key
+        Where the component says so.
     port
-        Its port that has to be at the needle.
+        That has to be at the needle.
     heights [m]
         Of its ends, in the drawing of the needle.
     room [m]
-        Way of the axis across itself that it allows at these heights; infinite where nothing can
-        touch.
+        Lateral displacement that it allows at these heights; infinite where nothing can touch.
     """
 
     key: tuple[str | int, ...]

@@ -1,9 +1,7 @@
 """Every component type that a case file may name, and the sections of fluid and gas.
 
-User components: classes outside klack, which only the user may allow.
-
-A case file names such a class as ``package.module:Class``, but never has it imported: the class is
-handed to the reader of the case, from Python or by the option ``--component`` of a command.
+A case file may also name a class of the user's own as ``package.module:Class``, but never has it
+imported: the reader of the case gets the class, from Python or by the option ``--component``.
 """
 
 import sys
@@ -123,10 +121,7 @@ _NONE: Mapping[str, type[Component]] = MappingProxyType({})
 def component_class(word: str, own: Mapping[str, type[Component]] = _NONE) -> type[Component]:
     """Class of a type; imports classes of klack only.
 
-    Parameters
-    ----------
-    own : mapping of str to type
-        Components of the user's own that may be used, by ``package.module:Class``.
+    ``own`` are the components of the user's own that may be used, by ``package.module:Class``.
 
     Raises
     ------
@@ -188,12 +183,9 @@ def component_word(kind: type[Component]) -> str:
 
 
 def import_component(word: str) -> type[Component]:
-    """Import the class that the user named; **runs the code of its module**.
+    """Import the class ``package.module:Class``; **runs the code of its module**.
 
-    Parameters
-    ----------
-    word
-        ``package.module:Class``, of the user, never of a file.
+    So the word is the user's, never that of a file.
 
     Raises
     ------
@@ -230,13 +222,10 @@ def import_component(word: str) -> type[Component]:
 
 
 def source_digests(components: Iterable[Component]) -> Mapping[str, str]:
-    """User components among these, with the digest of their code.
+    """User components among these, by word, with the digest of their code.
 
-    Returns
-    -------
-    mapping of str to str
-        By word, in their order: the first 12 digits of the SHA-256 of the file of the class,
-        or ``"no file"`` for a class that was typed in.
+    That is the first 12 digits of the SHA-256 of the file of the class, or ``"no file"`` for a
+    class that was typed in.
     """
     kinds = dict.fromkeys(type(component) for component in components)
     return {

@@ -1,4 +1,4 @@
-"""Checks that a network is a computable valve, with one clear error for each fault."""
+"""Checks that a network is a computable valve."""
 
 import warnings
 from collections.abc import Iterable, Mapping
@@ -22,12 +22,7 @@ class LooseBodyWarning(UserWarning):
 
 
 def check_nodes(components: Mapping[str, Component], nodes: Iterable[Node]) -> None:
-    """Checks that need only the connections.
-
-    Raises
-    ------
-    CaseProblem
-    """
+    """Checks that need only the connections; raises CaseProblem."""
     nodes = tuple(nodes)
     _check_dangling(components, nodes)
     checks = {
@@ -148,7 +143,7 @@ def _refuse_forced_flow(components: Mapping[str, Component], node: Node, pressur
 
 
 def _is_flow_source(components: Mapping[str, Component], joint: Joint) -> bool:
-    """Whether the component forces a flow with this port alone."""
+    """Whether the component forces a flow through this port alone."""
     ports = components[joint.component].port_kinds().values()
     needed = [port for port in ports if not port.optional]
     two = len(ports) > 1  # a store of fluid has one alone
@@ -210,7 +205,7 @@ def _check_drive(components: Mapping[str, Component], node: Node) -> None:
 
 
 def _check_feed(node: Node) -> None:
-    """A boost capacitor and the drivers that draw from it."""
+    """Check a boost capacitor and the drivers that draw from it."""
     sources = [str(joint) for joint in node.having(Role.FEEDS)]
     drivers = [str(joint) for joint in node.having(Role.FED)]
     others = [str(joint) for joint in node.joints if str(joint) not in (*sources, *drivers)]
@@ -243,18 +238,13 @@ def _no_coil(key: tuple[str | int, ...], driver: str) -> CaseProblem:
 
 
 def check_rows(rows: Rows) -> None:
-    """Checks of the rows of all components, before the solver.
+    """Check the rows of all components; warn of an unsupported body.
 
     Raises
     ------
     InputError
         For no body at all, an interface closed at the start, a node without a row, or a stroke
         that leaves the range of a law (:mod:`klack.network.ranges`).
-
-    Warns
-    -----
-    LooseBodyWarning
-        For an unsupported body.
     """
     if not rows.bodies:
         raise InputError(
@@ -279,7 +269,7 @@ def check_rows(rows: Rows) -> None:
 
 
 def _check_driven(rows: Rows) -> None:
-    """Raise where a stop or a friction joins a prescribed motion to what cannot give way."""
+    """Reject a stop or a friction between a prescribed motion and what cannot move."""
     driven = {port for row in rows.bodies if row.course is not None for port in row.ports}
     fixed = driven | {GROUND}
     joined = [(row.component, {row.upper, row.lower}) for row in rows.interfaces]
@@ -310,7 +300,7 @@ def _check_node_rows(rows: Rows) -> None:
 
 
 def _check_junctions(rows: Rows) -> None:
-    """Raise for a junction without a line, whose pressure nothing sets, or with a moving face."""
+    """Reject a junction without a line, whose pressure nothing sets, or with a moving face."""
     lines = {node for row in rows.lines for node in (row.a, row.b)}
     lines |= {node for row in rows.waves for node in (row.a, row.b)}
     for node, row in rows.nodes.items():

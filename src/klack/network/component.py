@@ -19,8 +19,8 @@ class Component(Section):
     """A part of a valve with ports.
 
     A component type is one class in one file: its fields are the keys of a case file (with units
-    there, SI numbers in Python), ``ports`` says where it can be joined, and :meth:`add_rows`
-    translates it into rows of the solver.  Register it in :mod:`klack.network.catalogue`.
+    there, SI numbers in Python), and :meth:`add_rows` translates it into rows of the solver.
+    Register it in :mod:`klack.network.catalogue`.
 
     Attributes
     ----------
@@ -48,31 +48,30 @@ class Component(Section):
         return self.ports
 
     def dry(self) -> "Component | None":
-        """Return this part without any fluid; None if nothing is left of it.
+        """Same part without any fluid; None if nothing is left of it.
 
-        Whatever has a port for liquid or gas goes, a section ``film`` goes, all else stays.
+        Parts with a port for liquid or gas and sections ``film`` go.
         """
         if any(port.domain in FLUID_DOMAINS for port in self.port_kinds().values()):
             return None
         return self.model_copy(update={"film": None}) if hasattr(self, "film") else self
 
     def lumped(self, stiffness: float, restitution: float | None) -> "Component | None":
-        """Return this part of the lumped baseline; None becomes ground.
+        """Same part in the lumped baseline; None becomes ground.
 
         Bodies become rigid, an end stop one spring [N/m] and one dashpot; all else stays.
         """
         return self
 
     def at_start(self) -> "Component":
-        """Return this part with what it prescribes over time held at its value at time zero.
+        """Same part with what it prescribes over time held at its value at time zero.
 
-        For whatever follows no time this is the part itself.  Drivers are a matter of their coils:
-        :mod:`klack.magnetics.constant_drive`.
+        Drivers are a matter of their coils: :mod:`klack.magnetics.constant_drive`.
         """
         return self
 
     def off_axis_parts(self) -> tuple[OffAxisPart, ...]:
-        """Return what of it acts across the axis of a needle in three dimensions as well."""
+        """What also acts across the axis of a needle in three dimensions."""
         return ()
 
     @abstractmethod

@@ -1,4 +1,4 @@
-"""The section ``network`` of a case file: fluid, components by type, connections."""
+"""The section ``network`` of a case file."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Self
@@ -43,7 +43,6 @@ def read_component(value: Any, context: Any = None) -> Component:
 
     Parameters
     ----------
-    value : mapping or Component
     context
         Of pydantic; with one, as in a case file, every number needs its unit.  Its
         ``"components"`` are the classes of the user's own that may be used, by their words.
@@ -52,8 +51,6 @@ def read_component(value: Any, context: Any = None) -> Component:
     ------
     CaseProblem
         Without a type, or for an unknown one.
-    pydantic.ValidationError
-        For keys and values that the component refuses.
     """
     if isinstance(value, Component):
         return value
@@ -107,7 +104,7 @@ def _read_fluid(value: Any, info: ValidationInfo) -> Any:
 
 
 class LateSection:
-    """The section ``fluid``, which is imported when it is used: a name alone, or a mapping."""
+    """The section ``fluid``, imported when it is used: a name alone, or a mapping."""
 
     def section(self) -> type[Section]:
         """Class of the section."""
@@ -152,7 +149,7 @@ class AmbientSection(Section):
     )
 
     def ambient(self) -> Ambient:
-        """Return it in the form of the rows."""
+        """Same surroundings in the form of the rows."""
         return Ambient(self.pressure, self.temperature)
 
 
@@ -180,19 +177,13 @@ class NetworkSection(Section):
         return self
 
     def network(self) -> Network:
-        """Join the components.
-
-        Raises
-        ------
-        CaseProblem
-            See :class:`klack.network.network.Network`.
-        """
+        """Join the components; see :class:`klack.network.network.Network`."""
         fluid = self._fluid_here() if self.fluid is not None else None
         gas = self.gas.gas() if self.gas is not None else None
         return Network(self.components, self.connections, self.ambient.ambient(), fluid, gas)
 
     def _fluid_here(self) -> Any:
-        """Fluid at the temperature of the surroundings; what does not fit there, at its key."""
+        """Fluid at the temperature of the surroundings; errors name its key."""
         try:
             return self.fluid.at(self.ambient.temperature)
         except CaseProblem:

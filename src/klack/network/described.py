@@ -1,8 +1,8 @@
 """What a component type is, read from its class: ports, keys, equation and source.
 
-Nothing is written twice: the first sentence of the docstring says what the type is, its first
-``.. math::`` is the equation, ``Source:`` or ``Sources:`` begins the source, and where that is
-missing, works are named in the text with their years.
+The first sentence of the docstring says what the type is, its first ``.. math::`` is the equation,
+``Source:`` or ``Sources:`` begins the source, and where that is missing, works are named in the
+text with their years.
 """
 
 import re

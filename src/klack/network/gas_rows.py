@@ -21,7 +21,7 @@ class GasChamberRow:
     temperature [K]
         At the start.
     heat [W/K]
-        Heat flow from the wall per temperature; below zero for a gas as warm as the wall.
+        From the wall; below zero for a gas as warm as the wall.
     wall [K]
     """
 
@@ -51,9 +51,9 @@ class GasBranchRow:
     ----------
     a, b
         Handles of nodes.
-    law : tuple of 6 floats
+    law
         See :func:`klack.hydraulics.gas.flow_law.flow_through`.
-    lift : (int, int) or None
+    lift
         Handles of the ports whose distance opens it.
     table (2, n)
         Lifts [m], and the opening that scales the flow; empty without a lift.
@@ -87,7 +87,7 @@ class GasRows:
     walls: list[GasWallRow] = field(default_factory=list)
 
     def highest_pressure(self) -> float:
-        """Highest pressure that chambers and sources have at the start, absolute [Pa]."""
+        """Highest absolute pressure of chambers and sources at the start [Pa]."""
         stated = [row.pressure for row in self.chambers.values() if row.pressure is not None]
         given = [float(np.interp(0.0, s.time, s.pressure)) for s in self.sources.values()]
         return max([*stated, *given], default=0.0)

@@ -1,9 +1,8 @@
-r"""A valve as components and connections: checked, then translated into rows for the solver.
+"""A valve as components and connections: checked, then translated into rows for the solver.
 
-A *connection* lists all ports that meet in one node.  A mechanical node is one point of one body
-(or of the ground) and everything that pushes it there; a hydraulic node, of liquid, and a pneumatic
-one, of gas, is one pressure; an electric node is one pair of wires, a thermal node is one
-temperature.  Two words may stand in place of a port: ``ground`` does not move, ``ambient`` has the
+A *connection* lists all ports that meet in one node: one point of one body (or of the ground) and
+everything that pushes it there, one pressure of liquid or gas, one pair of wires, or one
+temperature. Two words may stand in place of a port: ``ground`` does not move, ``ambient`` has the
 pressure, or the temperature, of the surroundings.
 """
 
@@ -31,15 +30,12 @@ class Network:
 
     Parameters
     ----------
-    components
-        By name.
-    connections : sequence of sequences of str
-        Each lists the ports, ``"component.port"``, that meet in one node; or ``"ground"``,
-        ``"ambient"``.
+    connections
+        Ports, ``"component.port"``, that meet in one node; or ``"ground"``, ``"ambient"``.
     fluid
-        At its temperature; needed as soon as anything is hydraulic.
+        At its temperature; needed if anything is hydraulic.
     gas
-        Needed as soon as anything is pneumatic.
+        Needed if anything is pneumatic.
 
     Raises
     ------
@@ -99,20 +95,10 @@ class Network:
                     )
 
     def rows(self) -> Rows:
-        """Translate into what the solver runs.
+        """Translate into what the solver runs, after the checks of :mod:`klack.network.checks`.
 
         Bodies come first, then whatever rules a pressure, then all others in their own order, so
         that each finds what it needs.
-
-        Raises
-        ------
-        InputError
-            For a network that cannot start; see :mod:`klack.network.checks`.
-
-        Warns
-        -----
-        LooseBodyWarning
-            For an unsupported body.
         """
         rows = Rows(ambient=self.ambient, fluid=self.fluid, gas=self.gas)
         if any(_has_port_of(component, "hydraulic") for component in self.components.values()):
@@ -159,7 +145,7 @@ class Network:
         return handles
 
     def _partners(self) -> dict[str, dict[str, tuple[Component, ...]]]:
-        """Return the other components at the node of every joined port."""
+        """Other components at the node of every joined port."""
         partners: dict[str, dict[str, tuple[Component, ...]]] = {}
         for name in self.components:
             partners[name] = {}
@@ -171,10 +157,7 @@ class Network:
         return partners
 
     def coil_labels(self) -> list[str]:
-        """Return what the channels of each coil are called after: its magnet, and its port there.
-
-        The port ``terminals`` is not named.
-        """
+        """Names of the channels of each coil: its magnet, and its port but for ``terminals``."""
         return [
             name if port == "terminals" else f"{name} {port}"
             for name, part in self.components.items()
@@ -185,12 +168,9 @@ class Network:
     def with_components(
         self, components: Mapping[str, Component], connections: Sequence[Sequence[str]] = ()
     ) -> Self:
-        """Return this network with components added or, under a name that is there, replaced.
+        """Same network with components added or, under a known name, replaced.
 
-        Parameters
-        ----------
-        connections : sequence of sequences of str
-            Added; one that shares a port with a connection that is there extends it.
+        Added ``connections`` that share a port with one that is there extend it.
         """
         merged = [list(connection) for connection in self.connections]
         for new in connections:
@@ -202,19 +182,19 @@ class Network:
         return type(self)(parts, merged, self.ambient, self.fluid, self.gas)
 
     def dry(self) -> Self:
-        """Return the same valve without fluid: no flow, no pressure force, no film, no leakage."""
+        """Same valve without fluid: no flow, no pressure force, no film, no leakage."""
         parts = {name: part.dry() for name, part in self.components.items()}
         left = [part for part in parts.values() if part is not None]
         wet = any(_has_port_of(part, "hydraulic") for part in left)
         return self._changed(parts, "", self.fluid if wet else None)
 
     def lumped(self, stiffness: float, restitution: float | None = None) -> Self:
-        """Return the lumped baseline: rigid bodies, one spring and one dashpot per end stop.
+        """Lumped baseline: rigid bodies, one spring and one dashpot per end stop.
 
         Parameters
         ----------
         stiffness [N/m]
-            Of every end stop; 1e9 N/m is usual.
+            Usually 1e9 N/m.
         restitution [-]
             Sets the dashpots after Gonthier et al. (2004); no loss without.
         """
@@ -224,13 +204,13 @@ class Network:
         return self._changed(parts, "ground", self.fluid)
 
     def at_start(self) -> Self:
-        """Return this valve with all sources and forces held at their value at time zero."""
+        """Same valve with all sources and forces held at their value at time zero."""
         return self.with_components({n: part.at_start() for n, part in self.components.items()})
 
     def _changed(
         self, parts: Mapping[str, Component | None], instead: str, fluid: NetworkFluid | None
     ) -> Self:
-        """Replace components; None removes one, and its ports become the given word."""
+        """Replace components; None removes one, and its ports become the word ``instead``."""
         kept = {name: part for name, part in parts.items() if part is not None}
         connections = []
         for connection in self.connections:

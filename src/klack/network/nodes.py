@@ -1,4 +1,4 @@
-"""Which ports meet: connections turned into nodes, before anything is known about their physics."""
+"""Connections turned into nodes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -38,7 +38,7 @@ class Node:
     index
         Place of its connection in the list.
     word
-        ``"ground"`` or ``"ambient"`` if the node is that, else empty.
+        ``"ground"``, ``"ambient"`` or empty.
     """
 
     index: int

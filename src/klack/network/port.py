@@ -1,4 +1,4 @@
-"""Kinds of ports: what two components may be joined in, and who of them rules the common node."""
+"""Kinds of ports: what may be joined, and which port rules the common node."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -44,13 +44,12 @@ class Role(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Port:
-    """One port of a component.
+    """One port of a component; only equal domains can be joined.
 
     Parameters
     ----------
     domain
-        ``"mechanical"``, ``"hydraulic"``, ``"pneumatic"``, ``"electric"`` or ``"thermal"``; only
-        equal domains can be joined.
+        ``"mechanical"``, ``"hydraulic"``, ``"pneumatic"``, ``"electric"`` or ``"thermal"``.
     optional
         Whether it may stay unconnected.
     """

@@ -1,4 +1,4 @@
-"""What a network asks of the fluid in it and of the laws of its contacts, whatever they are."""
+"""What a network asks of its fluid and of the laws of its contacts."""
 
 from collections.abc import Mapping
 from typing import Protocol
@@ -19,15 +19,14 @@ __all__ = [
 
 
 class PressureBounds(Protocol):
-    """Absolute pressures for which a fluid is described, and where that comes from.
+    """Absolute pressures for which a fluid is described.
 
     Attributes
     ----------
     lowest, highest [Pa]
         Between them its numbers are right.
     usable [Pa]
-        Above it a number means nothing any more, and a run stops.
-    source
+        Above it a run stops.
     """
 
     @property
@@ -45,15 +44,12 @@ class NetworkFluid(Protocol):
 
     Attributes
     ----------
-    name
     temperature [K]
     vapour_pressure [Pa]
-        At which it boils.
     all_liquid_from [Pa]
         Above it no vapour is left.
-    kinks : tuple of float [Pa]
+    kinks [Pa]
         Where the second derivative of the density jumps, increasing.
-    pressure_range : PressureBounds
     """
 
     @property
@@ -86,27 +82,14 @@ class NetworkFluid(Protocol):
 
 
 class NetworkGas(Protocol):
-    """A gas of a network; what it computes with it is a matter of the room of gases.
-
-    Attributes
-    ----------
-    name
-    """
+    """A gas of a network, of which only the room of gases knows more."""
 
     @property
     def name(self) -> str: ...  # noqa: D102
 
 
 class LawNumbers(Protocol):
-    """A law as plain numbers for the time loop: its kind, its parameters, its damping.
-
-    Attributes
-    ----------
-    kind
-    parameters
-    dissipation [-]
-        0 for an elastic law.
-    """
+    """A law as plain numbers for the time loop; ``dissipation`` [-] is 0 for an elastic law."""
 
     @property
     def kind(self) -> int: ...  # noqa: D102
@@ -120,13 +103,13 @@ class InterfaceLaw(Protocol):
     """Force of a contact over its indentation."""
 
     def force(self, indentation: ArrayLike) -> Floats:
-        """Return the force [N] at the given indentation [m]."""
+        """Force [N] at the given indentation [m]."""
 
     def tangent_stiffness(self, indentation: ArrayLike) -> Floats:
-        """Return the tangent stiffness [N/m] at the given indentation [m]."""
+        """Tangent stiffness [N/m] at the given indentation [m]."""
 
     def potential(self, indentation: ArrayLike) -> Floats:
-        """Return the stored energy [J] at the given indentation [m]."""
+        """Stored energy [J] at the given indentation [m]."""
 
     def flat(self) -> LawNumbers:
         """Return the law as plain numbers."""

@@ -1,7 +1,4 @@
-"""Ranges of a whole network, and their check before the run.
-
-Travel of the bodies of a network between the stops, before the run.
-"""
+"""Ranges of a whole network: travel of its bodies between the stops, and the check before a run."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
@@ -24,12 +21,7 @@ _LEAST_LENGTH = 1e-6  # [m] the solver's tolerances are meant for numbers around
 
 @dataclass(frozen=True, slots=True)
 class StopBound:
-    """A stop between two bodies; None is what does not move.
-
-    Parameters
-    ----------
-    gap [m]
-    """
+    """A stop with a ``gap`` [m] between two bodies; None is what does not move."""
 
     name: str
     upper: str | None
@@ -38,7 +30,7 @@ class StopBound:
 
     @property
     def stands(self) -> bool:
-        """Whether one side does not move: it ends a chain of bodies that push each other."""
+        """Whether one side does not move, which ends a chain of bodies that push each other."""
         return self.upper is None or self.lower is None
 
 
@@ -47,8 +39,7 @@ class Travel:
     r"""Greatest and smallest value of a sum of displacements that no stop forbids.
 
     Rigid bodies along one axis, each with one displacement :math:`y_b`.  Every stop keeps its gap
-    open, :math:`g_0 + y_\text{upper} - y_\text{lower} \ge 0`, which leaves a linear programme: a
-    chain of bodies that push each other is one stop for all of them.
+    open, :math:`g_0 + y_\text{upper} - y_\text{lower} \ge 0`: a linear programme.
 
     Limits: rigid contacts, no tilt; springs and films stop nothing.
     """
@@ -69,19 +60,9 @@ class Travel:
         )
 
     def highest(self, factors: Mapping[str, float]) -> tuple[float, tuple[str, ...]]:
-        """Greatest ``sum(factor * displacement)`` and the stops that bound it.
+        """Greatest ``sum(factor * displacement)``, or infinity, and the stops that bound it.
 
-        Parameters
-        ----------
-        factors
-            By the component of the body.
-
-        Returns
-        -------
-        float
-            Infinity where no stop bounds it.
-        tuple of str
-            Stops against what does not move come first.
+        ``factors`` are by component of the body; stops against what does not move come first.
         """
         wanted = {body: factor for body, factor in factors.items() if factor != 0.0}
         if not wanted:
@@ -145,7 +126,7 @@ class Travel:
 
     @staticmethod
     def factors(rows: Rows, ports: Iterable[tuple[int, float]]) -> dict[str, float]:
-        """Factors of bodies from those of ports (handles); fixed ports count nothing."""
+        """Factors of bodies from those of ports (handles); fixed ports do not count."""
         owner = _owners(rows)
         total: dict[str, float] = {}
         for port, factor in ports:
@@ -166,7 +147,7 @@ _ROUNDING = 1e-9  # of the start value: what sums of lengths leave
 
 
 def limits_of(rows: Rows) -> list[LimitRow]:
-    """Every range of a network: those of its components, of its volumes, and of its fluid."""
+    """Every range of a network: those of its components, volumes, and fluid."""
     return [*rows.limits, *_volumes(rows), *_pressures(rows), *_liquids(rows)]
 
 
@@ -261,13 +242,7 @@ def _gives_fluid(rows: Rows) -> bool:
 
 
 def check_ranges(rows: Rows) -> None:
-    """Refuse what must leave a range: by the stops, by a start, or by a prescribed pressure.
-
-    Raises
-    ------
-    CaseProblem
-        That names the component and, where stops allow the motion, their gaps.
-    """
+    """Reject what must leave a range: by the stops, by a start, or by a prescribed pressure."""
     travel = Travel.of(rows)
     for limit in limits_of(rows):
         if limit.ports:
@@ -304,7 +279,7 @@ def _check_motion(rows: Rows, limit: LimitRow, travel: Travel) -> None:
 
 
 def _way_text(rows: Rows, limit: LimitRow, way: float, stops: tuple[str, ...]) -> str:
-    """Both numbers: the initial value, and its largest change within the stops."""
+    """Initial value and its largest change within the stops."""
     start, change = (value_text(abs(value), limit.unit) for value in (limit.start, way))
     gaps = {row.component: row.gap for row in rows.interfaces}
     named = " and ".join(f"components.{name}.gap: {format_si(gaps[name], 'm')}" for name in stops)
@@ -348,7 +323,7 @@ def range_text(limit: LimitRow) -> str:
 
 
 def value_text(value: float, unit: str) -> str:
-    """Quantity as people of this field write it: pressures in bar, volumes in mm^3."""
+    """Quantity as usual in this field: pressures in bar, volumes in mm^3."""
     if unit == "Pa":
         return f"{1e-5 * value:.5g} bar"
     if unit == "m^3":

@@ -58,8 +58,7 @@ class MotionCourse:
     time (n,) [s]
         Rising.
     displacement, slope (n,) [m], [m/s]
-        At each of them; both slopes of a jump of the speed are given by two intervals of
-        ``slope_after`` and ``slope_before``.
+        At each of them; a jump of the speed has two slopes, ``slope_before`` and ``slope_after``.
     """
 
     time: NDArray[np.float64]
@@ -77,7 +76,7 @@ GROUND = -1
 """Handle of the immovable ground as a mechanical port."""
 
 AMBIENT = 0
-"""Handle of the surroundings as a hydraulic node; always present when anything is hydraulic."""
+"""Handle of the surroundings as a hydraulic node."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +98,7 @@ class Ambient:
 class Book:
     """One entry of the energy balance that a row keeps itself; see ``step_function``.
 
-    A row that stands for several components names the ``owner`` of each entry.
+    ``owner`` is its component in a row that stands for several.
     """
 
     label: str
@@ -111,9 +110,8 @@ class Book:
 class Channel:
     """A state that is recorded under ``<component> <label>``; ``index`` counts in the state.
 
-    ``derived`` states follow from what else is known at the same moment: before the first step
-    they are what the step function makes of that, not what the state starts with.  A row that
-    stands for several components names the ``owner`` of each channel.
+    ``derived`` states follow from what else is known: before the first step they are what the step
+    function makes of that, not what the state starts with.  ``owner`` as of a :class:`Book`.
     """
 
     label: str
@@ -127,11 +125,9 @@ class Channel:
 class BodyRow:
     """A body in modal form; ``ports`` are handles of its ``port_shapes`` columns, in order.
 
-    ``names`` are what the component calls them.
-
-    ``speed`` [m/s] along +z is that of the whole free body at the start, undeformed: the rigid
-    modal velocities are ``speed * rigid_axial``.  A body with a ``course`` follows it whatever
-    pushes it; it has one mode, of shape 1 at all its ports.
+    ``names`` are those of the component.  ``speed`` [m/s] along +z is that of the whole free body
+    at the start, undeformed: the rigid modal velocities are ``speed * rigid_axial``.  A body with a
+    ``course`` follows it whatever pushes it; it has one mode, of shape 1 at all its ports.
     """
 
     component: str
@@ -146,12 +142,7 @@ class BodyRow:
 class StateInput:
     """Something that can flow into the states of an element: an input of its linear law.
 
-    Parameters
-    ----------
-    owner, quantity, unit
-        Whose it is, what, and its unit.
-    rates
-        By index of a state, its rate for one such unit, at the given states.
+    ``rates`` gives, by index of a state, its rate per unit at the given states.
     """
 
     owner: str
@@ -164,15 +155,13 @@ class StateInput:
 class ElementRow:
     """Element that applies forces to ports; see :mod:`klack.network.step_function`.
 
-    ``names`` are what the component calls its ports, or ``component.port`` in a row that stands for
-    several.  ``at_rest`` gives the first states that the
-    element has at the start once its ports rest at given displacements [m]; without it the states
-    at the start are ``state`` wherever the ports are.  ``at_steady`` does so for an operating
-    point, where they differ.  ``interval`` [s] is that of its exchange with something outside, in
-    whole steps; no step is longer than it.  ``state_names`` are name and unit of states that no
-    channel records, by index; ``component.name`` in a row that stands for several.  ``inflows``
-    are inputs of its linear law.  ``table`` are times [s] and forces [N] that it follows, whatever
-    its ports do.
+    ``names`` are those of its ports in the component, or ``component.port`` in a row that stands
+    for several, as are the ``state_names``, name and unit of states that no channel records, by
+    index.  ``at_rest`` gives the first states once its ports rest at given displacements [m], else
+    ``state`` wherever they are; ``at_steady`` does so for an operating point, where they differ.
+    ``interval`` [s] is that of its exchange with something outside, in whole steps; no step is
+    longer.  ``inflows`` are inputs of its linear law.  ``table`` are times [s] and forces [N] that
+    it follows, whatever its ports do.
     """
 
     component: str
@@ -204,7 +193,7 @@ class ControllerRow:
     period [s]
     begin
         Returns a fresh controller.
-    actuator : "voltage", "force" or "pressure"
+    actuator
         The output is the voltage of a coil [V], the first parameter of an element [N], or a
         prescribed pressure [Pa].
     handle
@@ -226,7 +215,7 @@ class BranchRow:
     """Flow between two hydraulic nodes, perhaps pushing mechanical ports.
 
     ``column`` [J s/kg^2] belongs to a column of fluid whose mass flow is its first state: its
-    friction, ``g_a - g_b = column * mdot`` once the flow is steady.
+    friction, ``g_a - g_b = column * mdot`` in steady flow.
     """
 
     component: str
@@ -248,10 +237,10 @@ class BranchRow:
 class NodeRow:
     """One pressure: a volume with compliance, a prescribed pressure over time, or a junction.
 
-    ``volume`` [m^3] at zero displacements; 0 for a prescribed pressure, whose ``time`` [s] and
+    ``volume`` [m^3] at zero displacements is 0 for a prescribed pressure, whose ``time`` [s] and
     ``pressure`` [Pa] are a table (constant beyond its ends), and for a ``junction``, whose pressure
-    is that at which its flows balance.  Where a pressure that is not prescribed is not ``stated``
-    either, it starts at that of steady flow.
+    is that at which its flows balance.  A pressure that is not ``stated`` starts at that of steady
+    flow.
     """
 
     component: str
@@ -268,7 +257,7 @@ class NodeRow:
 
     @property
     def at_start(self) -> float:
-        """Pressure at time zero [Pa]; of a volume that is not stated, that of the surroundings."""
+        """Pressure at time zero [Pa]; if not stated, that of the surroundings."""
         return float(np.interp(0.0, self.time, self.pressure))
 
 
@@ -326,11 +315,11 @@ class SliderRow:
     Parameters
     ----------
     upper, lower
-        Handles; the friction on the upper port is opposite to its way relative to the lower one.
+        Handles; the friction on the upper port opposes its motion relative to the lower one.
     names
-        What the component calls them.
+        Those of the component.
     coulomb [N]
-        Friction at high speeds of slip, beside the viscous one.
+        At high speeds of slip.
     breakaway [N]
         Largest friction at rest, not below ``coulomb``.
     stribeck_speed [m/s]
@@ -368,7 +357,7 @@ class LineRow:
     vapour_pressure [Pa]
         Below it a cavity opens between two segments.
     laminar_flow [m^3/s]
-        At which the friction, which is laminar, ends to hold: that of a Reynolds number of 2300.
+        At which laminar friction ends to hold, Re = 2300.
     """
 
     component: str
@@ -385,12 +374,12 @@ class LineRow:
 
 
 WAVE_BEGIN, WAVE_END, WAVE_STORE = 0.0, 1.0, 2.0
-"""What the step function of a :class:`WaveRow` is asked for, its first input."""
+"""Requests to the step function of a :class:`WaveRow`, its first input."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class WaveRow:
-    """Part that stores fluid between two nodes and answers at both with a wave of its own.
+    """Part that stores fluid between two nodes and answers at both with waves.
 
     Its step function writes its state in place; with ``B`` [J/kg] the pressure energy per mass of
     the node at an end, and flows [kg/s] into the part:
@@ -415,13 +404,13 @@ class WaveRow:
     parts
         Cells.
     crossing [s]
-        No step may be longer: the shortest time of a wave through one of them.
+        Shortest time of a wave through a part; no step may be longer.
     failures
         Meaning of a status.
     losses
         Names of the three losses.
     doubts
-        Sentences on a finished run, of losses and throughput [J], largest Reynolds number and its
+        Sentences on a finished run, from losses and throughput [J], largest Reynolds number and its
         time [s].
     """
 
@@ -447,9 +436,9 @@ class SideRow:
     Parameters
     ----------
     element, branch
-        Number of the row that the law belongs to; the other one is -1.
+        Number of the row of the law; the other one is -1.
     placement
-        Parameter of that row from which on it takes the placement of the law; -1 if it takes none.
+        First parameter of that row for the placement of the law; -1 without.
     """
 
     component: str
@@ -468,33 +457,29 @@ class LimitRow:
 
     Parameters
     ----------
-    component
-        Whose quantity it is.
     quantity
-        What it is called, as after "the": ``"gap"``.
-    unit
-        SI.
-    valid : (float, float)
+        As after "the": ``"gap"``.
+    valid
         Range of the law.  A motion that the stops allow may not leave it; checked before the run.
     slack
-        What contacts may give way beyond that range before it is warned of, once.
-    usable : (float, float)
+        By which contacts may exceed that range before it is warned of, once.
+    usable
         Beyond it the run stops.
     law
-        Whose range it is: ``"the magnetic circuit of 'coil'"``; where ranges of several rows bear
-        the same name, only the first that is left is warned of.
+        Such as ``"the magnetic circuit of 'coil'"``; of ranges with the same one only the first
+        that is left is warned of.
     source
-        Where the range comes from; may be empty.
+        Of the range; may be empty.
     effect
         What is wrong at a value outside, as a sentence.
     advice
         What to try.
     key
-        Key of the component that sets the start; empty where no key does.
-    ports : tuple of (int, float)
+        Of the component, that sets the start; empty where none does.
+    ports
         Handle of a mechanical port, and its factor.
     at_start
-        Whether it is looked at where a run begins alone.
+        Whether it matters at the start of a run alone.
     """
 
     component: str
@@ -519,9 +504,9 @@ class LimitRow:
 class Rows:
     """Collects the rows of a network, one component after the other.
 
-    ``ambient``, ``fluid`` and ``gas`` hold for the whole network.  While a component adds its rows,
-    ``component`` is its name and ``handles`` maps its port names to handles.  What a component puts
-    into ``closing`` is called once, after all components, under one name once.
+    While a component adds its rows, ``component`` is its name and ``handles`` maps its port names
+    to handles.  What a component puts into ``closing`` is called once, after all components, under
+    one name once.
     """
 
     ambient: Ambient
@@ -548,15 +533,15 @@ class Rows:
     coils: dict[int, tuple[int, int]] = field(default_factory=dict)
 
     def port(self, name: str) -> int:
-        """Handle of the node that the port ``name`` of the present component is joined to.
+        """Handle of the node at the port ``name`` of the present component.
 
         Mechanical: the port of the body there, or :data:`GROUND`; hydraulic: the node, or
-        :data:`AMBIENT`.  An optional port that is not joined is at the ground or the surroundings.
+        :data:`AMBIENT`, as for optional ports that are not joined.
         """
         return self.handles[name]
 
     def partner(self, name: str) -> tuple[object, ...]:
-        """Return the other components at the node of the port ``name``."""
+        """Other components at the node of the port ``name``."""
         return self.partners.get(name, ())
 
     def body(
@@ -615,7 +600,7 @@ class Rows:
         )
 
     def _names(self, ports: Sequence[int]) -> tuple[str, ...]:
-        """Return what the present component calls these handles, each name once."""
+        """Names of these handles in the present component, each once."""
         left = dict(self.handles)
         names = []
         for handle in ports:
@@ -710,7 +695,7 @@ class Rows:
         )
 
     def inner_junction(self, label: str) -> int:
-        """Add a junction inside the present component, at no port of it; return its handle."""
+        """Add a junction inside the present component, at no port; return its handle."""
         node = min(self.nodes, default=AMBIENT) - 1
         self.nodes[node] = NodeRow(
             component=f"{self.component} {label}",

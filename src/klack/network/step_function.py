@@ -1,4 +1,4 @@
-r"""The one signature of everything that acts in a time step, compiled or in plain Python.
+"""The one signature of everything that acts in a time step, compiled or in plain Python.
 
 A component hands the solver functions ``step(par, state, inp, out) -> status``; all four are
 pointers to ``float64``.
@@ -19,18 +19,16 @@ positive along +z, *on the body*: the work done on the body is exactly ``F (y1 -
 middle and its end, implicit; the mass flow ``mdot`` [kg/s], the mean over the step, runs from a to
 b.
 
-Energies [J]: a *store* is the energy held at the end of the step; a *supply* what came in from
-outside during it; a *loss* what was turned into heat.  An element must satisfy, to round-off,
-``sum F (y1 - y0) + change of stores = supplies - losses``.  A branch gives only what it stores.
-The solver adds the rest of the hydraulic power: into the branch's supply, if it names one (a
-pump), else as its loss.
+Energies [J]: a *store* is held at the end of the step; a *supply* came in from outside during it; a
+*loss* was turned into heat.  An element must satisfy, to round-off, ``sum F (y1 - y0) + change of
+stores = supplies - losses``.  A branch gives only what it stores; the solver adds the rest of the
+hydraulic power to its supply, if it names one (a pump), else to its loss.
 
-The solver calls a function several times in a step, with better and better ``y1`` and pressures,
-and takes over the next state of the last call.  Before the first step it calls with ``h = 0`` and
-``y0 = y1``: then only the stores are read; nothing may be divided by ``h``.  And it calls with
-short steps up to the time zero (``t = -h``), for the static equilibrium and the first record: no
-next state of an element is taken over from these.  Status 0 is success; any other number stops the
-run, and the component gives its meaning.
+A function is called several times in a step, with better and better ``y1`` and pressures; the next
+state of the last call counts.  Before the first step it is called with ``h = 0`` and ``y0 = y1``,
+for the stores only: nothing may be divided by ``h``; and with short steps up to the time zero (``t
+= -h``), for the static equilibrium and the first record, without a next state.  Status 0 is
+success; any other number stops the run, and the component gives its meaning.
 """
 
 import ctypes
@@ -70,7 +68,7 @@ PythonStep = Callable[
 
 
 def step_function(function: Callable[..., int]) -> StepFunction:
-    """Compile a step function when a network first has it, not when its file is imported.
+    """Compile a step function when a network first has it, not at import.
 
     It may call other compiled functions and index its pointers.
     """
@@ -111,7 +109,7 @@ def first(typingctx: Any, array: Any) -> Any:
 
 @intrinsic
 def pointers(typingctx: Any, bundle: Any) -> Any:
-    """Return a named tuple with :func:`first` of every array in it, in compiled code."""
+    """Named tuple with :func:`first` of every array in it, in compiled code."""
     from numba import types
 
     members = [types.CPointer(t.dtype) if isinstance(t, types.Array) else t for t in bundle]
@@ -206,14 +204,14 @@ def _call(address: int, par: Vector, state: Vector, inp: Vector, out: Vector) ->
 def evaluate(
     step: StepFunction, parameters: Any, state: Any, inputs: Any, outputs: int
 ) -> tuple[int, Vector]:
-    """Call a step function once from Python: its status and ``out``; for tests and pictures."""
+    """Call a step function once from Python, for tests and pictures: its status and ``out``."""
     arrays = [np.array([*values, 0.0], dtype=float) for values in (parameters, state, inputs)]
     out = np.zeros(outputs)
     return _call(address_of(step), *arrays, out), out
 
 
 class _PythonStep:
-    """A Python function behind a C address, so that the solver can call it."""
+    """A Python function behind a C address for the solver."""
 
     def __init__(self, function: PythonStep, sizes: tuple[int, int, int, int]) -> None:
         self.errors: list[BaseException] = []
@@ -248,12 +246,7 @@ def python_step(
 ) -> StepFunction:
     """Use a plain Python function in the time loop: about 2 us per call.
 
-    Parameters
-    ----------
-    function
-        ``function(par, state, inp, out)`` with numpy arrays, the first three read-only; writes
-        ``out`` and returns a status or None.  An exception stops the run and is raised again.
-    parameters, states, inputs, outputs
-        Lengths of the arrays; see the module text for their contents.
+    ``function(par, state, inp, out)`` has numpy arrays of these lengths, the first three read-only;
+    it writes ``out`` and returns a status or None.  An exception stops the run and is raised again.
     """
     return _PythonStep(function, (parameters, states, inputs, outputs))

@@ -9,14 +9,14 @@ Array = NDArray[np.float64]
 
 
 def grounded_inverse(links: Array, ground: Array) -> Array:
-    r"""Temperatures of all nodes over 1 W into each of them, the ground at zero.
+    r"""Temperatures of all nodes over 1 W into each of them (n, n) [K/W], the ground at zero.
 
     .. math:: (\mathrm{diag}(g + \sum_j W_{ij}) - W)^{-1}
 
-    Node after node is removed, and what it joined is joined by the star-mesh transform.  Only sums,
-    products and quotients of positive numbers occur, so that every entry is exact to some units in
-    the last place however far the conductances are apart; a factorisation of the matrix would lose
-    a ground of 1 mW/K beside a link of 1 GW/K in its diagonal.
+    Nodes are removed by the star-mesh transform.  Only sums, products and quotients of positive
+    numbers occur, so that every entry is exact to some units in the last place however far the
+    conductances are apart; a factorisation of the matrix would lose a ground of 1 mW/K beside a
+    link of 1 GW/K.
 
     Parameters
     ----------

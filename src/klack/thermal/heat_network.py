@@ -38,17 +38,17 @@ class Links:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HeatNetwork:
-    """Nodes whose temperature is looked for, and what joins them.
+    """Nodes of unknown temperature, and what joins them.
 
     Parameters
     ----------
-    names : tuple of str, length n
+    names
         Of the free nodes: the first heat capacity there, or the ports that meet.
     node_of
         Free node of every heat capacity.
     capacity (n,) [J/K]
     start (n,) [K]
-    fixed_names : tuple of str, length f
+    fixed_names
         ``"ambient"`` first.
     fixed (f,) [K]
     paths
@@ -108,12 +108,12 @@ class HeatNetwork:
 
 
 def heat_network(network: Network) -> HeatNetwork | None:
-    """Heat network of a valve; None if nothing in it stores or carries heat.
+    """Heat network of a valve; None if nothing stores or carries heat.
 
     Raises
     ------
     InputError
-        For a node that neither stores heat nor has a path to any other that does.
+        For a node without storage of heat and without a path to one.
     """
     parts = {
         name: part

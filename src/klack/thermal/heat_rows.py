@@ -16,11 +16,9 @@ class HeatPath:
 
     Parameters
     ----------
-    a, b
-        Nodes.
     conductance [W/K]
     radiation [W/K^4]
-        Area, emissivity and the constant of Stefan and Boltzmann together.
+        Area times emissivity times the constant of Stefan and Boltzmann.
     """
 
     component: str
@@ -44,8 +42,7 @@ class HeatSupply:
 class HeatRows:
     """Collects what the components of a network add.
 
-    ``node`` are the nodes of the ports of the component whose turn it is; node 0 is the
-    surroundings.
+    ``node`` are the nodes of the ports of the present component; node 0 is the surroundings.
     """
 
     ambient: float
@@ -74,10 +71,10 @@ class HeatRows:
 
 
 class ThermalComponent(Component):
-    """A component of the heat network alone: nothing of it takes part in a stroke."""
+    """A component of the heat network alone, which takes no part in a stroke."""
 
     def add_rows(self, rows: Rows) -> None:
-        """Add nothing: within a stroke temperatures stand still."""
+        """Add nothing: within a stroke temperatures are constant."""
 
     @abstractmethod
     def add_heat(self, heat: HeatRows) -> None:

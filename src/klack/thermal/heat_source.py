@@ -40,8 +40,7 @@ class HeatSource(ThermalComponent):
 
     .. math:: \dot Q = P(t)
 
-    Stands for heat from outside of the valve, such as a warm neighbour or the sun; below zero it
-    cools.
+    Heat from outside, such as a warm neighbour or the sun; below zero it cools.
     """
 
     type: ClassVar[str] = "heat-source"

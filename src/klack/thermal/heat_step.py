@@ -20,7 +20,7 @@ _TERMS = 20
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class HeatStep:
-    """End of a step, and the heat that went where.
+    """End of a step, and where the heat went.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ class HeatStep:
     supplied (n,) [J]
         Heat into each free node.
     stored (n,) [J]
-        Rise of what each of them stores.
+        Rise of its store.
     given_off (f,) [J]
         Heat into each node of known temperature.
     """
@@ -49,10 +49,10 @@ def heat_step(
 ) -> HeatStep:
     r"""Advance by ``length`` [s] under a heat flow that runs straight from one value to another.
 
-    With the modes of :math:`C^{-1/2} G C^{-1/2}`, each of which decays as
-    :math:`e^{-\lambda t}`, no step length and no ratio of time constants is too large.  They are
-    taken from the inverse of :math:`G + C/h`, whose largest eigenvalues, the slow modes, are the
-    exact ones.  Nodes without capacity follow the others at once.
+    With the modes of :math:`C^{-1/2} G C^{-1/2}`, which decay as :math:`e^{-\lambda t}`, no step
+    length and no ratio of time constants is too large.  They are taken from the inverse of :math:`G
+    + C/h`, whose largest eigenvalues, the slow modes, are the exact ones.  Nodes without capacity
+    follow at once.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def steady_temperature(
 ) -> Array | None:
     """Temperatures [K] at which all heat is given off; None where some of it has no way out.
 
-    An island without path and without heat comes to its mean temperature.
+    An island without path and heat comes to its mean temperature.
     """
     zero = network.fixed[0]
     found = np.full(network.count, np.nan)

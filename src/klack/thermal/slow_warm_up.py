@@ -1,16 +1,16 @@
 r"""Warm-up over many strokes: the fast heat is averaged, the slow temperatures advance by it.
 
-A stroke lasts milliseconds, a warm-up minutes: over one period :math:`\tau` the temperatures hardly
-move, and only the mean heat of a stroke at them counts,
+Over one period :math:`\tau` the temperatures hardly move, and only the mean heat of a stroke
+counts,
 
 .. math:: C\dot T = -G(T)\,(T - T_0) + \bar Q(T) + P(t), \qquad
           \bar Q(T) = \frac1\tau\int_\text{stroke}\dot Q\,\mathrm dt .
 
-Each step takes the heat of a stroke at its start as constant, computes the stroke at the end that
-this leads to, and repeats the step with a heat that runs straight from one to the other (second
-order).  The two ends differ by an estimate of the error; within it the stroke at the first end is
-that of the second, so a step costs one stroke.  The steps in between are exact
-(:mod:`klack.thermal.heat_step`), of any length.
+Each step takes the heat of a stroke at its start as constant, computes the stroke at the resulting
+end, and repeats the step with a heat that runs straight from one to the other (second order).  The
+two ends differ by an estimate of the error; within it the stroke at the first end is that of the
+second, so a step costs one stroke.  Steps of :mod:`klack.thermal.heat_step` are exact at any
+length.
 
 Source of the averaging: Sanders, Verhulst and Murdock, Averaging Methods in Nonlinear Dynamical
 Systems, 2007, chapter 2: its error is of the order of one period over the slow time constant.
@@ -90,7 +90,7 @@ class SlowWarmUp:
     points
         The steady state last, where it was found.
     supplied, stored (n,) [J]
-        Heat into each node until the last moment in time, and how much of it is stored.
+        Heat into each node until the last moment in time, and its stored part.
     given_off (f,) [J]
         To each node of known temperature.
     residual [-]
@@ -101,7 +101,7 @@ class SlowWarmUp:
     end
         ``"steady"``, ``"duration"``, ``"runaway"``, or ``"hot"`` beyond 2000 K.
     steps, repeats
-        Steps that were taken, and those that were done again.
+        Steps taken, and those repeated.
     """
 
     points: tuple[WarmPoint, ...]
@@ -294,7 +294,7 @@ def _ended(march: _March, T: Array, Q: Array) -> str:
 
 
 def _step(march: _March, T: Array, Q: Array) -> tuple[HeatStep, Array, Array, float]:
-    """Take one step: its end, the temperatures and heat of its stroke, and its length."""
+    """One step: its end, the temperatures and heat of its stroke, and its length."""
     network, settings = march.network, march.settings
     links = network.links(T)
     length = _first_length(march, T, Q)
@@ -370,7 +370,7 @@ def _flows(network: HeatNetwork, T: Array, Q: Array) -> Array:
 
 
 def _steady(march: _March, T: Array, Q: Array) -> WarmPoint:
-    """Steady state: the temperatures that the heat of a stroke at them leads to."""
+    """Steady state, at which the heat of a stroke leads to the same temperatures."""
     settled = _SETTLED * march.settings.tolerance
     for _ in range(_MOST_STEADY):
         aim = _aim(march, T, Q)
