@@ -14,7 +14,7 @@ __all__ = ["HysteresisController", "RunningHysteresis"]
 
 
 class HysteresisController(Section):
-    """One output below, another one above, and the last one in between.
+    """One output below a signal, another one above, and the last one in between.
 
     Switches at its sampling instants; ``two-point`` switches at the very current.
     """
