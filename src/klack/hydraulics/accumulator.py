@@ -105,7 +105,6 @@ class Accumulator(Component):
         return p, self.volume - held, 0.0, 1.0
 
     def _limits(self, rows: Rows) -> list[LimitRow]:
-        """Full, and empty after it held fluid."""
         node = rows.nodes.get(rows.port("fluid"))
         holds = node is not None and node.stated and node.at_start > self.precharge
         full = "It is full: it takes no more fluid, the pressure rises as without it."

@@ -87,7 +87,6 @@ class EquationOfState:
 
 
 def _state(name: str) -> Any:
-    """Abstract state of CoolProp."""
     try:
         import CoolProp
     except ImportError as error:
@@ -147,7 +146,6 @@ def _tabulated(name: str, temperature: float) -> FluidState:
 
 
 def _viscosity(state: Any, name: str, temperature: float, start: float) -> tuple[float, float]:
-    """Viscosity at one atmosphere and its relative slope, at constant temperature."""
     import CoolProp
 
     pressure = np.linspace(start, _VISCOUS_TOP, 20)

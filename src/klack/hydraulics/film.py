@@ -175,7 +175,6 @@ class Film(Section):
     def _all_vapour(
         self, component: str, fluid: str, cavitation: float, around: float
     ) -> InputError:
-        """Error of a film in surroundings below its cavitation pressure."""
         limit, words = value_text(cavitation, "Pa"), value_text(around, "Pa")
         film = f"the film of '{component}'"
         if self.cavitation_pressure is not None:

@@ -66,7 +66,6 @@ class DensityTable(Section):
 
 
 def _table(value: Any, info: ValidationInfo) -> Any:
-    """Return a curve of densities, or the path of a file of properties."""
     if isinstance(value, str | Path):
         return TypeAdapter(InputPath).validate_python(value, context=info.context)
     if value is None or isinstance(value, DensityTable):
@@ -273,7 +272,6 @@ class FluidChoice(NamedSection):
         return fluid if law is None else replace(fluid, viscosity_law=law)
 
     def _law(self, fluid: Fluid) -> PressureViscosity | None:
-        """Chosen law of the viscosity over pressure."""
         if self.viscosity_law == "ambient":
             return None
         if fluid.pressure_viscosity == 0.0:

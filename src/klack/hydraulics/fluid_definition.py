@@ -39,7 +39,6 @@ _SLACK = 1e-6  # [K] for sums of degrees Celsius and 273.15
 
 
 def _vapour_density(pressure: float, temperature: float, molar_mass: float) -> float:
-    """Density [kg/m^3] of an ideal gas."""
     return pressure * molar_mass / (_GAS_CONSTANT * temperature)
 
 

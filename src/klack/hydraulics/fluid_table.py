@@ -227,7 +227,6 @@ def pressure_at(table: Vector, rho: float, hint: int) -> tuple[float, int]:
 
 @inner(error_model="numpy", forceinline=True)
 def _volume(table: Vector, i: int, s: float) -> tuple[float, float]:
-    """Specific volume and its slope in the piece at offset ``i``."""
     c1, c2, c3, c4, c5 = table[i + 2], table[i + 3], table[i + 4], table[i + 5], table[i + 6]
     v = table[i + 1] + s * (c1 + s * (c2 + s * (c3 + s * (c4 + s * c5))))
     slope = c1 + s * (2.0 * c2 + s * (3.0 * c3 + s * (4.0 * c4 + s * 5.0 * c5)))

@@ -327,7 +327,6 @@ class Line(Component):
 
 @lru_cache(maxsize=100)
 def _kept_range(line: Line, fluid: Fluid, pressure: float) -> tuple[float, float]:
-    """Range that strokes of one valve share."""
     return _followed(line, fluid, pressure)
 
 

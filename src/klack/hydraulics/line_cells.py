@@ -234,7 +234,6 @@ def _leaving(
 
 @njit(error_model="numpy", _nrt=False)
 def _energy(par: Any, M: Any, J: Any, memory: Any, work: Any) -> float:
-    """Energy [J] of all cells and of the memory of their friction."""
     n, dx = int(par[0]), par[1]
     total = 0.0
     for i in range(n):
@@ -248,7 +247,6 @@ def _energy(par: Any, M: Any, J: Any, memory: Any, work: Any) -> float:
 
 @njit(error_model="numpy", _nrt=False)
 def _viscosity(par: Any, p: float) -> float:
-    """Dynamic viscosity [Pa s] from the table of its logarithm."""
     table, spacing, rows = shift(par, int(par[10])), par[11], int(par[12])
     place = min(max(p / spacing, 0.0), rows - 1.000001)
     i = int(place)

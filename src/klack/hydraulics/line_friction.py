@@ -94,7 +94,6 @@ def laminar_weight(tau: ArrayLike) -> Values:
 
 @cache
 def _bessel_zeros() -> tuple[float, ...]:
-    """Positive zeros of ``J_2``."""
     return tuple(float(zero) for zero in scipy.special.jn_zeros(2, _SERIES_TERMS))
 
 

@@ -118,7 +118,6 @@ class LocalLine:
     def _doubts(
         self, component: str, passed: Vector, reynolds: float, time: float
     ) -> Iterator[str]:
-        """Sentences on a finished run."""
         if passed[1] > _STEEP * passed[3]:
             yield (
                 f"'{component}': {100.0 * passed[1] / passed[3]:.2g} % of the energy that passed "

@@ -204,7 +204,6 @@ class PropertyTable:
         return CompressedLiquid(self.name, self.pressure, float(density[0]), fall)
 
     def _between(self, columns: Values, temperature: float) -> Values:
-        """Row of the columns at a temperature, by monotone cubics."""
         if self.temperature.size == 1:
             return columns[0]
         inside = np.clip(temperature, self.temperature[0], self.temperature[-1])

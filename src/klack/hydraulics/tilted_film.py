@@ -523,7 +523,6 @@ def film_slopes(
 
 @inner(error_model="numpy")
 def _loads(land: Land) -> Array:
-    """Forces on the circles per function of the radius, shape (N, Q) [m^2]."""
     G, N = land.between.shape
     L = np.zeros((N, land.load.shape[1]))
     for p in range(G):

@@ -196,7 +196,6 @@ class BoostDriver(Driver):
         )
 
     def _check_capacitor(self) -> None:
-        """Refuse half a capacitor."""
         needed = ("capacitance", "boost_voltage", "recharge_power")
         more = ("start_voltage", "recharge_current")
         given = [key for key in (*needed, *more) if getattr(self, key) is not None]

@@ -169,7 +169,6 @@ def _tell_remanence(placed: Sequence[PlacedMagnet]) -> None:
 
 
 def _resting(part: PlacedMagnet, gap: float) -> tuple[Vector, Vector]:
-    """Loop fluxes and stops at the currents of the start."""
     magnet = part.magnet
     others = dict(magnet.currents)
     main = others.pop("", 0.0)
@@ -184,7 +183,6 @@ def _channels(
     capacitors: Sequence[tuple[str, str]],
     first: Sequence[int],
 ) -> tuple[Channel, ...]:
-    """Voltage, current and driver state of each winding, voltages of capacitors, and fluxes."""
     found, w = list[Channel](), 0
     for m, part in enumerate(placed):
         for winding in part.magnet.windings:
@@ -208,7 +206,6 @@ def _channels(
 def _books(
     placed: Sequence[PlacedMagnet], capacitors: Sequence[tuple[str, str]]
 ) -> tuple[Book, ...]:
-    """Energies in the order of the step."""
     found = list[Book]()
     for part in placed:
         for winding in part.magnet.windings:

@@ -135,7 +135,6 @@ class DriveProfile(DiodeDriver):
         return self.between(start, end, *states)
 
     def _follow(self, number: str, over: tuple[Switch, ...]) -> list[DriveState]:
-        """States that keep the current in its band."""
         current = self.current or ()
         band = _USUAL_BAND * max(current) if self.band is None else self.band
         target = DriveCourse(self.time, current)

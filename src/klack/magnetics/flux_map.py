@@ -176,7 +176,6 @@ class FluxMap:
         return np.concatenate((head, self.gap, *cells))
 
     def _cell(self, k: int, j: int) -> Vector:
-        """Sixteen coefficients of the bicubic Hermite patch of a cell."""
         h, d = float(self.linkage[1]), float(self.gap[j + 1] - self.gap[j])
         part = np.s_[k : k + 2, j : j + 2]
         corner = np.block(
@@ -318,7 +317,6 @@ def _checked(
 
 
 def _column(i: Vector, psi: Vector, common: Vector) -> tuple[Vector, Vector]:
-    """Energy and current over the common linkages, at one gap."""
     curve: scipy.interpolate.PPoly = scipy.interpolate.PchipInterpolator(psi, i)
     slope = float(curve(psi[-1], 1)) or float((i[-1] - i[-2]) / (psi[-1] - psi[-2]))
     inside = np.minimum(common, psi[-1])

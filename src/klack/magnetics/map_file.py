@@ -61,8 +61,6 @@ class MapTable:
 
 @dataclass(frozen=True, slots=True)
 class _Column:
-    """A column of a table: quantity, factor to SI, and what varies in its head."""
-
     quantity: str
     factor: float
     varied: tuple[str, float] | None = None
@@ -134,7 +132,6 @@ def read_matrix(path: Path, quantity: str, units: Mapping[str, str]) -> tuple[Ve
 def _columns(
     cells: CellTable, chosen: Mapping[str, str | int], units: Mapping[str, str]
 ) -> dict[int, _Column]:
-    """Find what each column holds; others are ignored."""
     place: dict[int, str] = {}
     for name, column in chosen.items():
         for k in _chosen(cells, name, column):
@@ -241,7 +238,6 @@ def _label(text: str) -> tuple[str, str]:
 
 
 def _factor(where: str, quantity: str, unit: str) -> float:
-    """Size of a unit in SI."""
     kind, known = KINDS[quantity], read_unit(unit) if unit.strip() else None
     try:
         return parse_quantity(f"1 {known or unit}", kind)
@@ -268,7 +264,6 @@ def _value(cells: CellTable, row: tuple[int, tuple[str, ...]], k: int) -> float:
 
 
 def _rows(cells: CellTable, found: Mapping[int, _Column]) -> dict[str, Vector]:
-    """Columns of points in SI."""
     return {
         column.quantity: column.factor * np.array([_value(cells, row, k) for row in cells.rows])
         for k, column in found.items()

@@ -79,13 +79,11 @@ def map_numbers(flux_map: FluxMap) -> Vector:
 
 @inner(error_model="numpy")
 def _row(par: Any, t: int, size: float) -> int:
-    """Row of cells that holds a linkage."""
     return min(int(size / par[t + 2]), int(par[t]) - 1)
 
 
 @inner(error_model="numpy")
 def _column(par: Any, t: int, x: float) -> int:
-    """Column of cells that holds a gap."""
     low, high = 0, int(par[t + 1]) - 1
     while low < high:
         middle = (low + high + 1) // 2

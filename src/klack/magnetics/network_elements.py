@@ -45,8 +45,6 @@ class WorkingGaps:
 
 
 class _Element(Section):
-    """What all elements share."""
-
     between: Between
 
     @model_validator(mode="after")
@@ -61,7 +59,6 @@ class _Element(Section):
         return self
 
     def tubes(self, name: str, gaps: WorkingGaps) -> tuple[Tube, ...]:
-        """Branches of the element."""
         raise NotImplementedError
 
     def _tube(

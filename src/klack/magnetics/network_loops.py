@@ -84,7 +84,6 @@ def loop_names(circuit: MagneticCircuit) -> tuple[str, ...]:
 
 
 def _spanning_tree(tubes: Sequence[Tube]) -> tuple[list[int], list[int]]:
-    """Numbers of the tubes in the tree and of the others."""
     group = {node: node for tube in tubes for node in (tube.start, tube.end)}
 
     def head(node: str) -> str:

@@ -140,6 +140,5 @@ class ArmaturePull:
 
 
 def _edge_permeance(face: PoleGap, gap: float) -> float:
-    """Permeance of the edge field of a working gap [H]."""
     reluctance, _ = face.reluctance(np.array(gap))
     return float(1.0 / reluctance - face_permeance(face.area, gap))

@@ -19,7 +19,6 @@ __all__ = ["stops_end", "stops_energy", "stops_mean", "stops_move"]
 
 @inner(error_model="numpy", forceinline=True)
 def _width(par: Any, table: int, flux: float) -> float:
-    """Yield of all stops of a part [A] at a flux [Wb]."""
     n, place = int(par[table]), abs(flux) * par[table + 1]
     if not place < n:
         return par[table + 2 + 4 * n]

@@ -66,8 +66,6 @@ class FmuController:
 
 
 class _Running:
-    """An instance of the FMU during a run, in a new process."""
-
     def __init__(self, controller: FmuController, period: float) -> None:
         self._of, self._period = controller, period
         self._folder = TemporaryDirectory(prefix="klack-fmu-", ignore_cleanup_errors=True)

@@ -199,7 +199,6 @@ def _archive(path: Path) -> Iterator[zipfile.ZipFile]:
 
 
 def _extract(path: Path, archive: zipfile.ZipFile, folder: Path, wanted: object) -> None:
-    """Unpack the needed files after a check of names and sizes."""
     assert callable(wanted)
     members = archive.infolist()
     if len(members) > _MOST_MEMBERS or sum(item.file_size for item in members) > _LARGEST:

@@ -142,7 +142,6 @@ class _Watch(threading.Thread):
         self._process, self._is_over = process, threading.Event()
 
     def run(self) -> None:
-        """Check repeatedly until :meth:`stop`."""
         seen, waited = -1, 0.0
         while not self._is_over.wait(pause := min(self.limit / _LOOKS, _LONGEST_LOOK)):
             if self.calls != seen:
@@ -155,7 +154,6 @@ class _Watch(threading.Thread):
                     return
 
     def stop(self) -> None:
-        """Stop checking."""
         self._is_over.set()
 
 

@@ -39,7 +39,6 @@ _W0, _W1 = (float(w) / 2.0 for w in _GAUSS[1][2:])
 
 @inner(error_model="numpy")
 def _piece(par: Any, at: int, s: float) -> int:
-    """Piece of a curve that holds the deflection ``s``."""
     low, high = 0, int(par[at]) - 1
     while low < high:
         middle = (low + high) // 2
@@ -52,7 +51,6 @@ def _piece(par: Any, at: int, s: float) -> int:
 
 @inner(error_model="numpy")
 def _value_of(par: Any, at: int, k: int, s: float) -> float:
-    """Force of piece ``k`` [N]."""
     pieces, terms = int(par[at]), int(par[at + 1])
     t = s - par[at + 1 + pieces + k]
     first = at + 1 + 3 * pieces + k * terms

@@ -135,7 +135,6 @@ class PrescribedMotion(Component):
         rows.body(body, self.points, course=self.course())
 
     def _columns(self, path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Time [s] and displacement [m] of a file."""
         size = path.stat().st_size
         if size > _LARGEST:
             raise CaseProblem(
@@ -180,7 +179,6 @@ class PrescribedMotion(Component):
 
 
 def _at_zero(course: MotionCourse) -> float:
-    """Displacement at time zero [m]."""
     time, place = course.time, course.displacement
     k = int(np.searchsorted(time, 0.0, side="right"))
     if k == 0 or k == len(time):

@@ -56,7 +56,6 @@ class RigidMass(Component):
 
 
 def _rigid_body(name: str, mass: float, points: tuple[str, ...]) -> ReducedBody:
-    """Build the reduced form of a rigid mass: one mode ``1/sqrt(m)``."""
     count = len(points)
     return ReducedBody(
         name=name,

@@ -205,7 +205,6 @@ def _check_drive(components: Mapping[str, Component], node: Node) -> None:
 
 
 def _check_feed(node: Node) -> None:
-    """Check a boost capacitor and the drivers that draw from it."""
     sources = [str(joint) for joint in node.having(Role.FEEDS)]
     drivers = [str(joint) for joint in node.having(Role.FED)]
     others = [str(joint) for joint in node.joints if str(joint) not in (*sources, *drivers)]

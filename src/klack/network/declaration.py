@@ -72,8 +72,6 @@ def read_component(value: Any, context: Any = None) -> Component:
 
 
 class _ComponentSchema:
-    """JSON schema of the mapping that :func:`read_component` takes."""
-
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:

@@ -91,7 +91,6 @@ def _unit(info: FieldInfo) -> str:
 
 
 def _equation(text: str) -> str:
-    """First displayed equation, in one line."""
     _, found, rest = text.partition(".. math::")
     if not found:
         return ""

@@ -122,7 +122,6 @@ class Network:
         return min((_FIRST.get(port.role, 2) for port in ports), default=2)
 
     def _handles(self) -> dict[str, dict[str, int]]:
-        """Handle of every port of every component."""
         handles: dict[str, dict[str, int]] = {}
         moving = 0
         for name, component in self.components.items():
@@ -145,7 +144,6 @@ class Network:
         return handles
 
     def _partners(self) -> dict[str, dict[str, tuple[Component, ...]]]:
-        """Other components at the node of every joined port."""
         partners: dict[str, dict[str, tuple[Component, ...]]] = {}
         for name in self.components:
             partners[name] = {}

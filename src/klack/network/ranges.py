@@ -93,7 +93,6 @@ class Travel:
         return nearest.gap / length * length * abs(factor), (nearest.name,)
 
     def _of_a_chain(self, wanted: Mapping[str, float]) -> tuple[float, tuple[str, ...]]:
-        """Answer of the linear programme."""
         sides = [side for bound in self.bounds for side in (bound.upper, bound.lower) if side]
         place = {body: i for i, body in enumerate(dict.fromkeys([*sides, *wanted]))}
         closing = np.zeros((len(self.bounds), len(place)))
@@ -137,7 +136,6 @@ class Travel:
 
 
 def _owners(rows: Rows) -> dict[int, str]:
-    """Free body of every port."""
     free = [row for row in rows.bodies if row.body.rigid_count > 0]
     return {handle: row.component for row in free for handle in row.ports}
 
@@ -236,7 +234,6 @@ def _begins(pressure: float) -> str:
 
 
 def _gives_fluid(rows: Rows) -> bool:
-    """Whether anything can flow out of the surroundings."""
     ends = [(row.a, row.b) for row in rows.branches] + [(row.a, row.b) for row in rows.lines]
     return any(AMBIENT in both for both in ends)
 

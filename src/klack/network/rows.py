@@ -600,7 +600,6 @@ class Rows:
         )
 
     def _names(self, ports: Sequence[int]) -> tuple[str, ...]:
-        """Names of these handles in the present component, each once."""
         left = dict(self.handles)
         names = []
         for handle in ports:

@@ -176,7 +176,6 @@ def compile_step(step: StepFunction) -> None:
 
 
 def _compiled(step: StepFunction) -> Any:
-    """Code of a step function for the one signature of all."""
     from numba import types
 
     return step.get_compile_result(types.int64(*4 * [types.CPointer(types.float64)]))

@@ -283,7 +283,6 @@ def start_lines(lines: Lines, state: LineState, pressure: ArrayLike, flow: Array
 
 
 def _segment_steps(row: LineRow, step: float, coarse: int) -> Vector:
-    """Delays of the segments of a line in fine steps."""
     total = row.delay / step
     blocks = total / (row.segments * coarse)
     if blocks < 1.0 - _A_WHOLE:

@@ -556,7 +556,6 @@ def _external_forces(
     step: float,
     velocity: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Mean axial force on each body; springs act on the centre of mass."""
     out = np.zeros((records, len(system.bodies)))
     for k, block in enumerate(flat.blocks):
         body, rigid = block.body, block.body.rigid_count

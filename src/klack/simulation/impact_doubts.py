@@ -218,7 +218,6 @@ def _closes(record: InterfaceRecord, k: int) -> bool:
 
 
 def _at_touch(record: InterfaceRecord, force: Vector, k: int) -> float:
-    """Force of a film at the moment of touch within this step [N]."""
     before, after, h = float(record.gap[k - 1]), float(record.gap[k]), record.step
     share = min(max(before / (before - after), 0.0), 1.0)
     growth = 2.0 * log(force[k - 1] / force[k - 2]) / (h[k - 2] + h[k - 1])
@@ -238,7 +237,6 @@ def _highest(h: Vector, mean: Vector, returned: float) -> float:
 
 
 def _rounded_down(step: float) -> float:
-    """Next shorter one of 1, 2 and 5 times a power of ten."""
     decade = 10.0 ** floor(log10(step))
     return max(n for n in (1.0, 2.0, 5.0) if n <= step / decade * (1.0 + 1e-9)) * decade
 

@@ -77,7 +77,6 @@ def _film_mean(
     inverse1: float,
     closed: float,
 ) -> float:
-    """``Pi(x1) - Pi(x0)`` with ``closed = x0 - x1``."""
     total, inverses = x0 + x1, inverse0 * inverse1
     damping = 0.5 * cubic * total * inverses * inverses
     if linear != 0.0:

@@ -168,7 +168,6 @@ def _watch_all(
     out: Matrix,
     place: int,
 ) -> None:
-    """Record displacements or velocities; the forces ``F`` of the last step are still pending."""
     for k in range(rows.shape[0]):
         y = _watch(rows, k, state)
         for c in range(F.size):
@@ -194,7 +193,6 @@ def _modal_force(rows: Matrix, F: Vector, f: Vector) -> None:
 
 @compiled(fastmath=FAST)
 def _damped_energy(q: Vector, v: Vector, B: Matrix, f: Vector, W: Matrix) -> float:
-    """Energy of the damped modes after the pending modal force ``f``."""
     total = 0.0
     for i in range(q.size):
         qi = q[i] + B[0, i] * f[i]
@@ -224,8 +222,6 @@ class Damped(NamedTuple):
 
 
 class _Now(NamedTuple):
-    """Where the contacts and modes are in the run."""
-
     F: Vector  # (c,) [N] of the last step
     F_before: Vector  # of the step before
     gap: Vector  # (c,) [m]

@@ -267,7 +267,6 @@ def _closing(p: Vector, start: int, d: float) -> tuple[float, float, float]:
 
 @inner
 def _along(p: Vector, start: int, d: float) -> tuple[float, float, float]:
-    """Force, stiffness and work of the faces as they are now."""
     deep = p[start + _DEEP]
     if d <= deep:
         return _elastic(p, start, deep, d)

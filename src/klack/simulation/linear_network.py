@@ -160,7 +160,6 @@ class _Assembly:
         return found
 
     def _contacts(self) -> None:
-        """Stiffness and damping of contacts and films."""
         at, state = self.network.interfaces, self.network.interface_state
         gap = at.gap0 + self.y[at.upper] - self.y[at.lower]
         force, slope = contacts_at_rest(at.kind, at.law, at.law0, at.series, gap)
@@ -313,7 +312,6 @@ class _Assembly:
     # ------------------------------------------------------------------ equations
 
     def found(self) -> LinearNetwork:
-        """Write all equations."""
         n = self.port_count
         self.way, self.speed = np.zeros((n + 1, self.width)), np.zeros((n + 1, self.width))
         self._move_ports()
@@ -374,7 +372,6 @@ class _Assembly:
         return np.asarray(forms[:, kept] + forms[:, last] @ pressure)
 
     def _move_ports(self) -> None:
-        """Displacement and speed of every port."""
         begin = 0
         for b, row in enumerate(self.rows.bodies):
             shapes, r = np.asarray(row.body.port_shapes), row.body.rigid_count
@@ -500,7 +497,6 @@ class _Assembly:
             self.force[lower] -= push
 
     def _put_lines(self) -> None:
-        """Waves, flows and friction: see :mod:`klack.simulation.delay_line`."""
         for line, row in enumerate(self.rows.lines):
             self._put_line(line, row)
 
@@ -590,7 +586,6 @@ class _Assembly:
 
 
 def _state_signals(row: ElementRow | BranchRow) -> dict[int, Signal]:
-    """States of a row by their index."""
     found = {c.index: Signal(c.owner or row.component, c.label, c.unit) for c in row.channels}
     for index, (label, unit) in row.state_names.items():
         owner, dot, quantity = label.partition(".")

@@ -201,7 +201,6 @@ def _usual(at: RowPoint, kept: tuple[int, ...]) -> Vector:
 
 
 def _derivatives(at: RowPoint, h: float, side: float) -> Matrix:
-    """Derivatives of all outputs by states, starts and ends of ports, pressures, inputs."""
     row = at.row
     told, first_port = at.told(h, side), 2 + 2 * at.p.size
     seeds: list[tuple[str, int, Vector | float]] = []

@@ -175,7 +175,6 @@ def _bordered(system: LinearSystem, s: complex, late: Complex, factors: Vector) 
 
 
 def _late(delay: float, pieces: int) -> tuple[Matrix, Vector, Vector]:
-    """State space of a delay, equal pieces in series."""
     tau, n = delay / pieces, ORDER
     m = n - 1
     # e^-x = N(x)/P(x), x = s tau; no feedthrough, so that no reflection closes an algebraic loop
@@ -351,7 +350,6 @@ def _newton(
 
 
 def _with_slope(system: LinearSystem, s: complex, factors: Vector) -> tuple[Complex, Complex]:
-    """Matrix of the characteristic equation, and its change with ``s``."""
     n, late = len(system.A), np.exp(-s * system.delays)
     matrix = _bordered(system, s, late, factors)
     slope = np.zeros_like(matrix)
@@ -362,7 +360,6 @@ def _with_slope(system: LinearSystem, s: complex, factors: Vector) -> tuple[Comp
 
 
 def _shares(system: LinearSystem, product: Complex) -> dict[str, float]:
-    """Participation by component."""
     found: dict[str, float] = {}
     size = np.abs(product)
     owners = [*(signal.owner for signal in system.states), *system.waves]

@@ -209,8 +209,6 @@ def compile_network(rows: Rows, sizes: StepSizes) -> CompiledNetwork:
 
 
 class _Accounts:
-    """Collects the entries of the energy balance."""
-
     def __init__(self) -> None:
         self.kinds: list[int] = []
         self.names: list[str] = []
@@ -231,7 +229,7 @@ def _number_ports(rows: Sequence[BodyRow]) -> tuple[dict[int, int], tuple[PortNa
 
 
 class _Answers(NamedTuple):
-    """Lay out the modes in blocks for each step size; also return the first block of each body."""
+    """Response of each port to a force at another, for each step size, (SIZES, PORTS, PORTS)."""
 
     moved: Cube  # displacement at the end per unit force
     moved_by_rise: Cube  # ... per force that rises evenly by one and has no mean
@@ -239,7 +237,7 @@ class _Answers(NamedTuple):
 
     @classmethod
     def of(cls, rows: Sequence[BodyRow], propagators: Sequence[Sequence[Propagator]]) -> Self:
-        """Of all bodies, each with its propagators; what follows a course is not moved."""
+        """Responses of all bodies; one that follows a course is not moved."""
         found = np.zeros((3, len(propagators[0]), PORTS, PORTS))
         first = 0
         for row, of_body in zip(rows, propagators, strict=True):
@@ -255,7 +253,6 @@ class _Answers(NamedTuple):
 
 
 def _propagators(rows: Sequence[BodyRow], steps: Sequence[float]) -> list[list[Propagator]]:
-    """Of each body, for each size of step."""
     return [[modal_propagator(row.body.omega, row.body.damping, h) for h in steps] for row in rows]
 
 

@@ -200,7 +200,6 @@ def solve_interfaces(contacts: Any, sliding: Any, bodies: Any, G: Any, step: Ste
 
 @phase
 def _solve_interface(contacts: Any, S: Any, c: int, step: Step) -> None:
-    """Force, compression and losses of one interface over the step."""
     rows, state, trial = contacts.rows, contacts.state, contacts.trial
     G, g0 = rows.G[step.level * rows.interfaces + c], state.gap[c]
     gap_free = gap_between(rows, S, c) - G * trial.force[c]

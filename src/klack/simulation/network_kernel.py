@@ -499,7 +499,6 @@ def _act(
 
 @unfolded
 def _end_step(step: Step, level: int, whole: bool, loop: Any, longest: float) -> None:
-    """Take over states, masses, waves and accounts; repair the bodies."""
     bodies, elements, fluid = loop.bodies, loop.elements, loop.fluid
     accounts, kind, H = loop.accounts, loop.kind, step.H
     end_elements(elements, H, accounts, kind, loop.sums)
@@ -522,14 +521,12 @@ def _end_step(step: Step, level: int, whole: bool, loop: Any, longest: float) ->
 
 @phase
 def _interface_sums(loop: Any) -> Any:
-    """Sums of interfaces behind those of elements and branches."""
     elements, branches = loop.elements, loop.fluid.branches
     return shift(loop.sums, elements.port0[elements.rows] + branches.rows)
 
 
 @phase
 def _slider_sums(loop: Any) -> Any:
-    """Sums of sliders behind those of interfaces."""
     return shift(_interface_sums(loop), 2 * loop.contacts.rows.interfaces)
 
 

@@ -235,7 +235,6 @@ def _flows_follow(fluid: Any, H: float) -> bool:
 
 @phase
 def _place_walls(fluid: Any, S: Any) -> None:
-    """Volumes with the walls and pressures of the last sweep."""
     nodes, trial = fluid.nodes, fluid.trial
     for i in range(nodes.volumes):
         trial.V_used[i] = nodes.volume[i]
@@ -248,7 +247,6 @@ def _place_walls(fluid: Any, S: Any) -> None:
 
 @phase
 def _step_by(fluid: Any, share: float) -> None:
-    """Take a share of the Newton step."""
     trial = fluid.trial
     for i in range(fluid.nodes.volumes):
         trial.p[i] += share * trial.r[i]
@@ -257,7 +255,6 @@ def _step_by(fluid: Any, share: float) -> None:
 
 @phase
 def _look_up(fluid: Any) -> None:
-    """Density, its slope and pressure energy of every node at the present pressures."""
     nodes, state, trial, hint = fluid.nodes, fluid.state, fluid.trial, fluid.state.hint
     for i in range(nodes.chambers):
         theta = trial.theta[i]

@@ -254,7 +254,6 @@ class Recorder:
         return found
 
     def _velocities(self, count: int) -> dict[str, Vector]:
-        """Velocities of the centres of mass [m/s] in this chunk, by component."""
         return {name: self.recording.points[:count, i] for name, i in self.moving.items()}
 
     def _thin(self, count: int) -> None:

@@ -691,7 +691,6 @@ def _changing(network: CompiledNetwork, clock: NDArray[np.int64]) -> dict[str, C
 
 
 def _pressed_faces(network: CompiledNetwork) -> dict[str, PressedFaces]:
-    """What has become of faces that yield."""
     at, found = network.interfaces, {}
     for c, row in enumerate(network.rows.interfaces):
         if isinstance(row.law, YieldingLaw):

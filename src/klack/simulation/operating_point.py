@@ -255,7 +255,6 @@ def _put_states(network: CompiledNetwork, states: Vector) -> None:
 
 
 def _recorded(network: CompiledNetwork, step: float) -> dict[str, ChannelData]:
-    """Channels of a network at rest, as a run begins with them."""
     recorder = Recorder(network, records=1, looks=1, chunk=1, fine=1)
     recorder.start(0.0, ImpactFinder(network.rows, 0.0, step), fresh=True)
     short, speeds = SHARE_OF_STEP * step, recorder.port_speeds()

@@ -42,7 +42,6 @@ def ask_again(rows: Any, k: int) -> int:
 
 @phase
 def _tell_ports(rows: Any, k: int, place: int, y0: Any, y1: Any) -> None:
-    """Write displacements at both ends of the step into the inputs of row ``k``."""
     for j in range(rows.port0[k], rows.port0[k + 1]):
         rows.inputs[place] = y0[rows.ports[j]]
         rows.inputs[place + 1] = y1[rows.ports[j]]

@@ -146,7 +146,6 @@ def _watch(
 
 @phase
 def _push_in(S: Matrix, index: NDArray[np.int64], pushed_q: Vector, pushed_v: Vector) -> None:
-    """Add the motion under constant forces to that of all modes."""
     for k in range(index.size):
         c, i = index[k] // CHUNK, index[k] % CHUNK
         S[c, i] += pushed_q[k]
@@ -183,7 +182,6 @@ def _damped_energy_chunk(S: Matrix, L: Matrix, c: int, F: float) -> float:
 
 @compiled()
 def _damped_energy(S: Matrix, L: Matrix, F: float) -> float:
-    """Energy of the damped modes after the pending contact force ``F``."""
     total = 0.0
     for c in range(S.shape[0]):
         total += _damped_energy_chunk(S, L, c, F)
@@ -211,8 +209,6 @@ def _damping_loss(S: Matrix, L: Matrix, F_before: float, F: float) -> float:
 
 
 class _Contact(NamedTuple):
-    """Where the contact is."""
-
     F: float  # [N] of the last step
     F_before: float  # of the step before
     gap: float  # [m]

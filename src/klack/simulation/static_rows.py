@@ -165,7 +165,6 @@ def newton_system(at: Couplings, now: Balance, creep: Vector, tau: float) -> tup
 
 @njit(error_model="numpy")
 def _fill_volumes(A: Matrix, left: Vector, at: Couplings, now: Balance, tau: float) -> None:
-    """Rows of the masses in free volumes."""
     r, n = at.shapes.shape
     for i in range(at.free.size):
         through = 0.0 if at.shut[i] else tau

@@ -97,8 +97,6 @@ _NEARLY = 1e-9  # the same where they come no closer
 
 @dataclass(slots=True)
 class _State:
-    """Unknowns, and what belongs to them."""
-
     z: Vector  # axial coordinates of all free bodies
     y: Vector  # ports, the ground last
     p: Vector  # all nodes
@@ -599,7 +597,6 @@ class _Balance:
         return [int(i) for i in self.free if which[i] and not self.given[i]]
 
     def answers(self, state: _State) -> bool:
-        """Whether every part has a force or flow in this state."""
         return (
             self._in_range(state.y)
             and self._keep_states(state.y)
@@ -618,7 +615,6 @@ class _Balance:
         )
 
     def evaluate(self, state: _State) -> bool:
-        """Forces and flows with their slopes, with contacts; False if a part fails."""
         found = self._keep_states(state.y) and slopes_at_rest(
             *self._rows,
             self.h,
@@ -650,7 +646,6 @@ class _Balance:
         return True
 
     def contacts(self, y: Vector) -> list[tuple[float, float]]:
-        """Force of every contact [N] and its change with the gap [N/m]."""
         interfaces = self.network.interfaces
         gap = interfaces.gap0 + y[interfaces.upper] - y[interfaces.lower]
         forces, slopes = contacts_at_rest(
@@ -749,7 +744,6 @@ class _Balance:
         return found
 
     def masses(self, state: _State) -> Vector:
-        """Mass in each free volume [kg]."""
         return self._masses(state)[0]
 
     def _masses(self, state: _State) -> tuple[Vector, Vector, Vector]:
@@ -761,7 +755,6 @@ class _Balance:
         return volume * density, volume * fluid[1], density
 
     def volumes(self, y: Vector) -> Vector:
-        """Volume of every node [m^3] with the walls at these displacements."""
         nodes = self.network.nodes
         volume = np.zeros(nodes.nodes)
         volume[: nodes.volumes] = nodes.volume
@@ -811,7 +804,6 @@ class _Balance:
         )
 
     def left_on_bodies(self) -> dict[str, float]:
-        """Force left on each free body [N]."""
         left = self.shapes @ self.force[:-1]
         result = {}
         for b, row in enumerate(self.network.rows.bodies):
@@ -821,7 +813,6 @@ class _Balance:
         return result
 
     def not_found(self, state: _State) -> ConvergenceError:
-        """Error of a network that comes to no end."""
         if not self.evaluate(state):
             return self.failed()
         if self.beyond is not None:

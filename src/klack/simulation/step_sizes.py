@@ -99,7 +99,6 @@ def scaled(rows: Rows, sizes: StepSizes, factor: float) -> StepSizes:
 
 
 def _intervals(rows: Rows) -> list[float]:
-    """Intervals of the exchange with FMUs [s]."""
     found = [row.interval for row in rows.elements if row.interval is not None]
     return found + [row.period for row in rows.controllers]
 

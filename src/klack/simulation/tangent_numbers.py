@@ -106,7 +106,6 @@ def end_stretch(lines: Any, state: Any, lane: int) -> None:
 
 
 def _change(waves: Vector) -> Vector:
-    """Change of the waves per fine step."""
     return np.asarray(np.gradient(waves)) if len(waves) > 1 else np.zeros(len(waves))
 
 

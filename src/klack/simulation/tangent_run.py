@@ -131,7 +131,6 @@ class TangentRun:
 
     @cached_property
     def _peaks(self) -> tuple[tuple[str, Lanes | None, Lanes | None], ...]:
-        """Of each impact its stop, and force and time of its peak."""
         places = {row.component: c for c, row in enumerate(self.rows.interfaces)}
         return tuple(
             (event.stop, *_vertex(self._fine[places[event.stop]], event.peak_time))
@@ -317,8 +316,6 @@ def compile_tangents(rows: Rows, *, step: float | None = None) -> None:
 
 
 class _Running:
-    """A run with derivatives, under way."""
-
     def __init__(
         self,
         rows: Rows,
@@ -404,7 +401,6 @@ class _Running:
         self.done: list[_Part] = []
 
     def compile(self) -> None:
-        """Compile or load the time loop."""
         self._start()
         self._advance(0)
 
@@ -491,7 +487,6 @@ class _Running:
         laid_out[places] = kept.modes
 
     def _start(self) -> "_Part":
-        """The state before the first step."""
         none = np.zeros((0, self.recording.fine.shape[2], LANES))
         start_with_tangents(self.recording, moment_of(self.numbers))
         return _Part(
@@ -587,7 +582,6 @@ class _Running:
         self.origin[STRETCH] = -float(self.clock[0]) * self.h[0]
 
     def _end_stretch(self) -> None:
-        """Continue with steps that do not change."""
         set_stretch(self.with_slopes, False)
         end_stretch(self.numbers.lines, self.numbers.line_state, STRETCH)
         self.origin[STRETCH] += float(self.clock[0]) * self.h[STRETCH]
@@ -634,8 +628,6 @@ class _Running:
 
 @dataclass(slots=True)
 class _Part:
-    """What a chunk recorded, with derivatives."""
-
     time: Lanes
     points: Lanes
     means: Lanes
@@ -644,8 +636,6 @@ class _Part:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Kept:
-    """A moment of a run."""
-
     arrays: list[tuple[Any, Any]]
     modes: Any
 
@@ -659,7 +649,6 @@ class _Found:
 
 
 def _masses(rows: Rows) -> dict[str, float]:
-    """Mass of the relative motion of the bodies at each stop [kg]."""
     owner = {handle: row for row in rows.bodies for handle in row.ports}
     return {
         row.component: effective_mass((owner.get(row.upper), owner.get(row.lower)))

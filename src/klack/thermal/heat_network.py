@@ -146,7 +146,6 @@ def heat_network(network: Network) -> HeatNetwork | None:
 
 
 def _numbered(rows: HeatRows, words: Mapping[int, str], stores: Mapping[str, int]) -> HeatNetwork:
-    """Free nodes first, then those of known temperature."""
     used = set(rows.capacity) | {node for path in rows.paths for node in (path.a, path.b)}
     used |= {item.node for item in rows.supplies}
     free = sorted(used - set(rows.fixed))
@@ -180,7 +179,6 @@ def _numbered(rows: HeatRows, words: Mapping[int, str], stores: Mapping[str, int
 
 
 def _require_known(network: HeatNetwork) -> None:
-    """Refuse a temperature that nothing determines."""
     for nodes in network.floating:
         if not network.capacity[list(nodes)].any():
             names = " and ".join(f"'{network.names[i]}'" for i in nodes)

@@ -117,8 +117,6 @@ class SlowWarmUp:
 
 @dataclass(slots=True)
 class _Energy:
-    """Sums over all steps [J]."""
-
     supplied: Array
     stored: Array
     given_off: Array
@@ -133,7 +131,6 @@ class _Energy:
 
     @property
     def residual(self) -> float:
-        """What does not balance, over what was moved."""
         left = self.supplied.sum() - self.stored.sum() - self.given_off.sum()
         return abs(float(left)) / self.scale if self.scale > 0.0 else 0.0
 
@@ -319,7 +316,6 @@ def _step(march: _March, T: Array, Q: Array) -> tuple[HeatStep, Array, Array, fl
 
 
 def _first_length(march: _March, T: Array, Q: Array) -> float:
-    """Longest step in which no temperature is expected to move by more than the spacing."""
     network, settings = march.network, march.settings
     links, held = network.links(T), network.capacity > 0.0
     aim = _aim(march, T, Q)
@@ -361,7 +357,6 @@ def _first_length(march: _March, T: Array, Q: Array) -> float:
 
 
 def _flows(network: HeatNetwork, T: Array, Q: Array) -> Array:
-    """Heat flow that each free node keeps [W]."""
     links = network.links(T)
     inside = links.between @ T - links.between.sum(axis=1) * T
     outside = links.to_fixed @ network.fixed - links.to_fixed.sum(axis=1) * T

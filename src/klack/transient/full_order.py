@@ -304,8 +304,6 @@ def _returned(precision: Precision) -> float:
 
 
 class _Run:
-    """Both bodies, the contact between them, and the step."""
-
     def __init__(
         self,
         bodies: list[FullBody],
@@ -372,12 +370,10 @@ class _Run:
 
     @property
     def gap(self) -> NDArray[np.float64]:
-        """Gaps at the end of the last step, shape (nc,) [m]."""
         return self.ends[: self.count]
 
     @property
     def reach_per_step(self) -> float:
-        """Change of a gap in one step at the impact speed [m]."""
         return self.speed * self.step
 
     @property
@@ -394,7 +390,6 @@ class _Run:
         )
 
     def watch(self, points: NDArray[np.bool_]) -> None:
-        """Watch these points from now on."""
         if np.any(points & ~self.learned):
             new = (points | (self.gap < _LEARN_STEPS * self.reach_per_step)) & ~self.learned
             points_new = np.flatnonzero(new)
@@ -489,7 +484,6 @@ class _Run:
         return self.rubbing.solve(np.concatenate([gap, slip]), self.lam[self.rows])
 
     def _commit(self, lam: NDArray[np.float64], ends: NDArray[np.float64]) -> tuple[float, float]:
-        """Add the energies of the step and make its end the new state."""
         moved, before, self.ends = ends - self.ends, self.gap, ends
         gap = self.gap
         mean = 0.5 * (self.lam + lam) if self.scheme == "massless" else lam
@@ -550,8 +544,6 @@ class _Run:
 
 
 class _Record:
-    """Grows during a run."""
-
     def __init__(self, run: _Run) -> None:
         self.force: list[float] = []
         self.gap: list[float] = []
@@ -627,7 +619,6 @@ def _march(
     progress: Callable[[float], None] | None,
     show: Callable[[], None] | None,
 ) -> _Record:
-    """All steps, with the record."""
     record = _Record(run)
     if show is not None:
         show()
@@ -665,8 +656,6 @@ def _march(
 
 
 class _Show:
-    """Passes on the fields after every due step."""
-
     def __init__(self, run: _Run, start: float, snapshots: Snapshots) -> None:
         self.run, self.start, self.snapshots = run, start, snapshots
         self.before = [body.u for body in run.bodies]
@@ -707,7 +696,6 @@ def _result(
     longest_period: float,
     times: tuple[float, float],
 ) -> FullOrderResult:
-    """Everything that the caller keeps."""
     bodies, count = run.bodies, len(run.bodies)
     velocity = np.array(record.velocity)
     for i, body in enumerate(bodies):

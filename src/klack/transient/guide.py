@@ -195,8 +195,6 @@ def require_within(body: str, surface: str, height: float, z: NDArray[np.float64
 
 
 class _Section(NamedTuple):
-    """A ring of nodes around a height."""
-
     load: NDArray[np.float64]  # (n_dof, 3) weights of the mean displacement
     moment: NDArray[np.float64]  # (n_dof, 3) [1/m] of the mean rotation
     centre: NDArray[np.float64]  # (3,) [m] the axis there

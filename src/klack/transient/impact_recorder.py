@@ -244,7 +244,6 @@ def _await(
 
 @inner
 def _await_place(rows: ImpactRows, c: int, time: float, place: Vector) -> None:
-    """Remember where the bodies are before a touch."""
     rows.words[c, MODE_ROWS] = 1
     rows.moments[c, 0] = time
     for k in range(len(place)):
@@ -305,7 +304,6 @@ def _next_load(rows: ImpactRows, c: int) -> None:
 def _add_film(
     rows: ImpactRows, c: int, start: float, h: float, force: float, land: Vector, pause: float
 ) -> None:
-    """Add a sample of the film."""
     words, film = rows.words[c], rows.film[c]
     if words[PHASE] == PRESSED and words[NUMBER] > MOST:
         return
@@ -328,7 +326,6 @@ def _add_film(
 
 @inner
 def _forget_films(rows: ImpactRows, c: int, before: float) -> None:
-    """Forget samples of the film that are too old."""
     words, film = rows.words[c], rows.film[c]
     old = 0
     while old < words[FILM_ROWS] and film[old, 0] < before:
@@ -341,7 +338,6 @@ def _forget_films(rows: ImpactRows, c: int, before: float) -> None:
 
 @inner
 def _add_place(rows: ImpactRows, c: int, time: float, place: Vector) -> None:
-    """Add a moment of the bodies."""
     words, moments, places = rows.words[c], rows.moments[c], rows.places[c]
     if words[NUMBER] > MOST_MOTIONS:
         return
@@ -370,8 +366,6 @@ def _every_second(rows: Matrix, count: int) -> int:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Stop:
-    """What stays the same of one stop."""
-
     name: str
     points: slice
     shares: csr_array  # (S, n) axial force of a sector per force of a point

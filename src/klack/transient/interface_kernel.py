@@ -185,7 +185,6 @@ def _hold(step: Step, modes: Modes) -> float:
 
 @phase
 def _add(step: Step, modes: Modes, factor: float) -> None:
-    """Let the next force act, times a factor."""
     for i in range(len(step.kick)):
         step.whole[i] += factor * step.kick[i]
         step.q[i] += factor * modes.B1[i] * step.kick[i]
@@ -194,7 +193,6 @@ def _add(step: Step, modes: Modes, factor: float) -> None:
 
 @phase
 def _gather(traces: Matrix, force: Vector, factor: float, kick: Vector) -> None:
-    """Modal force of ``factor`` times contact forces."""
     for i in range(len(kick)):
         kick[i] = 0.0
     for k in range(len(force)):
@@ -624,7 +622,6 @@ def _settle(
 def _tell_forces(
     points: ContactPoints, state: State, step: Step, pay: float, record: Record, taken: int
 ) -> None:
-    """Record the mean contact forces, and count the steps of the contact."""
     force = 0.0
     for k in range(len(points.gap)):
         mean = 0.5 * (1.0 + pay) * step.both[k]
@@ -684,7 +681,6 @@ def _finish(
     gap: float,
     outside: float,
 ) -> None:
-    """The end of the step becomes the state."""
     record.gap[taken] = gap
     record.outside[taken] = outside
     for i in range(len(state.q)):

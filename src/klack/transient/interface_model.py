@@ -514,7 +514,6 @@ def _point_contact(contact: InterfaceContact, moving: str) -> PointContact:
 
 
 def _observed(item: InterfaceBody) -> NDArray[np.float64]:
-    """Rows of the observers of a body on its modes, rigid ones first."""
     shapes = np.hstack([item.body.rigid_modes, item.modes.shapes])
     return np.asarray(item.observers.reshape(-1, item.body.dof_count) @ shapes)
 
@@ -537,7 +536,6 @@ def _observed_static(
 
 
 def _common_ways(contacts: Sequence[InterfaceContact]) -> int:
-    """Tangential directions of every contact."""
     ways = {contact.ways for contact in contacts}
     if len(ways) > 1:
         raise InputError(

@@ -246,7 +246,6 @@ def _require_layer_alone(model: InterfaceModel) -> None:
 
 
 def _layer(model: InterfaceModel) -> Layer | None:
-    """Layer of asperities of the points."""
     law = model.layer
     if law is None:
         return None
@@ -265,8 +264,6 @@ def modes_of_step(model: InterfaceModel, step: float) -> Modes:
 
 
 class _Segment:
-    """Records of fine steps as they come."""
-
     def __init__(self, run: "_Run") -> None:
         self.time = run.time
         self.ledger = run.ledger_start()
@@ -285,8 +282,6 @@ class _Segment:
 
 
 class _Run:
-    """State of one run."""
-
     def __init__(
         self,
         model: InterfaceModel,
@@ -387,7 +382,6 @@ class _Run:
         self.books[LAYER] = layer_energy(self.contact.layer, lam, ends)
 
     def coordinates(self, rigid: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Rigid modal coordinates of a translation and rotation vector."""
         R = self.model.rigid[:, : self.rigid_count]
         q = rigid_coordinates(R, rigid)
         if np.max(np.abs(R @ q - rigid) / SCALE) > 1e-9 * max(1.0, np.max(np.abs(rigid / SCALE))):
@@ -409,7 +403,6 @@ class _Run:
         return self.gap0 + worn if len(worn) else self.gap0
 
     def take_gaps(self) -> None:
-        """Take the gaps from the geometry at the present placement."""
         if self.gaps is None:
             return
         r = self.rigid_count
@@ -487,7 +480,6 @@ class _Run:
         )
 
     def impact(self, duration: float, wait: int, progress: Callable[[float], None] | None) -> None:
-        """Fine steps through one impact, or to the end of the run."""
         segment = _Segment(self)
         self.books[OPEN_STEPS], self.books[DIRECTION] = -1.0, 0.0
         status = 0

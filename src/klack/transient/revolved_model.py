@@ -183,8 +183,6 @@ def _columns(omega: Floats, traces: Floats) -> Iterator[tuple[float, Floats]]:
 
 
 class _Orders:
-    """Statics and rigid modes, order by order."""
-
     def __init__(
         self, rows: RingRows, points: RingPoints, loads: Floats, sections: RingSections | None
     ) -> None:
@@ -232,7 +230,6 @@ class _Orders:
     def modes(
         self, elastic: list[tuple[int, float, Floats]]
     ) -> tuple[NDArray[np.int64], Floats, Floats, Floats]:
-        """Orders, angular frequencies, traces and motions of sections, rigid modes first."""
         ways = [(n, way, read) for n, _, read in elastic for way in range(1 if n == 0 else 2)]
         omega = [w for n, w, _ in elastic for _ in range(1 if n == 0 else 2)]
         all_modes = [*self._rigid, *ways]
@@ -290,7 +287,6 @@ class _Pairs:
         self.found += [(order, *one) for one in _columns(modes.omega, rows @ modes.shapes)]
 
     def lowest(self) -> list[tuple[int, float, Floats]]:
-        """The pairs that are kept, lowest first."""
         low = [one for one in self.found if one[1] <= self.below]
         return sorted(low, key=lambda one: one[:2][::-1])[: self.count]
 

@@ -45,7 +45,6 @@ def _interval(layer: Layer, closure: float) -> int:
 
 @phase
 def _pressure(layer: Layer, gap: float) -> tuple[float, float]:
-    """Pressure [Pa] and its slope [Pa/m] at a gap."""
     if gap >= 0.0:
         return 0.0, 0.0
     j = _interval(layer, -gap)
@@ -72,7 +71,6 @@ def layer_energy(layer: Layer, lam: NDArray, gap: NDArray) -> float:
 
 @inner
 def _invert(A: NDArray, pressed: Pressed, stiffness: NDArray) -> None:
-    """Inverse of A and of the compliance of the layer, over the pressed points."""
     m = 0
     for k in range(len(stiffness)):
         pressed.stiffness[k] = stiffness[k]

@@ -150,7 +150,6 @@ def rubbing_contact(
 def _opened(
     state: "_State", approach: float, count: int, friction: float, key: str
 ) -> tuple[Vector, Vector]:
-    """Approaches [m] and forces [N] while the contact opens."""
     down = np.linspace(approach, 0.0, count + 1)
     force = [state.force]
     for at in down[1:]:
@@ -179,8 +178,6 @@ def _loop(closing: StaticContact, approach: Vector, force: Vector) -> Loop:
 
 
 class _State:
-    """Forces and offsets at one approach after the other."""
-
     def __init__(self, static: StaticContact, faces: FaceFriction, C: Matrix) -> None:
         space = static.space
         lifted = lifted_offset(faces.T_a, space.dimension)

@@ -142,11 +142,9 @@ class _Walls:
 
     @classmethod
     def none(cls) -> Self:
-        """No wall."""
         return cls(np.zeros(0, dtype=np.int64), np.zeros((0, 2)))
 
     def carrying(self, force: Vector) -> Self:
-        """Those with a force."""
         keep = np.flatnonzero(force > 0.0)
         return type(self)(self.height[keep], self.normal[keep])
 

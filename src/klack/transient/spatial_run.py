@@ -183,8 +183,6 @@ class SpatialValve:
 
 
 class _Run(NamedTuple):
-    """What the loop works on beside the network, and records."""
-
     recording: Recording
     scratch: Scratch
     clock: Index
@@ -194,8 +192,6 @@ class _Run(NamedTuple):
 
 
 class _Kept(NamedTuple):
-    """What a repeated step begins with."""
-
     vectors: tuple[NDArray[np.generic], ...]
     active: NDArray[np.bool_]
     points: Index
@@ -358,7 +354,6 @@ class _Moving:
         return self.gap0
 
     def resume(self) -> None:
-        """Continue from a stored state."""
         self._silence_interfaces()
         self.read()
         self.sides.place(self.q)
@@ -366,7 +361,6 @@ class _Moving:
         self.impacts.resume()
 
     def _silence_interfaces(self) -> None:
-        """Let the points act in place of the interfaces of the network."""
         rows, state = self.network.interfaces, self.network.interface_state
         rows.kind[:] = NO_LAW
         rows.dry[:] = 1
@@ -413,7 +407,6 @@ class _Moving:
         return told | self._side_channels(time)
 
     def _side_channels(self, time: Vector) -> dict[str, ChannelData]:
-        """Forces of magnets and seats, and moments about the centre of mass."""
         told = {}
         self.sides.warn()
         for k, row in enumerate(self.sides.rows):
@@ -449,7 +442,6 @@ class _Moving:
         )
 
     def stores(self) -> dict[str, float]:
-        """Energies [J] that contacts and guide hold."""
         self.read()
         held, bent = {}, self.gap0.copy()
         for k in range(len(self.squeezed)):
@@ -486,7 +478,6 @@ class _Moving:
         return lost
 
     def forget_losses(self) -> None:
-        """Begin a new energy balance."""
         self.books[[DAMPING, GUIDE, FRICTION]] = 0.0
         self.flags[_LOST] = 0.0
         self.state.films[:, LOST] = 0.0
@@ -563,7 +554,6 @@ class _Moving:
         return fly, safe * _SURE < span
 
     def _fly(self, run: _Run, done: int, looks: int) -> int:
-        """Free flight, in the loop of the axial network."""
         here = slice(0, self.ports)
         before, work = modal_energy(self.model, self.q, self.v), float(np.sum(self.at[WORK:][here]))
         status = self._loop(run, done, looks)
@@ -637,7 +627,6 @@ class _Moving:
         return STATUS_DONE
 
     def _bends(self, clock: Index, steps: int) -> bool:
-        """Whether a table bends sharply within a macro step of so many fine ones."""
         at = self.arrays.kinks / self.sizes.step - float(clock[0])
         return steps > 1 and bool(np.any((at > 0.0) & (at < steps)))
 
@@ -816,7 +805,6 @@ class _Moving:
         return False
 
     def _steady(self, before: Vector) -> None:
-        """Note whether forces changed little in this record."""
         scale = np.maximum(np.abs(before), np.abs(self.stops.force))
         steady = np.all(np.abs(self.stops.force - before) <= _STEADY * scale)
         self.flags[_STEADILY] = float(steady)
@@ -868,12 +856,10 @@ class _Moving:
     # ------------------------------------------------------------------ state
 
     def read(self) -> None:
-        """Take the modes from the network."""
         self.q[:] = self.network.bodies.laid_out[self.place_q]
         self.v[:] = self.network.bodies.laid_out[self.place_v]
 
     def write(self) -> None:
-        """Give the modes to the network."""
         self.network.bodies.laid_out[self.place_q] = self.q
         self.network.bodies.laid_out[self.place_v] = self.v
 
@@ -898,7 +884,6 @@ class _Moving:
         return float(safe_flight(self.gap0 - stale, *args))
 
     def _clear(self) -> bool:
-        """Whether no point and no height of the guide is closed."""
         open_by = self.gap0 + self.model.traces @ self.q
         return bool(np.min(open_by) > 0.0) and surely_unguided(
             self.model, self.bore, self.state, 0.0

@@ -509,7 +509,6 @@ def _resisting(slopes: Matrix, reach: float) -> Matrix:
 
 @inner
 def _size(u: Vector, reach: float) -> float:
-    """Largest height that lift and tilts make [m]."""
     return abs(u[0]) + reach * np.sqrt(u[1] ** 2 + u[2] ** 2)
 
 

@@ -77,7 +77,6 @@ def _along(par: Any, at: int, points: int, x: float) -> float:
 
 @inner(error_model="numpy")
 def _node(par: Any, work: Any, node: int, middle: float) -> tuple[float, float]:
-    """Pressure and temperature that act at a node."""
     chambers = int(par[0])
     if node < chambers:
         return work[WORK_OF_CHAMBER * node], work[WORK_OF_CHAMBER * node + 1]
@@ -166,7 +165,6 @@ def _between(work: Any, i: int) -> None:
 
 @inner(error_model="numpy")
 def _set_up(par: Any, now: Any, work: Any, inp: Any, middle: float, share: float, h: float) -> None:
-    """Residuals of all chambers and their slopes with the unknowns."""
     chambers, R, cv, cp = int(par[0]), par[5], par[6], par[7]
     size = 2 * chambers
     A = shift(work, WORK_OF_CHAMBER * chambers)
