@@ -120,9 +120,9 @@ class CaseOnHand:
         Parameters
         ----------
         key
-            From the top of the case: ``"network.components.spring.preload"``.
+            ``"network.components.spring.preload"``.
         value
-            As the case file would have it: ``"14 N"``.
+            As in the case file: ``"14 N"``.
 
         Examples
         --------
@@ -518,9 +518,9 @@ def sensitivities(
     Parameters
     ----------
     study
-        Its parameters and measures are meant.
+        With parameters and measures.
     parameters
-        Keys of the case, or some of the parameters of the study.
+        Keys, or some of the study.
     measures
         ``"closing_time"``, ``"seat.peak_force"``.
     level

@@ -98,19 +98,19 @@ class Kind:
     Parameters
     ----------
     name
-        With its article, as an error says it: ``"a length"``.
+        With its article: ``"a length"``.
     unit
         SI unit that klack computes with.
     common
         Units that an error proposes.
     factors
-        All accepted units, for kinds that their dimension does not tell apart.
+        All accepted units, where the dimension does not decide.
     bare
         Whether a number without a unit is accepted.
     smallest, largest
-        Bounds of the size of a value that is not zero, in ``unit``: wider than anything a valve,
-        a building or a laboratory has, and so narrow that areas, volumes, energies and their
-        quotients stay far from the ends of double precision.
+        Of a value that is not zero, in ``unit``: wider than anything in a valve, a building or a
+        laboratory, and so narrow that areas, volumes, energies and their quotients stay far from
+        the ends of double precision.
     """
 
     name: str
@@ -404,15 +404,9 @@ _BASE = {
 def base_powers(unit: str) -> tuple[tuple[str, Fraction], ...]:
     """Powers of the SI base units in a coherent SI unit, ordered by name.
 
-    A number without unit, ``"-"`` or ``"1"``, has none; Hz is 1/s and rad is 1.
+    A number without unit, ``"-"`` or ``"1"``, has none; Hz is 1/s and rad is 1.  InputError for an
+    unknown unit, or one of another size than 1 in base units (``mm``).
 
-    Raises
-    ------
-    InputError
-        If ``unit`` is unknown, or has a size other than 1 in base units (``mm``).
-
-    Examples
-    --------
     >>> [f"{base}^{power}" for base, power in base_powers("N/m")]
     ['kg^1', 's^-2']
     """
@@ -561,20 +555,11 @@ def percent_text(share: float) -> str:
 
 
 def format_si(value: float, unit: str, digits: int = 4) -> str:
-    """Write a number with a decimal prefix, as people read it; :func:`parse_quantity` reads it.
+    """Write a number with a decimal prefix; :func:`parse_quantity` reads it.
 
-    Parameters
-    ----------
-    value
-        In ``unit``.
-    unit
-        SI unit without prefix; ``"-"`` or ``""`` writes the plain number.  Temperatures, rates
-        (1/s), powers (m^2) and what is counted in kg get no prefix.
-    digits
-        Significant digits.
+    ``unit`` is SI without prefix; ``"-"`` or ``""`` writes the plain number.  Temperatures, rates
+    (1/s), powers (m^2) and what is counted in kg get no prefix.  Digits are significant ones.
 
-    Examples
-    --------
     >>> format_si(3.6e-6, "m"), format_si(1.25e9, "N/m"), format_si(0.0, "N")
     ('3.6 um', '1.25 GN/m', '0 N')
     >>> format_si(4.51e-7, "m", 2)

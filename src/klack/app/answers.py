@@ -89,11 +89,11 @@ class Answer:
     levels [dB]
         Of the force, re 1e-12 N^2 s.
     wav, ghost_wav
-        The click now and that of the pinned design, to one full scale; empty if nothing radiates.
+        Clicks now and of the pinned design, to one full scale; empty if nothing radiates.
     scale
         Full scale of both in words.
     doubts
-        Why the numbers are doubtful; shown at once.
+        Shown at once.
     seconds
         That it took.
     run
@@ -185,7 +185,7 @@ class Slider:
     unit
         SI, of ``low``, ``high``, ``start`` and ``step``; empty for a pure number.
     needs_mesh
-        Whether bodies follow from it, so that it does not move here.
+        Whether bodies depend on it, so that it does not move here.
     written
         What the case has there.
     """
@@ -270,15 +270,15 @@ class FormField:
     Parameters
     ----------
     written
-        As the file has it; empty where it does not have the key.
+        As the file has it; else empty.
     kind
         ``"a length"``, with an ``example``; empty for words and plain numbers.
     limits
         ``"> 0"``.
     choices
-        Words that the schema allows; empty where it allows any.
+        Words of the schema; empty for any.
     default
-        What counts where the file does not have the key.
+        Without the key.
     """
 
     key: str
@@ -296,18 +296,10 @@ class FormField:
 
 @dataclass(frozen=True, kw_only=True)
 class Checked:
-    """What the checker says of a text.
+    """What the checker says of a text: an ``error``, empty for a valid one.
 
-    Parameters
-    ----------
-    error
-        Its message; empty for a valid case.
-    kind
-        ``"impact"`` or ``"stroke"``; ``"study"`` of a study in a file of its own.
-    has_objectives
-        Whether its study has something to search for.
-    case
-        Case that a study names.
+    ``kind`` is ``"impact"``, ``"stroke"``, or ``"study"`` of a study in its own file, with the
+    ``case`` that it names; ``has_objectives`` if its study has something to search for.
     """
 
     error: str = ""
@@ -331,14 +323,8 @@ class FaceFacts:
 class PartFacts:
     """What a STEP file or a drawing holds.
 
-    Parameters
-    ----------
-    words
-        Size, volume, solids.
-    faces, solid_faces
-        Of the half section, and of the solid; empty where there is none.
-    not_turned
-        Why there is no half section; empty where there is one.
+    ``words`` tell size, volume, solids; ``faces`` are those of the half section, or empty, and
+    ``not_turned`` says why.
     """
 
     words: str
@@ -349,16 +335,10 @@ class PartFacts:
 
 @dataclass(frozen=True, kw_only=True)
 class Finding:
-    """What one check of a new valve found.
+    """What one check of a new valve found, graded ``"good"``, ``"doubt"`` or ``"error"``.
 
-    Parameters
-    ----------
-    grade
-        ``"good"``, ``"doubt"`` or ``"error"``.
-    what, words, advice
-        Name of the check, what was found, and what to do; no advice for what is good.
-    step
-        Of the guide, where it is changed.
+    ``what`` is its name, ``step`` that of the guide where it is changed; what is good has no
+    ``advice``.
     """
 
     grade: str

@@ -1,8 +1,8 @@
 """Impacts and strokes of bodies that stay, computed again at each move of a slider.
 
-An impact is that of ``klack impact --level reduced`` at the same values, bit for bit: the static
-contact, the pattern of the port, the modes' share and the law are all made again.  A stroke is that
-of ``klack stroke``, with the laws of its stops as they were built.
+An impact is that of ``klack impact --level reduced``, bit for bit: static contact, pattern of the
+port, modes' share and law are made again. A stroke is that of ``klack stroke``, with the laws of
+its stops as built.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence

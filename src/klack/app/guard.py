@@ -74,15 +74,15 @@ class Access:
     Parameters
     ----------
     host
-        Address that the server listens on.
+        Address of the server.
     token
-        In the URL that is printed; gives the session cookie in exchange where no password does.
+        In the printed URL; gives the session cookie where no password does.
     session
-        Value of the cookie.
+        Value of that cookie.
     gate
-        Where other machines may connect: gives the cookie instead of the token.
+        For other machines: gives the cookie instead of the token.
     names
-        Host names by which browsers may call the server.
+        Host names of the server.
     """
 
     host: str

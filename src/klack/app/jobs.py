@@ -65,14 +65,11 @@ class Job:
     name
         Of its folder.
     case, out, study
-        Case file, result and file of the study by their path from the folder; the last is empty if
-        the study stands in the case.
+        Paths from the folder; that of a study in the case is empty.
     started [s]
         Since 1970.
     stage
         What it does now, to a ``fraction``.
-    code
-        Exit code, when it has ended.
     told
         The last of what it printed.
     points

@@ -194,11 +194,11 @@ class _Meeting:
     force [N]
         Estimate from above.
     half_width [m]
-        By Hertz under that force; nan where the shape does not say.
+        By Hertz under that force; nan if unknown.
     radius [m]
         Of the ring of first touch; 0 for a point, nan for a whole zone.
     sharp
-        Where a sharp edge touches; empty for smooth faces.
+        Place of a touching sharp edge, or empty.
     duration [s]
     """
 

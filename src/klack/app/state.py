@@ -202,8 +202,8 @@ class State:
     def explorer(self) -> Worker:
         """A process for a slider page, to be given back.
 
-        At the limit, that of a page that was left ends for it: a browser that reloads leaves one
-        page after another, and each may come back for some seconds.
+        At the limit, that of a left page ends for it: reloading browsers leave one page after
+        another, and each may come back for some seconds.
         """
         if len(self._explorers) >= _MOST_EXPLORERS:
             left = next((one for one, is_left in self._explorers.items() if is_left), None)

@@ -60,10 +60,10 @@ def _outside(named: str) -> InputError:
 
 
 def result_of_study(command: str, study: str, case: str = "") -> str:
-    """Folder of the result of a study: the same for the same files, and of no other ones.
+    """Result folder of a study, unique for its files.
 
-    The parts of the path are joined by dots.  A path that has dots of its own, or another ending,
-    or that is long, is told from others by a hash after two dots, which no plain name has.
+    Dots join the parts of the path. A path with dots, with another ending, or a long one gets a
+    hash after two dots, which no plain name has.
 
     Parameters
     ----------
@@ -138,11 +138,11 @@ class PointsSource:
     Parameters
     ----------
     folder
-        With a record of a study; None before there is one.
+        With a record, if there is one.
     job
-        The latest one that writes, or wrote, the result.
+        The latest one for the result.
     is_live
-        Whether the record is that of a study that runs or was stopped.
+        Whether the study runs or was stopped.
     mark
         Changes with the record.
     """

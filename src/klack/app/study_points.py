@@ -56,14 +56,12 @@ class Front:
     ----------
     ways
         ``"minimise"`` or ``"maximise"``, by the objective.
-    bounds
-        In words.
     points
         By the first objective.
     best
         -1 without a front.
     kept
-        Points that keep all bounds; None where there are none.
+        Points that keep all bounds, if there are bounds.
     """
 
     ways: dict[str, str]

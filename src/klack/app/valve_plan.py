@@ -47,12 +47,12 @@ EXAMPLES = {
 
 @dataclass(frozen=True, kw_only=True)
 class ValvePlan:
-    """All choices of the guide, as they were made; nothing is checked here but their kind.
+    """All choices of the guide; only their kind is checked here.
 
     Parameters
     ----------
     name
-        Of the folder that the case will have.
+        Of the folder for the case.
     step
         Where the guide stands.
     source
@@ -68,7 +68,7 @@ class ValvePlan:
     needle_contact, housing_contact
         Faces that meet.
     held, radiating
-        Faces of the housing; all that are left radiate where none is chosen.
+        Faces of the housing; all others radiate where none is chosen.
     needle_material, housing_material
         Of the library.
     speed, force, gap

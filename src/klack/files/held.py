@@ -1,8 +1,7 @@
-"""A folder held open, so that renaming or replacing it does not affect its entries.
+"""A folder held open, safe from renaming or replacing it.
 
-Another user who may write to a folder above can put a link in a path after a look at it.  So
-the folder is opened once, and everything in it is reached from there by a single name, which is
-never followed if it is a link.
+Another user with write access above can put a link in a path after a look at it. So the folder is
+opened once, and its entries are reached from there by single names, never through links.
 """
 
 import errno

@@ -1,8 +1,7 @@
 """Locks that no other user can hold, released by the system however a process ends.
 
-Whoever may read a file can lock it.  So only files and folders that klack has made for its user
-alone are locked: of a folder of results, a hidden file in it that goes with the lock.  Users do
-not keep each other out.
+Whoever may read a file can lock it. So klack locks only what it has made for its user alone: in a
+folder of results, a hidden file that goes with the lock. Users do not keep each other out.
 
 No process number is stored: one may come again, and containers that share a folder count their
 processes apart.
@@ -34,8 +33,7 @@ def try_lock(handle: int | None) -> bool | None:
     Returns
     -------
     bool or None
-        False if another process has the lock; None where there are no such locks: then no
-        process is kept out, and nothing is known of others.
+        False if another process has the lock; None without locks, when nothing is known of others.
     """
     try:
         import fcntl

@@ -43,8 +43,7 @@ def open_own_file(path: Path | str, flags: int, *, folder: int | None = None) ->
     Raises
     ------
     InputError
-        For a link, a pipe, a folder, a device, a file of another user or one with a second
-        name.
+        For all but a regular file of the caller with a single name.
     """
     try:
         handle = os.open(path, flags | SAFELY, _PRIVATE, dir_fd=folder)
@@ -87,8 +86,8 @@ def require_own_file(path: Path | str, state: os.stat_result) -> None:
 def planted(path: Path) -> str | None:
     """Description of a link or pipe that another user has planted; None if there is none.
 
-    Planted is what stands in a folder that others may write to, neither of the caller nor of
-    the owner of the folder: the rule by which Linux protects links (``protected_symlinks``).
+    Planted is, in a folder that others may write to, what is neither the caller's nor the folder
+    owner's: the rule of Linux's ``protected_symlinks``.
     """
     try:
         state, folder = path.lstat(), path.absolute().parent.stat()

@@ -15,8 +15,8 @@ _STOPS = (signal.SIGINT, signal.SIGTERM)
 def uninterrupted() -> Iterator[None]:
     """Hold back the signals that stop a program until the block has ended, well or not.
 
-    Without effect in other threads than the main one, which no signal interrupts, and on
-    signals that Python leaves to the system.
+    Only in the main thread, the only one that signals interrupt, and not for signals that Python
+    leaves to the system.
 
     A mask of signals would not do: the system gives a masked signal to another thread, and
     Python then raises in the main one all the same.

@@ -2,8 +2,7 @@
 
 New files are written into a hidden folder beside their place (:mod:`klack.files.stage`):
 
-1. they are filled in and synchronised (fsync), since a power cut may otherwise leave the new
-   name with an empty file;
+1. they are filled in and synchronised (fsync), since a power cut may otherwise leave an empty file;
 2. one rename makes them *ready*: from here on they count;
 3. what is replaced moves out of the way, what is new to its place, and the stage goes.
 
@@ -52,9 +51,9 @@ def whole_files(
 ) -> Iterator[Path]:
     """Give a hidden folder whose contents move into ``folder`` when all of it is complete.
 
-    Entries of the same names are replaced, everything else in ``folder`` stays, but for names
-    given to :func:`outdated`.  Folders made for it go again where nothing came into them.  Of
-    two processes that write the same names, the one that ends last stays, as a whole.
+    Entries of the same names are replaced, others stay, but for names given to :func:`outdated`.
+    Folders made for it go if they stay empty. Of two processes with the same names, the last one
+    stays, as a whole.
 
     Parameters
     ----------

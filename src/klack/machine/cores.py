@@ -37,9 +37,9 @@ def side_by_side(tasks: Sequence[Callable[[], _T]], *, at_once: bool = True) -> 
     Parameters
     ----------
     tasks
-        They gain where they spend their time outside of the interpreter: solves, products.
+        Best outside of the interpreter: solves, products.
     at_once
-        Each with one thread of BLAS; if not, one after the other with all that there are.
+        Each with one thread of BLAS; else in turn with all.
     """
     if not at_once:
         return [task() for task in tasks]

@@ -1,8 +1,8 @@
 """Chart described once, and drawn by any renderer.
 
 ``klack.report.interactive`` draws it with plotly for the browser, ``klack.report.printed`` with
-matplotlib for paper.  Curves differ by line style as well as by colour, for copies in black and
-white; the colours are those of Okabe & Ito (2008), safe for colour-blind eyes.
+matplotlib for paper. Curves differ by style and colour, for copies in black and white; the colours
+of Okabe & Ito (2008) are safe for colour-blind eyes.
 """
 
 from collections.abc import Iterable
@@ -179,13 +179,13 @@ class Curve:
     Parameters
     ----------
     label
-        A curve without one has no entry in the legend and no number under the pointer.
+        For the legend and the number under the pointer.
     drawn
         In ``steps`` value k holds from x_k to x_k+1; for an ``area`` the points go round it.
     listed
         False leaves it out of the legend alone.
     names
-        Words for the single points, shown under the pointer with both numbers.
+        Words for points, under the pointer.
     """
 
     x: NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""What a viewer sees of solids in parallel projection, pixel by pixel, cut open by a quarter.
+"""Pixels of solids in parallel projection, cut open by a quarter.
 
 Each pixel has a line of sight, ``x = u a + v b + d f`` with unit vectors to the right, upwards and
 away from the viewer.  It shows the nearest triangle that faces the viewer.  The quarter

@@ -1,8 +1,7 @@
 """Self-contained page: figures, plotly and texts in a single file.
 
-The content security policy of the page forbids to load anything.  The plotly library is packed with
-gzip, which browsers unpack (``DecompressionStream``, in all of them since 2023): 2 instead of 5 MB
-in every report.
+Its content security policy forbids to load anything. Plotly is packed with gzip, which all browsers
+since 2023 unpack (``DecompressionStream``): 2 instead of 5 MB in every report.
 """
 
 import gzip

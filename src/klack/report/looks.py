@@ -95,8 +95,8 @@ def thinned(
 ) -> tuple[Floats, Floats]:
     """Points of a curve that a picture of some columns can show.
 
-    Each column keeps the points with the smallest and the largest ``y``, at their own ``x``, so
-    that no peak is lost and none moves; a curve of few points stays as it is.
+    Each column keeps the points with the smallest and the largest ``y``, so that no peak is lost or
+    moves; short curves stay.
 
     Parameters
     ----------
@@ -104,8 +104,6 @@ def thinned(
         Rising.
     y (n,)
         nan breaks the curve; it is not thinned then.
-    window
-        Only this part of x is kept.
 
     Examples
     --------

@@ -46,8 +46,8 @@ class Sound:
 class Section:
     """A heading with what belongs under it.
 
-    A ``wide`` picture keeps its size on the screen, and has a page of its own at the end of the
-    paper, in landscape if the picture is wider than high.
+    A ``wide`` picture keeps its size on the screen, and has its own page at the end of the paper,
+    in landscape if it is wider than high.
     """
 
     title: str

@@ -1,10 +1,9 @@
 """Columns of a schematic: bodies in the middle, hydraulics to their left, magnets to their right.
 
-Column 0 has the bodies, column 1 what pushes them without fluid, column 2 drivers of coils.
-Column -1 has what joins fluid and bodies: seats, gaps, faces under pressure.  Further left the
-hydraulics follow in steps of one node: column -2 has the chambers that column -1 meets, -3 the
-restrictions and lines to those, and so on to the sources.  So most wires lead from one column to
-the next.
+Column 0 has the bodies, 1 what pushes them without fluid, 2 drivers of coils, -1 what joins fluid
+and bodies: seats, gaps, faces under pressure. Further left the hydraulics follow node by node: -2
+the chambers that column -1 meets, -3 the restrictions and lines to those, and so on to the sources.
+So most wires lead to the next column.
 """
 
 from collections import deque

@@ -107,16 +107,16 @@ def table_of_numbers(numbers: ArrayLike, where: str) -> NDArray[np.float64]:
 
 
 class Batches(ABC):
-    """A search that asks for the values of batches of points and never computes one itself.
+    """A search that asks for values of batches of points and computes none.
 
     Used as ::
 
         for points in search:
             search.tell(*evaluate(points))
 
-    The points depend on nothing but the settings and the values told.  An interrupted search is
-    therefore resumed by a new one with the same settings that is told the stored values first: it
-    asks for the same points, to the bit, with the same versions of NumPy and pymoo.
+    Points depend only on the settings and the values told. So a new search with the same settings
+    resumes an interrupted one when it is told the stored values first: it asks for the same points,
+    to the bit, with the same versions of NumPy and pymoo.
 
     ``objectives`` is the number of columns that will be told.
     """
@@ -146,10 +146,9 @@ class Batches(ABC):
         Parameters
         ----------
         objectives (points, objectives)
-            Numbers to minimise; a row with a value that is not finite is a failed point.
+            To minimise; a row with a value that is not finite is a failed point.
         constraints (points, constraints)
-            Zero or less where kept.  Give them as ratios to their limits, because the violations
-            are summed.
+            Zero or less where kept; as ratios to their limits, because violations are summed.
 
         Raises
         ------

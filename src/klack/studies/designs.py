@@ -1,9 +1,9 @@
 """Designs of points in the unit cube, and how the values of each parameter are spread.
 
-A point is a row, a parameter is a column.  A coordinate is the probability below a value of its
-parameter: 0 and 1 are the ends of a range, 0.5 is its middle or the median of its distribution.  A
-spread maps it to the value (inversion; Devroye 1986, chapter II.2), so that one design serves all.
-Drawn coordinates are above 0 and below 1; the same seed gives the same points.
+Rows are points, columns parameters. A coordinate is the probability below a value: 0 and 1 are the
+ends of a range, 0.5 the middle or the median. A spread maps it to the value (inversion; Devroye
+1986, chapter II.2), so that one design serves all. Drawn coordinates are above 0 and below 1; the
+same seed gives the same points.
 """
 
 from dataclasses import dataclass

@@ -37,10 +37,10 @@ class Front:
 def find_front(objectives: ArrayLike, constraints: ArrayLike | None = None) -> Front:
     """Non-dominated points under constraints; none if all failed.
 
-    Point *a* dominates *b* if ``a_i <= b_i`` in every objective and ``a_i < b_i`` in one.  Among
-    points of which one violates constraints, the smaller sum of violations wins (Deb's rule).  The
-    search divides the points at the median of one objective after the other (Kung, Luccio and
-    Preparata 1975): 100 000 points with 4 objectives take seconds.  Arguments as for
+    Point *a* dominates *b* if ``a_i <= b_i`` in every objective and ``a_i < b_i`` in one. If one
+    violates constraints, the smaller sum of violations wins (Deb's rule). The search divides the
+    points at the median of one objective after the other (Kung, Luccio and Preparata 1975): 100 000
+    points with 4 objectives take seconds. Arguments as for
     :meth:`~klack.studies.batches.Batches.tell`.
 
     Notes

@@ -37,9 +37,9 @@ def achievement(
     objectives (points, objectives)
         Numbers to minimise; nan gives nan.
     reference (objectives,) or (points, objectives)
-        Wished-for value ``z`` of each objective, in its unit.
+        Wished-for ``z`` of each objective.
     scales (objectives,)
-        What counts as one in each objective ``w``, above zero, in its unit: its range on the front.
+        ``w``, above zero: ranges of the objectives on the front.
     sum_weight
         ``rho``, zero or more: which loss in one objective is traded for gains in the others.
 
@@ -140,15 +140,13 @@ class RefinementSettings:
     Parameters
     ----------
     first_step
-        In the unit cube: a part of the range of every parameter, above zero to 0.5.
+        Share of every range, above zero to 0.5.
     last_step
-        A point is done when its step falls below this, above zero.
+        A point is done below this, above zero.
     evaluations
-        Most points to evaluate, all refined points together; no batch is begun that exceeds it.
+        Most in all; no batch is begun that exceeds it.
     seed
         Of the rotated directions.
-    edge
-        As in the search.
     """
 
     first_step: float = 0.05

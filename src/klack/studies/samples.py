@@ -103,9 +103,7 @@ def mean_and_margin(values: ArrayLike, multiple: float) -> Margin:
     Parameters
     ----------
     values (runs,)
-        At least two finite ones.
-    multiple
-        ``k``, of either sign.
+        At least two finite ones; ``multiple`` is ``k``, of either sign.
 
     Notes
     -----
@@ -161,14 +159,11 @@ class SampleQuantile:
     probability
         That part.
     low, high
-        Two values of the sample that enclose the quantile; infinite where the sample is too small
-        to bound it.
-    confidence
-        Asked for.
+        Two values of the sample around the quantile; infinite where it is too small.
     coverage
-        Exact probability that the interval encloses the quantile, at least ``confidence``.
+        Exact probability of the interval, at least ``confidence``, which was asked for.
     low_if_low, high_if_high
-        The ends if the values of all failed runs were below all others, or above all others.
+        The ends if all failed runs were below, or above, all others.
     """
 
     probability: float
@@ -295,12 +290,12 @@ class Exceedance:
     low, high
         Exact two-sided interval from the runs with a value.
     at_most
-        Exact one-sided upper bound.  It is the number to quote where no run exceeded; with
-        ``runs`` of 100 and more it is then close to ``3 / runs`` at 95 %.
+        Exact one-sided upper bound, to quote where no run exceeded; from 100 ``runs`` on it is then
+        close to ``3 / runs`` at 95 %.
     low_if_none, high_if_all
-        The interval of all runs, the failed ones counted as not above the limit (its lower end) and
-        as above it (its upper end).  Far from ``low`` and ``high``, failures leave the result in
-        doubt: failed runs are seldom like the others.
+        Ends of the interval if failed runs count as below the limit (lower end) and above it (upper
+        end). Far from ``low`` and ``high``, failures leave the result in doubt: failed runs are
+        seldom like the others.
     """
 
     exceeded: int

@@ -28,15 +28,13 @@ class SearchSettings:
 
     Parameters
     ----------
-    parameters
-        Dimensions of the unit cube.
     objectives
         1 to 4.
     population
         Points per generation, which is one batch: 8 to 10 000, from 20 with 4 objectives.
     edge
-        Distance that points keep from the faces of the cube, 0 to below 0.5; above zero for
-        parameters whose distribution has no ends.
+        Distance of points from the faces of the cube, 0 to below 0.5; above zero for distributions
+        without ends.
     """
 
     parameters: int

@@ -46,16 +46,16 @@ class SobolIndices:
     first
         Share that a parameter causes alone.  Estimates scatter, also below 0.
     total
-        Share that vanishes when the parameter is known and all others are free: with interactions.
+        Share that vanishes when the parameter is known: with interactions.
     rows
         Base rows that were used.
     discarded
         Base rows with a failed point.  If this is not 0, the indices are those of the region where
         points succeed, and are biased where failures follow a parameter.
     confidence
-        Probability that an interval claims to hold the true index.
+        Claimed by the intervals.
     reason
-        Why estimates or intervals are nan; empty if all are there.
+        Why estimates or intervals are nan.
     """
 
     first: Estimates
@@ -122,8 +122,8 @@ def sobol_indices(
     Parameters
     ----------
     values (base * (parameters + 2),)
-        One measure at the points of :func:`saltelli_design`, in their order; not finite where the
-        point failed.  A base row with such a value is discarded as a whole.
+        At the points of :func:`saltelli_design`; not finite where one failed, which discards its
+        base row.
     resamples
         At least 100.
     seed
@@ -247,13 +247,11 @@ class Screening:
         acts nonlinearly.
     mean_error, mean_size_error, scatter_error
         Their standard errors.
-    effects
-        Number of effects used.
     discarded
-        Number of effects that a failed point took away.  If not 0, the numbers are those of
-        the region where points succeed.
+        Effects lost with failed points. If not 0, the numbers are those of the region where points
+        succeed.
     reasons
-        Why the numbers of a parameter are nan; empty if all are there.
+        Why the numbers of a parameter are nan.
     """
 
     mean: Floats
@@ -348,8 +346,7 @@ def elementary_effects(points: ArrayLike, values: ArrayLike) -> Screening:
     points
         As from :func:`morris_design`.
     values
-        One measure at these points; not finite where the point failed.  The one or two effects
-        next to such a point are discarded, all others are used.
+        At these points; not finite where one failed, which discards the effects next to it.
     """
     x, y = np.asarray(points, dtype=np.float64), np.asarray(values, dtype=np.float64)
     fits = x.ndim == 2 and x.shape[1] and x.shape[0] and x.shape[0] % (x.shape[1] + 1) == 0

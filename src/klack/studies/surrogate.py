@@ -49,11 +49,11 @@ class Surrogate:
     Parameters
     ----------
     points
-        Different points with a value, that it was fitted to.
+        Different points with a value, of the fit.
     failed
-        Points without a value, left out.
+        Points without a value.
     repeated
-        Points that are the same as another one, left out.
+        Points that repeat another one.
     predictivity
         Q2 = 1 - sum of squared residuals / sum of squared deviations from the mean; 1 is perfect,
         0 no better than the mean of all points.  Nan if it was not fitted.
@@ -62,7 +62,7 @@ class Surrogate:
     residuals (points of the study,)
         Value minus its prediction from the other points; nan where there is none.
     reason
-        Why nothing may be derived from it; empty if it may.
+        Why nothing may be derived from it.
     first, total
         Shares of the variance; intervals by :attr:`error`, see
         :func:`~klack.studies.surrogate_model.share_estimates`.

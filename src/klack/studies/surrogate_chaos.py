@@ -43,12 +43,10 @@ class ChaosModel:
     Parameters
     ----------
     terms (terms, parameters)
-        Number of the function of each parameter, see :meth:`SurrogateAxis.functions`; the first
-        term is the constant.
+        Number of each parameter's function, see :meth:`SurrogateAxis.functions`; the first term is
+        constant.
     coefficients (terms,)
         In the unit of the measure.
-    degree
-        Highest number of a function.
     """
 
     axes: tuple[SurrogateAxis, ...]

@@ -52,11 +52,11 @@ class ProcessModel:
     Parameters
     ----------
     columns (points, columns)
-        Of the points that it was fitted to, for each parameter.
+        Of the fitted points, for each parameter.
     lengths (columns,)
         For each parameter.
     noise
-        Variance of noise, of that of the process.
+        Variance relative to the process.
     """
 
     axes: tuple[SurrogateAxis, ...]

@@ -30,21 +30,10 @@ def view_of_source(
     unit_length: float | None = None,
     progress: Progress = silent,
 ) -> "View":
-    """What a page of this source shows.
+    """What a page of this source shows; InputError if it is none, or has nothing to draw.
 
-    Parameters
-    ----------
-    source
-        Case file or name of a shipped case, mesh or STEP file, folder of a result.
-    components
-        Component classes of the user that a case may name.
-    unit_length [m]
-        Of a mesh file that does not name it.
-
-    Raises
-    ------
-    InputError
-        For a source that is none of these, or has nothing to draw.
+    ``source`` is a case file or shipped case, mesh or STEP file, or folder of a result;
+    ``unit_length`` [m] that of a mesh file without it.
     """
     from klack.viewer.drawn import view_of_case, view_of_mesh, view_of_result
 

@@ -33,12 +33,11 @@ class ContactView:
     upper, lower
         Surfaces, written ``needle.tip``.
     ring (n, 3) [m]
-        Points of first touch in their order round their centre; one for a point, none where flat
-        faces touch all at once.
+        Points of first touch round their centre; one for a point, none for flat faces.
     closed
-        The points are a ring; others are drawn one by one.
+        The points are a ring; else drawn one by one.
     gap [m]
-        As shown; nan where it is not known.
+        As shown; nan if unknown.
     """
 
     name: str
@@ -55,17 +54,16 @@ class MotionView:
 
     Parameters
     ----------
-    shapes : int16 array, shape (m, n, dimension)
-        Of full range each: mode shapes of the nodes of the surface, rigid ones first, then the
-        static rests.
+    shapes (m, n, dimension)
+        Modes of surface nodes, of full range each: rigid ones, elastic ones, then static rests.
     scale (m,)
-        Displacement of each shape at 32767, per unit of its amplitude.
+        Displacement at 32767, per unit of amplitude.
     frequency (m,) [Hz]
         0 for a rigid motion; nan for a static rest.
     amplitude (frames, m)
-        Over ``time`` of the page; empty where no impact was computed with these shapes.
+        Over ``time`` of the page; empty without an impact of these shapes.
     stress (n,) [Pa]
-        Von Mises at the highest force; empty where it is not known.
+        Von Mises at the highest force, if known.
     node (n,)
         Nodes of the mesh, rising.
     """
@@ -87,13 +85,13 @@ class BodyView:
     about
         Where it comes from, its mesh.
     held (v,)
-        Vertices of the skin that are held.
+        Held vertices of the skin.
     section (s, 2, 3) [m]
         Sides of elements in the plane y = 0.
     finest [m]
         Shortest side of an element.
     travel (frames,) [m]
-        Displacement along z of the body as a whole over ``time`` of the page; empty without.
+        Of the body as a whole along z, over ``time`` of the page, or empty.
     """
 
     name: str
@@ -135,12 +133,8 @@ class View:
         Short, for a file.
     source
         Which case, mesh or result this is.
-    version
-        Of klack.
     time (frames,) [s]
-        Of the motion; empty without one.
-    schematic
-        SVG of the network; empty without one.
+        Of the motion, or empty.
     notes
         What is not shown, and why.
     """

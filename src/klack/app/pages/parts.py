@@ -47,18 +47,18 @@ _READING = "Reading ... The first part takes longer: the CAD library is loaded."
 
 
 class PartsStep:
-    """Where both bodies come from, beside what was read in them.
+    """Sources of both bodies, beside what was read in them.
 
     What was read is shown in place: fields that are being typed in stay.
 
     Parameters
     ----------
     facts
-        What was read in each body, or why it could not be; nothing of one that is being read.
+        Content of each body, or why it could not be read; nothing while it is read.
     keep
         Keeps another plan.
     read
-        Reads the bodies of the plan, those that are named once more, and shows the facts.
+        Reads bodies, named ones once more, and shows the facts.
     files
         STEP files in the folder.
     """

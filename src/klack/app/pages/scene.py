@@ -29,9 +29,9 @@ class Scene(Element, component="scene_element.js"):  # type: ignore[call-arg]
     address
         Of the payload, from :class:`klack.app.state.Sounds`.
     on_pick, on_hover
-        Called when a face is clicked, and when the pointer comes to another one.
+        For clicks, and the pointer on another face.
     has_panel
-        Whether views, bodies and names of faces stand beside; a click on a name copies it.
+        With views, bodies and names of faces, copied by clicks.
     """
 
     def __init__(

@@ -21,8 +21,8 @@ def content_key(*parts: object) -> str:
     Parameters
     ----------
     parts
-        None, bool, int, float, str, bytes, arrays, sparse rows, tuples, lists, mappings (their
-        order counts, it numbers solids) and dataclasses of these; TypeError for anything else.
+        None, numbers, str, bytes, arrays, sparse rows, tuples, lists, mappings (their order counts,
+        it numbers solids) and dataclasses of these; TypeError for others.
 
     Examples
     --------

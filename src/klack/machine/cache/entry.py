@@ -93,11 +93,8 @@ def write_entry(file: IO[bytes], key: str, entry: Entry) -> None:
 def read_entry(path: Path, key: str) -> Entry:
     """Read the entry of a key.
 
-    Raises
-    ------
-    DamagedEntry
-        If the file is cut off, changed, of another program or of another key, a link or a pipe,
-        or if another user has written it or may do so.
+    DamagedEntry if the file is cut off, changed, of another program or key, a link or a pipe, or
+    may be written by another user.
     """
     with os.fdopen(_open_trusted(path), "rb") as file:
         size = os.fstat(file.fileno()).st_size

@@ -102,8 +102,7 @@ def remembered(
     kind
         What it is, e.g. ``"modes"``.
     parts
-        Everything that the result depends on; see
-        :func:`klack.machine.cache.content.content_key`.
+        All that the result depends on, for :func:`~klack.machine.cache.content.content_key`.
     compute
         Must not warn: a warning would come only once.
     pack, unpack

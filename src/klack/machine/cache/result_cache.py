@@ -48,7 +48,7 @@ class ResultCache:
     folder
         Made when the first result is stored.  Only files named like entries are ever deleted.
     limit [byte]
-        Above it the entries that were not used for the longest time go.
+        Above it the least recently used entries go.
     """
 
     def __init__(self, folder: Path, limit: int) -> None:

@@ -24,13 +24,13 @@ _MODULE = "klack.warming"
 def compiling_ahead(groups: Sequence[str], threads: int | None = None) -> Iterator[None]:
     """Start a second process with the first function of klack that is compiled meanwhile.
 
-    None is started where all functions are in the store, where no store can be used, and on one
-    core.  It ends with this block, also with this process.
+    None starts if all functions are in the store, without a store, and on one core. It ends with
+    this block or process.
 
     Parameters
     ----------
     groups
-        Of :data:`klack.warming.groups.GROUPS`, those first that this process needs last.
+        Of :data:`klack.warming.groups.GROUPS`, in the reverse order of need.
     """
     starting = _Starting(groups)
     if min(threads or available_cores(), available_cores()) < 2:

@@ -51,8 +51,7 @@ def is_trusted(state: os.stat_result) -> bool:
 def bytecode_folder() -> Path | None:
     """Folder for what Python compiles, made if absent; None where another user could write to it.
 
-    Python does not look at the owner of what it runs.  So no other user may enter the folder,
-    nor put another one in its place.
+    Python runs files of any owner, so no other user may enter the folder, nor replace it.
     """
     folder = compiled_folder()
     if folder is None or caller() is None:

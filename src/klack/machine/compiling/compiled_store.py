@@ -1,10 +1,9 @@
-"""The store of machine code: one file for each function, signature and kind of processor.
+"""Store of machine code: a file per function, signature and kind of processor.
 
-numba's own store looks only at the file that a function is written in; code that was compiled
-in from other files would stay when these change.  Here the key holds the code, the constants
-and the options of all functions that a function reaches; a file that only differs in its texts
-keeps the key.  A file is written under another name and renamed, and begins with a checksum: it
-is whole, or it counts as absent.
+numba's own store looks only at the file that a function is written in; code that was compiled in
+from other files would stay when these change. Here the key holds code, constants and options of all
+functions that one reaches, not docstrings or comments. A file is written under another name and
+renamed, and begins with a checksum: it is whole, or counts as absent.
 """
 
 import hashlib

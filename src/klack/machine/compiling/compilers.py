@@ -1,11 +1,11 @@
 """How numba compiles klack's functions: its own steps, with three of their costs left out.
 
-- numba compares the options of the function that it compiles with those of every function that
-  it has compiled before, one option after another: a tenth of all compiling.
-- The garbage collector searches the many objects of a compiler, which live until its end, again
-  and again: another tenth.
-- Inner functions, which only compiled ones call, are optimised and turned into machine code on
-  their own, and again in each function that they are linked into.
+- numba compares the options of a function with those of every one before, one by one: a tenth of
+  all compiling.
+- The garbage collector searches the many objects of a compiler, which live to its end, again and
+  again: another tenth.
+- Inner functions, which only compiled ones call, become machine code on their own, and again in
+  each function that they are linked into.
 """
 
 import gc

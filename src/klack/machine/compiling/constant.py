@@ -11,10 +11,10 @@ __all__ = ["constant", "with_slope_of"]
 def constant(typingctx: Any, number: Any) -> Any:
     """The same number without its derivatives; in compiled code.
 
-    For what is chosen: a first guess, the length of a piece.  A solution has the same derivatives
-    from any guess, and so has a sum over pieces of any length but for the error of the method;
-    where a guess or a length follows from that of the step before, what is left of their own
-    derivatives would grow from step to step without bound.
+    For a first guess, or the length of a piece: a solution has the same derivatives from any guess,
+    and so has a sum over any pieces but for the error of the method. Where a guess or a length
+    follows from the step before, the rest of their own derivatives would grow from step to step
+    without bound.
     """
     from llvmlite import ir
 

@@ -54,8 +54,7 @@ def take_turn(path: Path, done: Path, patience: float = _PATIENCE) -> Turn | Non
     done
         What the process that has the lock writes.
     patience [s]
-        Counts from when the other process took the lock, so that the waits of functions within
-        functions run out together.
+        Since the other process took the lock, so that nested waits end together.
     """
     turn = _try(path)
     end = time.monotonic() + patience - _age(path)
