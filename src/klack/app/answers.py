@@ -278,7 +278,7 @@ class FormField:
     choices
         Words of the schema; empty for any.
     default
-        Without the key.
+        Value without the key.
     """
 
     key: str

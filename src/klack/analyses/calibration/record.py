@@ -194,7 +194,7 @@ _THEORY = "theory/calibration"
 def _of_parameter(
     key: str, name: str, symbol: str, definition: str, digits: int = 0, note: str = ""
 ) -> Measure[CalibratedParameter]:
-    """In the unit of the parameter; ``digits`` 0: as its standard error leaves."""
+    """In the unit of the parameter; ``digits`` 0: as many as its error leaves."""
     return Measure(
         key=key,
         name=name,

@@ -335,7 +335,7 @@ def _ripple(
 
 
 def _lost(strokes: Sequence[HeatedStroke]) -> tuple[str, ...]:
-    """Delays that only some strokes have: else the valve does not open or close."""
+    """Delays that only some strokes have: in others the valve does not open or close."""
     found = []
     for name in ("opening delay", "closing delay"):
         missing = sum(not isfinite(stroke.numbers[name]) for stroke in strokes)

@@ -35,7 +35,7 @@ TRANSFER_MODES = max(TRANSFER_COUNTS)
 """Elastic modes of each body for the comparison."""
 
 LOSS_FACTOR = 0.01
-"""With less damping the notches between two points of the axis would decide."""
+"""With less damping the notches between two points of the axis would decide the comparison."""
 
 
 def sweep_of(case: Case) -> NDArray[np.float64]:

@@ -98,7 +98,7 @@ class LoopMargins:
         Factor on the loop for the limit of stability, the nearest to one.
     gain_frequency [Hz]
     phase_margin [degrees]
-        Lag, or lead below zero, for it.
+        Lag, or lead below zero, for that limit.
     phase_frequency [Hz]
     distance [-]
         Least distance of ``L`` from -1.

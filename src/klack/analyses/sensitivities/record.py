@@ -137,7 +137,7 @@ class SensitivityRecord(CaseRecord):
     Parameters
     ----------
     variant
-        Or level.
+        Of a stroke, or level of an impact.
     share
         Change of each parameter in the check; 0 without.
     runs_time, run_time [s]

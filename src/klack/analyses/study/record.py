@@ -255,7 +255,7 @@ class StudyRecord(CaseRecord):
     study_text
         Of a study in its own file.
     variant
-        Or level, ``"shots"``, or both.
+        Of a stroke; or level of an impact, ``"shots"``, or both.
     design
         In words.
     threads
