@@ -392,7 +392,7 @@ def _at_touch(
 
 
 def _is_corner(profile: Profile, at: np.ndarray) -> bool:
-    """Whether the outline has a convex corner there, off the axis."""
+    """Whether the outline has a convex corner there, off-axis."""
     near = 1e-6 * max(curve.length for curve in profile.curves)
     for before, after in zip(profile.curves[-1:] + profile.curves, profile.curves, strict=False):
         if np.hypot(*(np.array(after.start) - at)) > near or at[0] <= near:

@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _GRAZING = 1e-9
-"""Share of a triangle's area whose projection is a line."""
+"""Share of a triangle's area below which its projection is a line."""
 
 _ON_CUT = 1e-6
 """Distance from the cut [window size] that belongs to what is cut away."""

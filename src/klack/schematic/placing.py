@@ -294,7 +294,7 @@ def _top(block: tuple[list[float], float]) -> float:
 
 
 def _clear(columns: list[Column], i: int, middle: int) -> None:
-    """Move cells down until no different nodes meet head on."""
+    """Move cells down until no wires of different nodes meet head on."""
     column = columns[i]
     inner: Side = "right" if i < middle else "left"
     ends = _ends(columns, i, [i + 1 if i < middle else i - 1])[inner]

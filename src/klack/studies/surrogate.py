@@ -26,7 +26,7 @@ Choice = TypeVar("Choice")
 SurrogateKind = Literal["polynomial-chaos", "gaussian-process"]
 
 GOOD = 0.9
-"""Predictivity that allows conclusions."""
+"""Predictivity from which conclusions are drawn."""
 _GROUPS = 5
 _FEWEST = 20
 _MOST_WITHOUT = 0.1
