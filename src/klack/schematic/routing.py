@@ -63,7 +63,7 @@ def runs_between(
 
 
 def crossings(runs: Sequence[Run]) -> int:
-    """Crossings of different nodes, with tracks in order."""
+    """Crossings of wires of different nodes, with tracks in order."""
     straight = [run.low for run in runs if run.is_straight]
     order = _trunks(runs)
     over = sum(run.low < y < run.high for run in order for y in straight)

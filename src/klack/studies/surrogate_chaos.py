@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 Terms = NDArray[np.int64]
 
 _NORM = 0.75
-"""Exponent q; smaller, fewer terms of several parameters."""
+"""Exponent q of the sets of terms: a smaller one leaves fewer of several parameters."""
 _HIGHEST = 15
 _PATIENCE = 3
 """Degrees without improvement that end the search."""

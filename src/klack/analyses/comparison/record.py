@@ -186,7 +186,7 @@ class ComparedVariant:
         return next((hit for hit in self.impacts if hit.stop == stop and hit.number == 1), None)
 
     def judged(self) -> Iterator[tuple[str, float]]:
-        """Numbers that the verdict rests on, in words, over the scatter."""
+        """Numbers that the verdict rests on, in words, and their differences over the scatter."""
         for stop in ("opening", "seat"):
             impact = self.first(stop)
             if impact is not None:

@@ -364,7 +364,7 @@ def _unfinished(shots: ShotColumns) -> tuple[str, ...]:
 
 
 def shot_doubts(dropped: DroppedShots) -> tuple[str, ...]:
-    """Doubts of single shots, alike ones once; and energy from nowhere."""
+    """Doubts of single shots, like ones once; and energy from nowhere."""
     notes = [f"The centred shot: {doubt}" for doubt in dropped.alone.doubts]
     notes += grouped_doubts(((item.index, item.doubts) for item in dropped.outcomes), "shots")
     residual = float(np.max(np.abs(dropped.shots.energy_residual)))
