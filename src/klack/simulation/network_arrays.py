@@ -185,6 +185,11 @@ class Nodes(NamedTuple):
     slow_gas: int  # 1 where gas leaves and enters the liquid with time constants
     settled: Vector  # table of the fluid at equilibrium: that of ``fluid`` without time constants
     gas: Vector  # numbers of the release
+    order: Index  # of :class:`klack.simulation.mass_balance.Links`, as the following
+    first_link: Index
+    later: Index
+    filled: Index
+    place: Index  # (2 branches,)
 
 
 class NodeState(NamedTuple):
@@ -328,7 +333,7 @@ class NodeTrial(NamedTuple):
     freed: Vector  # way to equilibrium that release goes in the step, first number
     taken: Vector  # the same of absorption
     share: Vector  # free share of the gas that is found
-    matrix: Vector
+    into: Vector  # what flows over each link for a pressure, both ways
 
 
 class FlowTrial(NamedTuple):
@@ -393,7 +398,7 @@ class Scratch(NamedTuple):
 
 
 def scratch_memory(
-    *, interfaces: int, sliders: int, nodes: int, branches: int, ends: int, sums: int
+    *, interfaces: int, sliders: int, nodes: int, links: int, branches: int, ends: int, sums: int
 ) -> Scratch:
     """Memory for a network of these sizes."""
     vectors = np.zeros((len(NodeTrial._fields) - 1, nodes))
@@ -402,7 +407,7 @@ def scratch_memory(
     of_sliders = [*np.zeros((len(SliderTrial._fields) - 1, sliders))]
     of_sliders.append(np.zeros(KEPT_SLIDER * sliders))
     return Scratch(
-        nodes=NodeTrial(*[*vectors, np.zeros(nodes * nodes)]),
+        nodes=NodeTrial(*[*vectors, np.zeros(2 * links + 2)]),
         flows=FlowTrial(*np.zeros((3, branches)), *np.zeros((3, ends))),
         interfaces=InterfaceTrial(**dict(zip(InterfaceTrial._fields, of_interfaces, strict=True))),
         sliders=SliderTrial(**dict(zip(SliderTrial._fields, of_sliders, strict=True))),

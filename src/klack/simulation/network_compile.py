@@ -18,6 +18,7 @@ from klack.network.rows import GROUND, BodyRow, BranchRow, ElementRow, Rows
 from klack.network.step_function import address_of
 from klack.simulation.delay_line import Lines, LineState, compile_lines, start_lines
 from klack.simulation.lasting_laws import settle
+from klack.simulation.mass_balance import find_links
 from klack.simulation.modal_step import (
     FIXED_ROWS,
     ROW,
@@ -441,6 +442,7 @@ def _nodes(
     sizes = [len(node.time) for node in tables]
     volume = np.array([node.volume for node in given[:volumes]], dtype=float)
     gamma = np.zeros((2, max(volumes, 1)))
+    pairs = tuple((node_of[row.a], node_of[row.b]) for row in rows.branches)
     walls = [(node_of[w.node], port_of[w.port], w.area) for w in rows.walls]
     G = bodies.G.reshape(-1, PORTS, PORTS)
     for i, a, area_a in walls:
@@ -449,7 +451,6 @@ def _nodes(
                 gamma[0, i] += area_a * G[FINE, a, b] * area_b
     nodes = Nodes(
         nodes=count,
-        volumes=volumes,
         chambers=sum(node.volume > 0.0 for node in given),
         walls=len(walls),
         ends=len(ends),
@@ -469,6 +470,7 @@ def _nodes(
         slow_gas=int(slow),
         settled=settled,
         gas=gas,
+        **find_links(volumes, pairs)._asdict(),
     )
     mass = volume * rho[:volumes]
     state = NodeState(

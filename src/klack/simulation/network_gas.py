@@ -23,8 +23,8 @@ from klack.hydraulics.gas_release import (
     settled_share,
     share_moved,
 )
-from klack.machine.compiling.jit import inner
 from klack.network.rows import Rows
+from klack.simulation.mass_balance import clear_links, solve_mass_balance
 from klack.simulation.network_arrays import Nodes, NodeState
 from klack.simulation.phase import compiled
 
@@ -37,38 +37,7 @@ __all__ = [
     "pressure_of_mixture",
     "require_chambers",
     "settle_gas",
-    "solve_mass_balance",
 ]
-
-
-@inner(error_model="numpy", _nrt=False, forceinline=True)
-def solve_mass_balance(A: Any, own: Any, r: Any, n: int) -> None:
-    """Gauss without pivoting and without subtracting, ``A`` row by row and its column sums ``own``.
-
-    Off the diagonal ``A`` is below zero, since what leaves a volume fills another; its column sums,
-    what a pressure changes in all volumes together, are above zero.  Pivots follow from these sums
-    (Grassmann, Taksar & Heyman 1985), not from the diagonal, which solves even a wide channel
-    between two almost empty volumes, whose storage is less than the round-off of its flow.
-    """
-    for k in range(n):
-        pivot = own[k]
-        for i in range(k + 1, n):
-            pivot -= A[i * n + k]
-        A[k * n + k] = pivot
-        inverse = 1.0 / pivot
-        share = own[k] * inverse
-        for j in range(k + 1, n):
-            own[j] -= A[k * n + j] * share
-        for i in range(k + 1, n):
-            if A[i * n + k] != 0.0:
-                c = A[i * n + k] * inverse
-                for j in range(k + 1, n):
-                    A[i * n + j] -= c * A[k * n + j]
-                r[i] -= c * r[k]
-    for k in range(n - 1, -1, -1):
-        for j in range(k + 1, n):
-            r[k] -= A[k * n + j] * r[j]
-        r[k] /= A[k * n + k]
 
 
 def require_chambers(rows: Rows) -> None:
@@ -184,25 +153,26 @@ def end_gas(fluid: Any, H: float, accounts: Any) -> None:
 @compiled(_nrt=False, error_model="numpy")
 def _mix(fluid: Any, H: float) -> None:
     nodes, state, trial, branches = fluid.nodes, fluid.state, fluid.trial, fluid.branches
-    n, A, own, y = nodes.volumes, trial.matrix, trial.own, trial.share
+    n, into, own, y = nodes.volumes, trial.into, trial.own, trial.share
     for i in range(n):
         own[i] = state.mass[i]
         y[i] *= state.mass[i]
-        for j in range(n):
-            A[i * n + j] = 0.0
+    clear_links(nodes, into)
     for k in range(branches.rows):
         source, sink, mass = branches.a[k], branches.b[k], H * fluid.flows.mdot[k]
+        place = nodes.place[2 * k + 1]
         if mass < 0.0:
             source, sink, mass = sink, source, -mass
+            place = nodes.place[2 * k]
         if source == sink:
             continue
         if sink < n:
             own[sink] += mass
             if source < n:
-                A[sink * n + source] -= mass
+                into[place] += mass
             else:
                 share, _ = settled_share(nodes.gas, trial.p[source])
                 y[sink] += mass * share
         if source < n and sink < n:
             own[source] -= mass
-    solve_mass_balance(A, own, y, n)
+    solve_mass_balance(nodes, into, own, y)

@@ -7,6 +7,7 @@ import numpy as np
 from klack.hydraulics.fluid_table import fluid_at, pressure_at
 from klack.machine.compiling.jit import inner, njit
 from klack.network.step_function import shift
+from klack.simulation.mass_balance import clear_links, solve_mass_balance
 from klack.simulation.network_arrays import ANSWER, AT_ONCE, FINE, SEEN, STORE, Y1, Step
 from klack.simulation.network_gas import (
     begin_gas,
@@ -14,7 +15,6 @@ from klack.simulation.network_gas import (
     end_gas,
     look_up_mixture,
     pressure_of_mixture,
-    solve_mass_balance,
 )
 from klack.simulation.phase import (
     STATUS_BRANCH,
@@ -148,10 +148,7 @@ def solve_pressures(fluid: Any, S: Any, step: Step, report: Any) -> int:
             return failed_at(step.level, code, STATUS_BRANCH)
         _add_up_ends(fluid, step.H)
         _compare_storage(fluid)
-        if nodes.volumes == 1:
-            r[0] /= trial.own[0]
-        else:
-            solve_mass_balance(trial.matrix, trial.own, r, nodes.volumes)
+        solve_mass_balance(nodes, trial.into, trial.own, r)
         if changes <= nodes.volumes and _cavities_change(fluid, step.H):
             changes += 1
             continue
@@ -280,11 +277,10 @@ def _add_up_volumes(fluid: Any, gamma: Any) -> None:
     """Mass that each volume misses, without flows, and its change with the pressures."""
     nodes, trial = fluid.nodes, fluid.trial
     p, rho, V = trial.p, trial.rho_end, trial.V
+    clear_links(nodes, trial.into)
     for i in range(nodes.volumes):
         V[i] = trial.V_used[i] + gamma[i] * (p[i] - trial.p_used[i])
         trial.r[i] = fluid.state.mass[i] - V[i] * rho[i]
-        for j in range(nodes.volumes):
-            trial.matrix[i * nodes.volumes + j] = 0.0
         trial.stored[i] = V[i] * trial.slope[i] / trial.theta[i]
         trial.own[i] = trial.stored[i] + rho[i] * gamma[i]
     for i in range(nodes.chambers, nodes.volumes):
@@ -298,7 +294,7 @@ def _add_up_branches(fluid: Any, S: Any, step: Step) -> tuple[int, int]:
     """Flows of all branches; the row that failed and its status."""
     trial, branches, flows = fluid.trial, fluid.branches, fluid.flows
     volumes, H = fluid.nodes.volumes, step.H
-    A, own, r = trial.matrix, trial.own, trial.r
+    into, own, r = trial.into, trial.own, trial.r
     seen, end = shift(S, SEEN), shift(S, Y1)
     for k in range(branches.rows):
         status = ask_branch(branches, k, step.t, H, seen, end, trial.p, trial.rho)
@@ -311,8 +307,8 @@ def _add_up_branches(fluid: Any, S: Any, step: Step) -> tuple[int, int]:
         if a < volumes:
             r[a] -= H * flows.mdot[k]
             if b < volumes:
-                A[a * volumes + b] += H * flows.slope_b[k]
-                A[b * volumes + a] -= H * flows.slope_a[k]
+                into[fluid.nodes.place[2 * k]] -= H * flows.slope_b[k]
+                into[fluid.nodes.place[2 * k + 1]] += H * flows.slope_a[k]
             else:
                 own[a] += H * flows.slope_a[k]
         if b < volumes:
@@ -388,12 +384,14 @@ def _fills(fluid: Any, i: int, H: float) -> bool:
 def _compare_storage(fluid: Any) -> None:
     """What a pressure changes in the flows of its volume, relative to the volume."""
     nodes, trial = fluid.nodes, fluid.trial
-    for j in range(nodes.volumes):
-        total = trial.own[j]
-        for i in range(nodes.volumes):
-            if i != j:
-                total -= trial.matrix[i * nodes.volumes + j]
-        trial.balanced[j] = max(total - trial.stored[j], 0.0)
+    balanced, into = trial.balanced, trial.into
+    for i in range(nodes.volumes):
+        balanced[i] = max(trial.own[i] - trial.stored[i], 0.0)
+    for s in range(nodes.volumes):
+        k = nodes.order[s]
+        for e in range(nodes.first_link[s], nodes.first_link[s + 1]):
+            balanced[k] += into[2 * e + 1]
+            balanced[nodes.later[e]] += into[2 * e]
 
 
 @njit(_nrt=False, error_model="numpy", forceinline=True)

@@ -498,6 +498,7 @@ def scratch_of(network: CompiledNetwork, recording: Recording) -> Scratch:
         interfaces=network.interfaces.interfaces,
         sliders=network.sliders.sliders,
         nodes=network.nodes.nodes,
+        links=len(network.nodes.later),
         branches=network.branches.rows,
         ends=network.nodes.ends,
         sums=recording.means.shape[1],

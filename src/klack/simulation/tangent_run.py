@@ -383,6 +383,7 @@ class _Running:
                 interfaces=network.interfaces.interfaces,
                 sliders=network.sliders.sliders,
                 nodes=network.nodes.nodes,
+                links=len(network.nodes.later),
                 branches=network.branches.rows,
                 ends=network.nodes.ends,
                 sums=recorder.recording.means.shape[1],
