@@ -10,7 +10,9 @@ as well.
 
 Pivots need no choice by size, so that the order is one of the structure alone: at each time the
 volume with the fewest links left (minimum degree: Tinney & Walker 1967; George & Liu 1989).  A
-chain, a star or any other tree gets no link by elimination, a ring one for each volume.
+chain, a star or any other tree gets no link by elimination, a ring less than one for each volume.
+Of several volumes with as few the one comes first that has waited longest since its numbers
+changed: a processor need not wait for them, and a chain is eliminated from both its ends.
 """
 
 from functools import lru_cache
@@ -56,14 +58,16 @@ def find_links(volumes: int, pairs: tuple[tuple[int, int], ...]) -> Links:
         if known:
             beside[a].add(b)
             beside[b].add(a)
-    left, order, later = set(range(volumes)), list[int](), list[set[int]]()
+    left, waits = set(range(volumes)), [0] * volumes
+    order, later = list[int](), list[set[int]]()
     while left:
-        k = min(left, key=lambda i: (len(beside[i]), i))
+        k = min(left, key=lambda i: (len(beside[i]), waits[i], i))
         left.remove(k)
         order.append(k)
         later.append(beside[k])
         for i in beside[k]:
             beside[i] = (beside[i] | beside[k]) - {i, k}
+            waits[i] = len(order)
     turn = {k: s for s, k in enumerate(order)}
     lists = [sorted(found, key=turn.__getitem__) for found in later]
     links = [(k, i) for k, found in zip(order, lists, strict=True) for i in found]

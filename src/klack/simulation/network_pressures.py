@@ -147,7 +147,6 @@ def solve_pressures(fluid: Any, S: Any, step: Step, report: Any) -> int:
             report[0], report[1], report[2] = failed, code, step.t
             return failed_at(step.level, code, STATUS_BRANCH)
         _add_up_ends(fluid, step.H)
-        _compare_storage(fluid)
         solve_mass_balance(nodes, trial.into, trial.own, r)
         if changes <= nodes.volumes and _cavities_change(fluid, step.H):
             changes += 1
@@ -282,11 +281,13 @@ def _add_up_volumes(fluid: Any, gamma: Any) -> None:
         V[i] = trial.V_used[i] + gamma[i] * (p[i] - trial.p_used[i])
         trial.r[i] = fluid.state.mass[i] - V[i] * rho[i]
         trial.stored[i] = V[i] * trial.slope[i] / trial.theta[i]
-        trial.own[i] = trial.stored[i] + rho[i] * gamma[i]
+        trial.balanced[i] = rho[i] * gamma[i]
+        trial.own[i] = trial.stored[i] + trial.balanced[i]
     for i in range(nodes.chambers, nodes.volumes):
         if trial.cavity[i] == _OPEN:
             trial.r[i] = _HELD * (nodes.boiling - p[i])
             trial.stored[i] = trial.own[i] = _HELD
+            trial.balanced[i] = 0.0
 
 
 @phase
@@ -294,7 +295,7 @@ def _add_up_branches(fluid: Any, S: Any, step: Step) -> tuple[int, int]:
     """Flows of all branches; the row that failed and its status."""
     trial, branches, flows = fluid.trial, fluid.branches, fluid.flows
     volumes, H = fluid.nodes.volumes, step.H
-    into, own, r = trial.into, trial.own, trial.r
+    into, own, balanced, r = trial.into, trial.own, trial.balanced, trial.r
     seen, end = shift(S, SEEN), shift(S, Y1)
     for k in range(branches.rows):
         status = ask_branch(branches, k, step.t, H, seen, end, trial.p, trial.rho)
@@ -306,6 +307,7 @@ def _add_up_branches(fluid: Any, S: Any, step: Step) -> tuple[int, int]:
         flows.slope_b[k] = branches.outputs[o0 + 2]
         if a < volumes:
             r[a] -= H * flows.mdot[k]
+            balanced[a] += H * flows.slope_a[k]
             if b < volumes:
                 into[fluid.nodes.place[2 * k]] -= H * flows.slope_b[k]
                 into[fluid.nodes.place[2 * k + 1]] += H * flows.slope_a[k]
@@ -313,6 +315,7 @@ def _add_up_branches(fluid: Any, S: Any, step: Step) -> tuple[int, int]:
                 own[a] += H * flows.slope_a[k]
         if b < volumes:
             r[b] += H * flows.mdot[k]
+            balanced[b] -= H * flows.slope_b[k]
             if a >= volumes:
                 own[b] -= H * flows.slope_b[k]
     return -1, 0
@@ -325,8 +328,10 @@ def _add_up_ends(fluid: Any, H: float) -> None:
         i = nodes.end_node[e]
         flows.q[e] = (nodes.density * trial.g[i] - flows.c[e]) / flows.Z[e]
         if i < nodes.volumes:
+            answer = H * nodes.density * (nodes.density / trial.rho_end[i]) / flows.Z[e]
             trial.r[i] -= H * nodes.density * flows.q[e]
-            trial.own[i] += H * nodes.density * (nodes.density / trial.rho_end[i]) / flows.Z[e]
+            trial.balanced[i] += answer
+            trial.own[i] += answer
 
 
 @phase
@@ -378,20 +383,6 @@ def _fills(fluid: Any, i: int, H: float) -> bool:
             net -= nodes.density * q
             size += nodes.density * abs(q)
     return fluid.state.mass[i] + H * net > _BALANCED * H * size
-
-
-@phase
-def _compare_storage(fluid: Any) -> None:
-    """What a pressure changes in the flows of its volume, relative to the volume."""
-    nodes, trial = fluid.nodes, fluid.trial
-    balanced, into = trial.balanced, trial.into
-    for i in range(nodes.volumes):
-        balanced[i] = max(trial.own[i] - trial.stored[i], 0.0)
-    for s in range(nodes.volumes):
-        k = nodes.order[s]
-        for e in range(nodes.first_link[s], nodes.first_link[s + 1]):
-            balanced[k] += into[2 * e + 1]
-            balanced[nodes.later[e]] += into[2 * e]
 
 
 @njit(_nrt=False, error_model="numpy", forceinline=True)
