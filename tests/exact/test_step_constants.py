@@ -5,23 +5,16 @@ Truth: one table.  numba, C, Modelica and MATLAB compute with its values and hol
 Bundles of arrays as bundles of pointers, in compiled code.
 
 Truth: the definition, member by member: the same memory, the same numbers.
-
-The linear equations of the pressures in a step.
-
-Truth: rational arithmetic.  Volumes that hold next to nothing are joined by wide channels: their
-storage is below the round-off of what the channels let through.
 """
 
 import ast
 import importlib
 import re
-from fractions import Fraction
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from draws import each
 from numba import njit
 
 from klack.contact import step_constants
@@ -39,9 +32,8 @@ from klack.exchange.matlab_model import write_matlab
 from klack.exchange.modal_model import ModalModel, Provenance, pair_model
 from klack.exchange.modelica import modelica_text
 from klack.network.rows import FilmRow
-from klack.network.step_function import first, pointers
+from klack.network.step_function import pointers
 from klack.simulation.bodies import fixed_body, rigid_mass_body
-from klack.simulation.mass_balance import find_links, solve_mass_balance
 from klack.verification.one_dimension import one_contact
 
 STEP = 40e-9  # [s]
@@ -205,57 +197,3 @@ def test_members_of_one_type_keep_their_names():
     swap(bundle)
 
     assert (bundle.a[0], bundle.b[0]) == (2.0, 1.0)
-
-
-@njit
-def eliminate(links, into, own, r):
-    solve_mass_balance(pointers(links), first(into), first(own), first(r))
-
-
-def solved(storage, channels, r):
-    """Answer to ``r`` of volumes with these storages, and channels with slopes up and down."""
-    links = find_links(len(storage), tuple(channels))
-    into, own, x = np.zeros(2 * len(links.later) + 2), storage.copy(), r.copy()
-    for n, (up, down) in enumerate(channels.values()):
-        into[links.place[2 * n]] += down
-        into[links.place[2 * n + 1]] += up
-    eliminate(links, into, own, x)
-    return x, links
-
-
-def exactly(storage, channels, r):
-    """Solve by elimination with fractions."""
-    n = len(storage)
-    A = [[Fraction(0)] * n for _ in range(n)]
-    for i, value in enumerate(storage):
-        A[i][i] = Fraction(value)
-    for (a, b), (up, down) in channels.items():
-        A[a][a] += Fraction(up)
-        A[b][a] -= Fraction(up)
-        A[a][b] -= Fraction(down)
-        A[b][b] += Fraction(down)
-    x = [Fraction(value) for value in r]
-    for k in range(n):
-        for i in range(k + 1, n):
-            c = A[i][k] / A[k][k]
-            for j in range(k, n):
-                A[i][j] -= c * A[k][j]
-            x[i] -= c * x[k]
-    for k in reversed(range(n)):
-        x[k] = (x[k] - sum(A[k][j] * x[j] for j in range(k + 1, n))) / A[k][k]
-    return [float(value) for value in x]
-
-
-@each("seed", range(20))
-def test_storage_below_the_round_off_of_the_flow_is_not_lost(seed):
-    rng = np.random.default_rng(seed)
-    n = int(rng.integers(2, 6))
-    storage = 10.0 ** rng.uniform(-40.0, -10.0, n)
-    pairs = [(i, i + 1) for i in range(n - 1)] + [(0, n - 1)] * (n > 2)
-    channels = {pair: 10.0 ** rng.uniform(-16.0, -4.0, 2) for pair in pairs}
-    r = 10.0 ** rng.uniform(-20.0, -10.0, n)
-
-    x, _ = solved(storage, channels, r)
-
-    # no operation subtracts: every one of some n^3 leaves its round-off
-    np.testing.assert_allclose(x, exactly(storage, channels, r), rtol=n**3 * 4e-16)

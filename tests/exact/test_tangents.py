@@ -459,6 +459,7 @@ def supply(displacement, setting, precharge, bore, overlap, wall):
         "bypass": VariableOrifice(lift=[-1e-3, 1e-3], area=[0.0, 2e-7]),
         "switch": VariableOrifice(time=[0.0, 1e-3], area=[0.0, 5e-7]),
         "drain": Orifice(diameter=2e-3),
+        "return": Orifice(diameter=3e-4),  # closes a ring of four volumes
         "tip": tip,
         "under": PressureFace(direction="opening", outer_diameter=tip.sealing_diameter),
         "face": PressureFace(direction="opening", outer_diameter=6e-3),
@@ -466,11 +467,11 @@ def supply(displacement, setting, precharge, bore, overlap, wall):
         "spring": Spring(stiffness=2e6, preload=150.0, damping=20.0),
     }
     joints = [
-        ["pump.b", "ripple.b", "outlet.fluid", "check.a"],
+        ["pump.b", "ripple.b", "outlet.fluid", "check.a", "return.b"],
         ["check.b", "rail.fluid", "relief.a", "gas.fluid", "pipe.a"],
         ["relief.b", "ambient"],
         ["pipe.b", "bend.fluid", "loss.a"],
-        ["loss.b", "room.fluid", "edge.a", "bypass.a", "switch.a", "face.fluid"],
+        ["loss.b", "room.fluid", "edge.a", "bypass.a", "switch.a", "face.fluid", "return.a"],
         ["edge.b", "far.fluid", "bypass.b", "switch.b", "drain.a", "tip.a", "under.fluid"],
         ["drain.b", "tip.b", "ambient"],
         [
