@@ -69,6 +69,15 @@ def _modes(axes: Axes, numbers: Sequence[Number]) -> bool:
     return bool(curves)
 
 
+def _volumes(axes: Axes, numbers: Sequence[Number]) -> bool:
+    curves = _curves(numbers)
+    for (name, points), look in zip(curves.items(), _looks(), strict=False):
+        axes.loglog(*zip(*points, strict=True), label=name, **look)
+    _finish(axes, "volumes added", "time of 2 ms [s]")
+    axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    return bool(curves)
+
+
 def _ratios(axes: Axes, numbers: Sequence[Number]) -> bool:
     own = sorted((n for n in numbers if n.series == "ratio"), key=lambda n: n.value)
     if not own:
@@ -146,6 +155,7 @@ _FIGURES: dict[str, tuple[str | None, Callable[[Axes, Sequence[Number]], bool], 
         "Processor time over degrees of freedom; the fitted exponent in brackets.",
     ),
     "modes": ("modes", _modes, "Time of a step over the number of modes."),
+    "volumes": ("volumes", _volumes, "Time of a wet stroke over the volumes added to it."),
     "ratios": (
         None,
         _ratios,

@@ -19,6 +19,7 @@ BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 LONG = ("accuracy", "big_body", "calculix", "demo", "full_order", "growth", "ngsolve_peer")
 PARTS = (
     *("start_up", "kernel", "modes", "limit", "reduced_peers", "stroke", "many_strokes"),
+    "volumes",
     "stroke_off_axis",
     "reduction",
     "study_workers",

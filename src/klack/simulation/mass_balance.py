@@ -1,18 +1,17 @@
-r"""What the flows of a step and the pressures of its volumes ask of each other, and its solution.
+r"""Linear equations of the mass balances of all volumes, along the links between them.
 
-What a pressure pushes out of a volume fills another.  So the matrix of the mass balances is, beside
-its diagonal, below zero, and the sum of a column is what that pressure changes in all volumes
-together: above zero.  Kept are these sums and, for both ways of every *link* between two volumes,
-what flows into the one for the pressure of the other, as numbers above zero.  Pivots follow from
-them by sums alone (Grassmann, Taksar & Heyman 1985); the diagonal is not formed.  So a wide channel
-between two almost empty volumes, whose storage is less than the round-off of its flow, is solved
-as well.
+What a pressure pushes out of a volume fills another.  Off its diagonal the matrix is below zero,
+and the sum of a column, what that pressure changes in all volumes together, is above zero.  Kept
+are these sums and, for both ways of every *link* between two volumes, what flows into one for the
+pressure of the other, as numbers above zero.  Pivots follow from them by sums alone (Grassmann,
+Taksar & Heyman 1985), without the diagonal: even a wide channel between two almost empty volumes,
+whose storage is less than the round-off of its flow, is solved.
 
-Pivots need no choice by size, so that the order is one of the structure alone: at each time the
-volume with the fewest links left (minimum degree: Tinney & Walker 1967; George & Liu 1989).  A
-chain, a star or any other tree gets no link by elimination, a ring less than one for each volume.
-Of several volumes with as few the one comes first that has waited longest since its numbers
-changed: a processor need not wait for them, and a chain is eliminated from both its ends.
+No pivot is chosen by size, so that the order follows from the structure alone: first the volume
+with the fewest links left (minimum degree: Tinney & Walker 1967; George & Liu 1989).  A tree gets
+no link by elimination, a ring less than one for each volume.  Of volumes with equally few links the
+one that was changed longest ago comes first, for which a processor does not wait: a chain is
+eliminated from both ends.
 """
 
 from functools import lru_cache
@@ -44,13 +43,13 @@ class Links(NamedTuple):
 
 @lru_cache(maxsize=64)
 def find_links(volumes: int, pairs: tuple[tuple[int, int], ...]) -> Links:
-    """Find the order of elimination of so many volumes, once for each structure.
+    """Order of elimination and places of the links, found once for each structure.
 
     Parameters
     ----------
     pairs
-        Of nodes that exchange mass.  One with itself or with another node than those volumes gets
-        the place behind all links, which nothing reads.
+        Of nodes that exchange mass.  A node with itself, or beyond the volumes, has the place
+        behind all links, which nothing reads.
     """
     beside: list[set[int]] = [set() for _ in range(volumes)]
     inside = [a != b and max(a, b) < volumes for a, b in pairs]
@@ -102,14 +101,16 @@ def clear_links(nodes: Any, into: Any) -> None:
 
 @phase
 def solve_mass_balance(nodes: Any, into: Any, own: Any, r: Any) -> None:
-    """Solve for the right-hand side ``r``, in place; ``own``, the sums of the columns, is used up.
+    """Solve in place for the right-hand side ``r``.
 
     Parameters
     ----------
     nodes
         With the fields of :class:`Links`.
     into
-        What flows over each link for a pressure, both ways.
+        What flows over each link for a pressure, both ways; overwritten.
+    own
+        Sums of the columns; overwritten.
     """
     order, first_link, later = nodes.order, nodes.first_link, nodes.later
     fill = 0
