@@ -82,9 +82,9 @@ def support_mobility(
 def mounted(structure: Structure, mount: Mount) -> Structure:
     """The same structure, rigidly held before, on an elastic mount, in its new modes.
 
-    The eigenmodes of the module's equations, nothing neglected. Their damping ratios share the
-    losses of the old modes and the mount by the energy in each (modal strain energy, Johnson &
-    Kienholz 1982), as long as damped modes do not overlap.
+    Its modes are the eigenmodes of the module's equations, nothing neglected. Their damping ratios
+    share the losses of the old modes and the mount by the energy in each (modal strain energy,
+    Johnson & Kienholz 1982), as long as damped modes do not overlap.
     """
     mass, m = moved_mass(structure, mount), len(structure.omega)
     M, K = np.eye(m + 1), np.diag([*structure.omega**2, mount.stiffness])

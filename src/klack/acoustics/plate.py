@@ -129,7 +129,7 @@ def baffled_plate_efficiency(
     (Maidanik 1962, with perimeter ``P``), above it :math:`1/\sqrt{1 - f_c/f}`. Limits are
     :math:`\sqrt{\pi f P/(16 c)}` near coincidence, :math:`4 A (f/c)^2` below the first mode, and 2
     everywhere, joined as in EN 12354-1:2000, annex B. Free edges without a baffle radiate less at
-    low frequencies. Within some decibels.
+    low frequencies. An estimate within some decibels.
 
     Parameters
     ----------

@@ -184,8 +184,8 @@ def force_spectrum(series: TimeSeries, *, high: float, resolution: float | None 
 
     .. math:: \hat F(f) = \frac{1}{2\pi i f} \int \dot F(t)\, e^{-2\pi i f t}\,\mathrm dt
 
-    As :func:`impulse_spectrum` from zero to zero. A force that stays adds ``1/f``; 0 Hz gets the
-    value of the next frequency.
+    Equal to :func:`impulse_spectrum` for a record from zero to zero. A force that stays adds
+    ``1/f``; 0 Hz gets the value of the next frequency.
 
     Parameters
     ----------

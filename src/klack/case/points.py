@@ -91,8 +91,8 @@ class Points:
 def points_of(case: AnyCase, tree: CaseTree, given: GivenPoints) -> Points:
     """Check the keys of points and the units of their values.
 
-    Whether the case allows a value: :func:`checked_parts`. Rejects unknown keys, other kinds,
-    missing units, and lists of different lengths.
+    Whether the case allows a value is checked at the point, see :func:`checked_parts`. Rejects
+    unknown keys, other kinds, missing units, and lists of different lengths.
 
     Parameters
     ----------

@@ -143,7 +143,7 @@ def press(
     q (n,) [m]
         Gaps without forces.
     before (n,) [m]
-        Gaps at the start of a step: forces then do the change of energy as work.
+        Gaps at the start of a step: forces are then those whose work is the change of energy.
     start (n,) [m]
         First guess of the gaps.
     """

@@ -110,7 +110,7 @@ class ContactSpace:
         little later (:attr:`touch`), by about h^2/(50 R) on elements of size h and surfaces of
         relative radius R.
     beyond [m]
-        Smallest gap of the omitted points. While the bodies approach by less, a contact at the rim
+        No omitted point has a smaller gap. While the bodies approach by less, a contact at the rim
         is complete all the same: elements may be wider than the reach.
     entry (nc,) [m]
         Reach from which each point is a candidate.
@@ -327,7 +327,6 @@ def _rule(shape: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 _Entries = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]
-"""Rows, columns and values of a sparse matrix."""
 
 
 class _Sums:
@@ -378,7 +377,6 @@ def _closest_face(mesh: Mesh, surface: Surface, gaps: NDArray[np.float64]) -> ND
 
 
 def _part(surface: Surface, faces: NDArray[np.bool_]) -> Surface:
-    """Return the marked faces of a surface."""
     start, blocks = 0, []
     for block in surface.blocks:
         chosen = block.connectivity[faces[start : start + len(block.connectivity)]]

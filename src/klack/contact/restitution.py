@@ -10,9 +10,9 @@ them.
 
 Times are found inside the records: the impulse since first touch grows like a power ``1 + n`` of
 the time (``n = 1`` for a linear law, 1.5 for Hertz), so three sums of the force give the exponent
-and the instant of touch; backwards, the end. A force that fades out (of rods, in theory without
-end) ends where it crosses the threshold: when the way from there to zero takes more than half the
-time of the fall from ten times the threshold.
+and the instant of touch; backwards, the end. A force that fades out (as of rods, in theory without
+end) ends where it crosses the threshold; it fades out if the way from there to zero takes more
+than half the time of the fall from ten times the threshold.
 """
 
 from dataclasses import dataclass

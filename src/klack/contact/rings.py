@@ -42,7 +42,7 @@ class RingSpace:
     rim (nc,)
         Points with an omitted neighbour, on their ring or beside it.
     beyond [m]
-        Smallest gap of the omitted points.
+        No omitted point has a smaller gap.
     """
 
     section: ContactSpace

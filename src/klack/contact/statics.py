@@ -53,7 +53,6 @@ __all__ = [
 ]
 
 _CHUNK = 64
-"""Right-hand sides solved at once."""
 
 COARSE = 1.5
 """Element size over half width of a contact too coarse to be judged."""

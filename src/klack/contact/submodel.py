@@ -34,7 +34,7 @@ class LocalStiffness:
         Of the least-squares line within ``fit_range``.
     fit_range [N]
     size [m]
-        Up to which from the contact the bodies deform.
+        Distance from the contact within which the bodies deform.
     """
 
     static: StaticContact

@@ -122,5 +122,5 @@ def front_pressure(speed: float, material_a: Material, material_b: Material) -> 
 
 
 def _impedance(material: Material) -> float:
-    """Pressure over speed of a plane wave [Pa s/m]."""
+    """Of a plane wave [Pa s/m]."""
     return sqrt(material.density * (material.lame_lambda + 2.0 * material.shear_modulus))

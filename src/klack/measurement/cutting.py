@@ -126,8 +126,6 @@ def whole_piece(window: Window) -> Piece:
 
 @dataclass
 class _State:
-    """State of the trigger channel up to the last sample."""
-
     dead_time: float
     armed: bool = False
     scanned: float = -np.inf
@@ -136,7 +134,6 @@ class _State:
     pending: list[float] = field(default_factory=list)
 
     def scan(self, series: TimeSeries, sign: float, level: float) -> None:
-        """Continue over the samples not yet scanned."""
         distance = sign * (series.values - level)
         if self.scanned == -np.inf:
             self.margin = _HYSTERESIS * _noise(series.values)
@@ -222,8 +219,8 @@ def onto_axis(piece: Piece, axis: Vector) -> Mapping[str, Vector]:
     """Channels of a piece at the times of an axis, by cubic splines held within their samples.
 
     Samples on the axis stay. Half-way between, white noise keeps about 0.7 of its variance; a
-    straight line would keep half, and blur a touch. The spline alone would overshoot a step by 11
-    %.
+    straight line would keep half, and blur a touch. The spline alone would overshoot a step by
+    11 %.
     """
     count = len(next(iter(piece.values.values())))
     time = piece.start + piece.step * np.arange(count)

@@ -183,7 +183,6 @@ def _lost_3_dB(window: int, step: float) -> float:
 
 
 def _half_window(bandwidth: float, samples: int, step: float) -> int:
-    """Widest window that still has the bandwidth."""
     require_positive("velocity_of: bandwidth", bandwidth, "Hz")
     # the product of window and bandwidth is nearly constant
     guess = max(2, int(1.1 / (bandwidth * step)))

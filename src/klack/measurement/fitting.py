@@ -343,7 +343,6 @@ class _Problem:
         jacobian: NDArray[np.float64],
         scale: float,
     ) -> Generator[Vector, Vector, tuple[Vector, float, NDArray[np.float64]]]:
-        """Fit the free parameters from a good start."""
         z = np.clip(start, 0.0, 1.0)
         r = self.root * ((yield z) - self.data)
         cost = float(r @ r)

@@ -209,7 +209,6 @@ class _Problem:
         return float(np.median(times)) if times else 0.0
 
     def _rows(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Whitened residuals and their derivatives."""
         J: list[NDArray[np.float64]] = []
         r: list[float] = []
 

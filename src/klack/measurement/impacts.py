@@ -91,8 +91,8 @@ def measure_stroke(
 ) -> StrokeMeasures:
     """Read impacts, speeds, restitution, rebound heights and periods off one lift.
 
-    Measured and computed lift are read in the same way, single drops too. Nothing touches: no
-    impacts.
+    Measured and computed lift are read in the same way, single drops too. Without a touch there
+    are no impacts.
 
     Parameters
     ----------
@@ -250,7 +250,6 @@ def _bounce(record: _Record, before: Touch, after: Touch) -> _Ends | None:
 
 
 def _same(time: NDArray[np.float64], flight: Flight) -> bool:
-    """Whether a flight was fitted to these samples."""
     return bool(time[0] == flight.first and time[-1] == flight.last)
 
 

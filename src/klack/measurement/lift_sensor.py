@@ -137,8 +137,8 @@ def trigger_instant(time: Vector, values: Vector, trigger: Trigger, step: float)
     """First instant at which a recorder finds the crossing of a trigger level [s].
 
     A recorder joins samples by straight lines, which cross the level of a bent channel a little
-    aside: 0.1 us for a current sampled every 2.5 us. So is it here, averaged over where the
-    samples may lie.
+    aside: 0.1 us for a current sampled every 2.5 us. The same is done here, averaged over where
+    the samples may lie.
 
     Parameters
     ----------

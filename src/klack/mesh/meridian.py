@@ -45,7 +45,8 @@ def mesh_meridian(profiles: Mapping[str, Profile], sizing: MeshSizing) -> Mesh:
 
     Parameters
     ----------
-    profiles : mapping of solid name to Profile
+    profiles
+        By name of the solid.
     sizing
         Refinements are rings (r, z), or points (0, 0, z) on the axis.
     """

@@ -5,7 +5,7 @@ Turned around the z axis; exact mass properties follow from Green's theorem alon
 
 .. math:: \iint r^m z^n \, dr\, dz = \oint \frac{r^{m+1}}{m+1} z^n \, dz ,
 
-area (m=0), volume 2 pi (m=1), moments of inertia (m=3).
+which gives the area (m=0), the volume over 2 pi (m=1), moments of inertia (m=3).
 """
 
 from dataclasses import dataclass, field

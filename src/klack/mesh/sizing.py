@@ -171,7 +171,8 @@ def element_count(
 ) -> dict[str, float]:
     """Elements that each wanted size causes, by ``"size"``, ``"surfaces.tip"``, ``"contact.size"``.
 
-    0.5 to 1.5 of what netgen makes at a single size; the grading between sizes is left out.
+    The estimate is 0.5 to 1.5 of what netgen makes at a single size; the grading between sizes is
+    left out.
 
     Parameters
     ----------

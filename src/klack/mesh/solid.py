@@ -1,8 +1,8 @@
 """Solid meshes of ten-node tetrahedra from CAD: STEP files and revolved profiles.
 
-Netgen (with OpenCASCADE) makes the mesh, in millimetres here alone. Mid nodes lie on the true
-geometry. Named faces become surfaces; one between two solids of a body becomes a node set of its
-name.
+Netgen (with OpenCASCADE) makes the mesh, in millimetres, which stay inside this package. Mid nodes
+lie on the true geometry. Named faces become surfaces; one between two solids of a body becomes a
+node set of its name.
 """
 
 import re

@@ -195,7 +195,6 @@ def _by_hand() -> str:
 
 
 def _case(text: str, parts: dict[str, str]) -> ValveCase:
-    """Case with its parts in its text."""
     kept = "".join(
         f"  {name}: |\n" + "".join(f"    {line}\n" for line in part.splitlines())
         for name, part in parts.items()

@@ -477,7 +477,7 @@ def _run_shared(
 def _boosted(start: float, time: float) -> float:
     r"""Capacitor [V] after one coil was at it for a time and returned its energy.
 
-    Without iron a damped oscillator, :math:`L\,\mathrm di/\mathrm dt = k U - R i`,
+    Without iron it is a damped oscillator, :math:`L\,\mathrm di/\mathrm dt = k U - R i`,
     :math:`C\,\mathrm dU/\mathrm dt = -k i`: a matrix exponential for each stretch of time.
     """
 

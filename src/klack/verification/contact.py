@@ -294,7 +294,6 @@ def _force_curve(static: StaticContact) -> ComparedCurve:
 
 
 def _pressure_curve(static: StaticContact, radius: float, peak: float) -> ComparedCurve:
-    """Over the radius, at the highest force."""
     order = np.argsort(static.space.points[:, 0])
     place = static.space.points[order, 0]
     near = place < 1.4 * radius

@@ -244,7 +244,6 @@ def _program(voltage: float, **more: float) -> DriveProgram:
 
 
 def _linear() -> list[Check]:
-    """A coil of constant inductance without eddy currents."""
     tau = _INDUCTANCE / 1.0
     rise = run_coil(
         linear_coil(), _program(12.0), resistance=1.0, gap=_GAP, step=20e-9, lift=np.zeros(20001)
@@ -379,7 +378,7 @@ def _eddy() -> list[Check]:
 
 
 def _core() -> Iterator[Check]:
-    """Flux into a solid round core after a step of the mmf."""
+    """Solid round core after a step of the mmf."""
     core = {"conductivity": 2e6, "length": 20e-3, "radius": 2e-3, "permeability": 1000.0}
     tau = _MU0 * 1000.0 * 2e6 * 2e-3**2
     reluctance = 20e-3 / (_MU0 * 1000.0 * pi * 2e-3**2)

@@ -235,7 +235,6 @@ _RITZ_ORDER = (
 _BENDING_ORDER = {1: 19587.12, 2: 50362.64, 4: 137162.74, 8: 343817.26, 16: 564352.88}
 """Circumferential order 1: number of the mode -> frequency [Hz]."""
 _BENDING_TOLERANCE = {1: 2e-6, 2: 4e-6, 4: 1e-5, 8: 5e-5, 16: 1e-4}
-"""Error of the mesh."""
 _OVAL = 543997.25
 """Circumferential order 2, mode 1 [Hz]."""
 

@@ -406,7 +406,7 @@ def _nastran(folder: Path, mesh: Mesh) -> Path:
 
 
 def _fortran(value: float) -> str:
-    """Return the number as ``e21.13e3`` writes it."""
+    """As ``e21.13e3``."""
     mantissa, exponent = f"{np.float64(value):.13E}".split("E")
     return f"{mantissa}E{int(exponent):+04d}".rjust(21)
 

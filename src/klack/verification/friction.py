@@ -146,7 +146,6 @@ def _points() -> Iterator[Check]:
 
 
 def _order() -> Check:
-    """Order of the step, over all bodies."""
     errors = [
         max(
             abs(impact.hit(time, steps=steps).tangential - after)

@@ -88,7 +88,7 @@ class ObliqueImpact:
     centre [m/s]
         Tangential, of the centre.
     spin [rad/s]
-        Across the plane of motion; positive where it rolls on.
+        About the axis across the plane of motion; positive where it rolls on.
     surface [m/s]
         Tangential, of the point of contact.
     normal [m/s]

@@ -76,12 +76,12 @@ def _about(network: Network, **drives: Network) -> tuple[LinearNetwork, Operatin
 
 
 def _near(system: LinearSystem, root: complex, band: float = 1e4) -> complex:
-    """Eigenvalue that is the nearest to a number."""
+    """Nearest eigenvalue."""
     return min([mode.root for mode in modes(system, band)[0]], key=lambda x: abs(x - root))
 
 
 def _root(equation: Callable[[complex], complex], start: complex) -> complex:
-    """Root of an equation by the secant method of SciPy."""
+    """By the secant method of SciPy."""
     find: Any = newton  # its types know real numbers alone
     return complex(find(equation, start, tol=1e-11 * abs(start), maxiter=200))
 
@@ -94,7 +94,6 @@ def _needle() -> dict[str, Component]:
 
 
 def _oscillator() -> list[Check]:
-    """Mass, spring and dashpot."""
     linear, point, _ = _about(_network(_needle(), [["needle.tip", "spring.end"]]))
     root = modes(linear.system, 1e4)[0][0].root
     decay, omega = DAMPING / (2.0 * MASS), sqrt(RATE / MASS)

@@ -293,7 +293,7 @@ def _ring(
 
 
 def _frequency(run: CellRun, rest: float) -> float:
-    """Frequency [Hz] of the closed end, by its falls through rest."""
+    """Of the closed end [Hz], by its falls through rest."""
     y, t = run.total[:, 1] - rest, run.time
     k = np.flatnonzero((y[:-1] > 0.0) & (y[1:] <= 0.0))
     zeros = t[k] + (t[1] - t[0]) * y[k] / (y[k] - y[k + 1])

@@ -52,7 +52,7 @@ def checks() -> list[Check]:
 
 
 def _period(time: np.ndarray, values: np.ndarray) -> float:
-    """Mean period from all rising crossings of zero after the start."""
+    """Mean, by rising crossings of zero."""
     at = crossings(time, values)
     return float((at[-1] - at[0]) / (len(at) - 1))
 

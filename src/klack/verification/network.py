@@ -472,7 +472,6 @@ class _BareFilm(Component):
     series: Compliance = 0.0
 
     def add_rows(self, rows: Rows) -> None:
-        """Add one interface."""
         rows.interface(
             upper=rows.port("upper"),
             lower=rows.port("lower"),

@@ -219,7 +219,6 @@ class _Pair(NamedTuple):
 
 
 def _loops(above: _Part, below: _Part, energy: float) -> SoftPair:
-    """Loops of two soft bodies up to an energy [J]."""
     reach = _REACH
     while True:
         with _pressed(above, below, energy, reach) as (static, C, upper, lower):

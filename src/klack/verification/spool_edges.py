@@ -495,7 +495,6 @@ def _edge(*notches: Notch, **changed: object) -> SpoolEdge:
 
 
 def _flow(part: SpoolEdge, y: float, drop: float = 30e5) -> float:
-    """Volume flow at the displacement ``y`` [m^3/s]."""
     return (
         float(branch_step(branch_of(part), 20e5 + drop, 20e5, ports=(y, y, 0.0, 0.0))[0]) / RHO_OIL
     )

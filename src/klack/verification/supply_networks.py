@@ -425,14 +425,13 @@ def _share(p: float) -> float:
 
 
 def _volume(p: float, share: float) -> float:
-    """Volume per mass of fluid."""
+    """Per mass of fluid."""
     liquid = CONDENSED / float(LIQUID.vapour.density_with(LIQUID.liquid, p)[0])
     gas = FRACTION * share * (REFERENCE / p) ** (1.0 / EXPONENT)
     return (liquid + gas) / (CONDENSED + FRACTION * AIR)
 
 
 def _pressure(volume: float, share: float) -> float:
-    """Pressure at a volume per mass of fluid."""
     ends = log(1e2), log(1e8)
     return exp(brentq(lambda x: _volume(exp(x), share) - volume, *ends, xtol=1e-13))
 

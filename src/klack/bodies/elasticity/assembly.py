@@ -36,11 +36,6 @@ def assemble(mesh: Mesh, materials: Mapping[str, Material]) -> tuple[csr_array, 
 
     Rejects a solid without material and an element that is inverted or too distorted.
 
-    Parameters
-    ----------
-    materials
-        Material of each solid, by the name of the solid.
-
     Returns
     -------
     K (n_dof, n_dof) [N/m]
@@ -180,7 +175,6 @@ def _check_radius(mesh: Mesh) -> None:
 
 
 def _check_jacobians(mesh: Mesh, block: ElementBlock, jacobians: NDArray[np.float64]) -> None:
-    """Refuse inverted and badly distorted elements."""
     low, high = jacobians.T
     scale = np.maximum(np.abs(low), np.abs(high))
     ratio = low / np.where(scale > 0, scale, 1.0)

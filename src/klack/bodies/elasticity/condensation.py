@@ -21,7 +21,6 @@ from klack.bodies.elasticity.factorization import Factorization
 __all__ = ["Halves", "condensation_memory", "condensed_inverse", "reached_rows"]
 
 _CHUNK = 64
-"""Right-hand sides solved at once."""
 
 _REACHED = 0.4
 """Share of the unknowns that loads on a contact face reach at most (0.06 to 0.34 measured)."""
@@ -91,7 +90,6 @@ def condensed_inverse(
 def _of_groups(
     factor: Factorization, groups: Sequence[csr_array], largest: int
 ) -> NDArray[np.float64]:
-    """Condense to loads that stand group by group."""
     ends = np.cumsum([0, *(G.shape[0] for G in groups)])
     own = [slice(*pair) for pair in pairwise(ends.tolist())]
     C = np.empty((ends[-1],) * 2)
@@ -123,7 +121,6 @@ def _of_groups(
 
 
 def _within(outer: slice, inner: slice) -> slice:
-    """Part of a slice."""
     return slice(outer.start + inner.start, min(outer.start + inner.stop, outer.stop))
 
 

@@ -266,7 +266,6 @@ def mode_memory(body: VibratingBody, count: int) -> float:
 
 
 def _require_memory(body: VibratingBody, count: int) -> None:
-    """Refuse more modes than fit."""
     require_memory(
         f"eigenmodes of body '{body.name}': count",
         mode_memory(body, count),
@@ -337,7 +336,7 @@ def _check_request(body: VibratingBody, count: int | None, max_frequency: float 
 
 
 def _dense(body: VibratingBody) -> NDArray[np.float64]:
-    """All elastic modes of a small body."""
+    """For small bodies."""
     free = body.free
     K = body.K[free][:, free].toarray()
     M = body.M[free][:, free].toarray()

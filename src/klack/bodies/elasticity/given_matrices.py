@@ -251,8 +251,6 @@ def body_of_matrices(
 
 
 class _Namer:
-    """Names of degrees of freedom."""
-
     def __init__(self, numbers: NDArray[np.int64], dimension: int) -> None:
         self._numbers, self._letters = numbers, "rz" if dimension == 2 else "xyz"
 

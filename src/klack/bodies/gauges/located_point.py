@@ -161,7 +161,6 @@ def _nearest(mesh: Mesh, near: LocatedPoint, point: Floats) -> LocatedPoint:
 
 
 def _inside(family: str, xi: Floats) -> Floats:
-    """Reference coordinates moved into the element."""
     if family.startswith(("quad", "hex")):
         return np.clip(xi, -1.0, 1.0)
     if family.startswith("wedge"):

@@ -35,8 +35,6 @@ _K_ENTRIES, _M_ENTRIES = (8, 9), (33, 21)
 
 @dataclass(frozen=True, slots=True)
 class _Records:
-    """Words of the file, read record by record."""
-
     path: Path
     words: NDArray[np.int32]
 
@@ -134,7 +132,6 @@ def _check_kind(path: Path, head: NDArray[np.int32]) -> None:
 def _places(
     file: _Records, head: NDArray[np.int32], at: int
 ) -> tuple[RowPlaces, NDArray[np.bool_]]:
-    """Node and direction of each equation, and which are constrained."""
     labels, at = file.integers(at)
     nodes, _ = file.integers(at)
     counts, at = file.integers(_long(head, _MARKS))

@@ -61,8 +61,6 @@ class _Budget:
 
 @dataclass(frozen=True)
 class _Element:
-    """A tagged piece of the file."""
-
     kind: int
     data: memoryview
 

@@ -58,8 +58,6 @@ Texts = dict[str, tuple[str, ...]]
 
 @dataclass
 class _Block:
-    """A matrix while it is read."""
-
     name: str
     line: int
     sizes: tuple[int, ...] = ()
@@ -72,7 +70,6 @@ class _Block:
     widths: set[int] = field(default_factory=set)
 
     def add(self, numbers: Sequence[float]) -> None:
-        """Take one line of numbers."""
         if self.rows == 0:
             self.first = len(numbers)
         else:
@@ -82,7 +79,6 @@ class _Block:
 
     @property
     def numbers(self) -> NDArray[np.float64]:
-        """All numbers, line by line."""
         return np.frombuffer(self.values, dtype=np.float64)
 
 
@@ -174,7 +170,6 @@ def _blocks(path: Path, text: Iterable[str]) -> tuple[list[_Block], Texts]:
 
 
 def _title(line: str) -> tuple[str, tuple[int, ...]] | None:
-    """Name and sizes of the matrix that a line announces."""
     named = _NAME.match(line)
     if named:
         sizes = re.findall(r"\d+", named["sizes"])[:2]

@@ -36,7 +36,6 @@ class _Punched:
     parts: list[NDArray[np.float64]] = field(default_factory=list)
 
     def flush(self, where: str) -> None:
-        """Convert the words to numbers."""
         if not self.words:
             return
         values = numbers_in(b" ".join(self.words))
@@ -69,7 +68,6 @@ def read_nastran_pch(path: Path, name: str | None, role: Role | None) -> SystemM
 
 
 def _names(data: bytes) -> list[str]:
-    """Names of the matrices, from their headings."""
     result = []
     at = -1
     while (at := data.find(b"DMIG", at + 1)) >= 0:
@@ -146,7 +144,6 @@ def _append(place: str, matrix: _Punched, column: tuple[bytes, bytes], fields: l
 
 
 def _check(place: str, name: str, again: bool, words: list[bytes]) -> None:
-    """Form and type of a matrix from its heading."""
     try:
         form, kind = int(words[2]), int(words[3])
     except (IndexError, ValueError):

@@ -224,7 +224,6 @@ class _KrylovSpace:
 
     @property
     def basis(self) -> NDArray[np.float64]:
-        """Q, shape (n_dof, size)."""
         return self._store[:, : self.size]
 
     @property
@@ -233,7 +232,6 @@ class _KrylovSpace:
         return not self.pending.shape[1]
 
     def grow(self, blocks: int) -> None:
-        """Add Krylov blocks of one vector per port."""
         for _ in range(blocks):
             if self.exhausted:
                 return

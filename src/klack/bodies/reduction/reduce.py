@@ -53,8 +53,6 @@ def reduce_body(
 
     Parameters
     ----------
-    correction
-        See the module text.
     damping
         Rigid modes stay undamped.
     modes_pool
@@ -143,7 +141,6 @@ def _no_modes(body: ElasticBody) -> Modes:
 
 
 def _patterns(body: ElasticBody, ports: Sequence[Port]) -> NDArray[np.float64]:
-    """Load patterns side by side, shape (n_dof, n_ports)."""
     where = f"reduction of body '{body.name}': ports"
     names = [port.name for port in ports]
     if not names or len(set(names)) < len(names):

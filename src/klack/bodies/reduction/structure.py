@@ -235,8 +235,6 @@ class _Part:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Group:
-    """One named surface and its integrals."""
-
     name: str
     parts: tuple[_Part, ...]
     gram: NDArray[np.float64]

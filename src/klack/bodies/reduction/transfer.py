@@ -39,7 +39,7 @@ class TransferComparison:
     Parameters
     ----------
     frequencies (n,) [Hz]
-    labels, k
+    labels (k,)
     curves (k, n) [m/N]
     level_deviations (k, n) [dB]
         Against the first curve.

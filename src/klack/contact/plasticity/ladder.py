@@ -207,7 +207,6 @@ class YieldingContact:
         return bool(outgrown)
 
     def _accept(self, found: "_Trial", active: NDArray[np.bool_]) -> None:
-        """Take a state into the history."""
         check_state(
             self.space,
             found.approach,

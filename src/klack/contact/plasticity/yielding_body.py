@@ -77,7 +77,7 @@ class Answer:
     along (nz, nc) [m/N]
         Of w per contact force.
     residual [-]
-        Forces out of balance over the plastic ones; at their begin over a thousandth of the
+        Forces out of balance over the plastic ones; where these begin, over a thousandth of the
         contact force of a point.
     """
 
@@ -113,7 +113,6 @@ class YieldingBody:
         self.states = [PlasticState.none(block.volume.size) for block in self.zone.points]
 
     def _choose(self) -> None:
-        """Condense onto the elements within the radius."""
         one = self._body
         near = one.elements_near(self._place, self._radius)
         beyond = one.elements_near(self._place, np.inf) & ~near

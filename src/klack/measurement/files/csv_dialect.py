@@ -69,7 +69,6 @@ class Dialect:
         return _COMMENTS.replace(self.separator, "") if self.separator else _COMMENTS
 
     def __str__(self) -> str:
-        """Description as text."""
         return f"{_NAMES[self.separator]}, decimal {'point' if self.decimal == '.' else 'comma'}"
 
 
@@ -100,7 +99,6 @@ def encoding_of(head: bytes) -> str:
 
 
 def _cells(line: str, separator: str) -> list[str]:
-    """Cells of a line without their quotes."""
     cells = line.split(separator) if separator else line.split()
     return [cell.strip().strip('"').strip() for cell in cells]
 

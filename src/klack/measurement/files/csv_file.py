@@ -452,7 +452,6 @@ def _complete_lines(raw: bytes, cut: bool) -> list[bytes]:
 
 
 def _lines_at(data: NDArray[np.uint8], first: int, last: int) -> list[str]:
-    """Complete lines between two bytes."""
     if data.size <= _HEAD:
         return []
     lines = data[first:last].tobytes().splitlines()[1:]

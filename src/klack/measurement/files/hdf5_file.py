@@ -164,7 +164,6 @@ def _attributes(stored: Mapping[str, Any]) -> dict[str, str | float]:
 
 
 def _plain(value: Any) -> str | float | None:
-    """Text or number, or None for anything else."""
     if isinstance(value, bytes):
         return value.decode("utf-8", "replace")[:_LONGEST_TEXT]
     if isinstance(value, str):

@@ -127,13 +127,10 @@ class StoredGroup:
 
 
 _Clock = tuple[StoredArray, str]
-"""A stored time and its unit."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Line:
-    """One channel of a stored array."""
-
     array: StoredArray
     line: int
     axis: int
@@ -397,7 +394,6 @@ def _time_of(
 
 
 def _step(file: str, name: str, about: Mapping[str, str | float]) -> float | None:
-    """Step [s] from a step or a rate among the attributes."""
     for keys, is_rate in ((_STEPS, False), (_RATES, True)):
         for key in keys:
             value = about.get(key)

@@ -1,7 +1,7 @@
 """Universal files: sets 58 and 58b of real values over time, read through pyuff.
 
-It names the kind of its values, in SI or in a unit written as text. Sets are read one at a time;
-the last one stays in memory.
+A universal file names the kind of its values, in SI or in a unit written as text. Sets are read
+one at a time; the last one stays in memory.
 """
 
 from contextlib import AbstractContextManager
