@@ -237,9 +237,7 @@ class Receiver(Protocol):
     def at(self, s: Complexes) -> ReceiverResponse:
         """Return mobility and transfers at ``s`` (k,) [1/s].
 
-        Raises
-        ------
-        InputError
-            Outside the measured frequencies; off the axis, where only measured values exist.
+        Where only measured values exist, it rejects frequencies beyond them and an ``s`` that has
+        a real part.
         """
         ...

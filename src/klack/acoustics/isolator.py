@@ -161,10 +161,8 @@ class MeasuredIsolator:
 def measured_frequency(name: str, known: Vector, s: Complexes) -> Vector:
     """Frequencies [Hz] of ``s``, shape (k,), where measured values are asked for.
 
-    Raises
-    ------
-    InputError
-        Off the axis of frequency, and outside the measured range: nothing is extrapolated.
+    Nothing is extrapolated: rejects frequencies outside the measured range, and an ``s`` that has
+    a real part.
     """
     refuse_if(
         bool(np.any(s.real != 0.0)),

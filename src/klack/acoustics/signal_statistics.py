@@ -145,7 +145,7 @@ def fast_square(pressure: TimeSeries, *, periodic: bool = False) -> NDArray[np.f
     pressure [Pa]
         A-weighted where the level is to be.
     periodic
-        Whether the record has gone on like this for ever; else there was silence before.
+        Whether the record repeats what was before it; else there was silence.
     """
     stays = exp(-pressure.step / FAST)
     square = pressure.values**2
