@@ -23,8 +23,8 @@ class Chamber(Component):
     .. math:: \frac{dm}{dt} = \sum \dot m, \qquad V \varrho(p) = m, \qquad
               V = V_0 + \sum_i A_i y_i
 
-    The state is the *mass*, which nothing makes drift, while the usual ``dp/dt = K/V (sum Q -
-    dV/dt)`` loses mass whenever ``K`` changes in a step (gas, vapour).  Walls are
+    The state is the *mass*, so nothing drifts, while the usual ``dp/dt = K/V (sum Q - dV/dt)``
+    loses mass whenever ``K`` changes in a step, as with gas and vapour.  Walls are
     :class:`~klack.hydraulics.pressure_face.PressureFace`.  The hydraulic spring on a face is ``K
     A^2/V``, 1e6 to 1e8 N/m in a valve.
 

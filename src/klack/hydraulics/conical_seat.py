@@ -374,7 +374,7 @@ class ConicalSeat(OpeningComponent):
         return side, self.acting_area(0.0), float(self.contour.edge_point)
 
     def _check_faces(self, rows: Rows) -> None:
-        """Reject faces with another diameter, from which the correction would start."""
+        """Reject faces whose diameter is not the one that the correction counts from."""
         seal = self.sealing_diameter
         for port in ("a", "b"):
             at_tip = port == self.tip_side

@@ -1,7 +1,7 @@
 r"""Fluid that a compliant part holds at a node: its volume, and the energy that fills it.
 
-It holds the volume ``V(p)``, not falling with the pressure, and stores ``U(p)`` with ``dU = (p -
-p_amb) dV``; with the compression of the fluid mass and energy are
+The part holds the volume ``V(p)``, not falling with the pressure, and stores ``U(p)`` with ``dU =
+(p - p_amb) dV``; with the compression of the fluid mass and energy are
 
 .. math:: m = \varrho(p)\,V(p), \qquad E = m\,g(p) - (p - p_{amb})\,V + U, \qquad dE = g\,dm ,
 

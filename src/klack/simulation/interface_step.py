@@ -154,8 +154,8 @@ def solve_interface(
         Gap and compression at the end.
     hint : int
     contact_loss, film_loss : float [J]
-        A compression that relaxes in the open contact loses to the film, or, without one, to the
-        contact.
+        The loss of a compression that relaxes in the open contact belongs to the film, or, without
+        one, to the contact.
     """
     z0 = g0 + e0
     if cubic == 0.0 and linear == 0.0:

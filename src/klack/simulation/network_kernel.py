@@ -430,8 +430,8 @@ def _act(
 ) -> int:
     """Modes, contacts and films over one step, or over all sub-steps of a macro step.
 
-    A step that may meet a touch, a release or a film that begins to cavitate is cut there.
-    Returns also ``STATUS_FORCES`` where contacts do not settle in a fine step.
+    A step that may meet a touch, a release or a film that begins to cavitate is cut there.  Returns
+    a status: ``STATUS_FORCES`` where contacts do not settle in a fine step.
     """
     bodies, contacts, sliding = loop.bodies, loop.contacts, loop.sliding
     move = first or not whole

@@ -211,7 +211,7 @@ def guess_forces(bodies: Any) -> None:
 
 @phase
 def guess_rise(bodies: Any, ratio: float) -> None:
-    """Forces rise as in the last step, ``1/ratio`` times as long; 0 for a fine step: no rise."""
+    """Forces rise as in the last step; this one is ``ratio`` times as long, 0 if fine: no rise."""
     S = bodies.at
     for i in range(row_length(bodies)):
         rise = ratio * (S[RISE + i] + S[RISE_MISSED + i])
