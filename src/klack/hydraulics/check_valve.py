@@ -42,11 +42,10 @@ class CheckValve(OpeningComponent):
     .. math:: A = A_l + (A_1 - A_l)\,s, \qquad
               s = \frac{(p_a - p_b) - p_c}{p_1 - p_c}\ \text{within}\ 0 \dots 1
 
-    with the flow of an orifice of that area.  The spring holds the poppet shut up to the cracking
-    pressure ``p_c`` and lets it lift in proportion beyond; from ``p_1`` on it is fully open.  Flow
-    and pressure drop always have the same sign, so the valve only dissipates.  The area is not
-    rounded where it begins: the flow would have a double zero there, from which no static
-    equilibrium of a closed volume behind the valve is found.
+    with the flow of an orifice of that area: shut up to the cracking pressure ``p_c``, fully open
+    from ``p_1`` on.  Flow and pressure drop have the same sign, so the valve only dissipates.  The
+    area is not rounded where it begins: the flow would have a double zero there, from which no
+    static equilibrium of a closed volume behind the valve is found.
 
     Limits: no inertia of the poppet, no impact and no chatter; for these take a ``rigid-mass`` with
     ``seat``, ``pressure-face``, ``spring`` and ``end-stop``.  Pressures of the spring are

@@ -116,15 +116,15 @@ class ConicalSeat(OpeningComponent):
     .. math:: A(x) = \min_{P, Q}\ \pi (r_P + r_Q)\,|PQ|, \qquad h = \frac{A}{\pi d_s}, \qquad
               |p_a - p_b| = a Q + b Q^2
 
-    ``P`` on the contour of the needle, ``Q`` on the seat between both of its ends, ``x`` the lift,
+    with ``P`` on the contour of the needle, ``Q`` on the seat between its ends, the lift ``x``, and
     ``A`` at most the area of the bore at the lower end; ``a`` and ``b`` are those of a ``seat``.
-    The tip of the needle is blunter than the seat and the shank above the edge is steeper, so that
-    the edge seals: sharp, with a chamfer, or rounded.  While it lifts, the narrowest section moves
-    from the edge to the upper end of the seat, or to its lower end and the tip of the needle.
+    The tip is blunter than the seat and the shank is steeper, so that the edge seals: sharp, with a
+    chamfer, or rounded.  With the lift the narrowest section moves from the edge to the upper end
+    of the seat, or to its lower end and the tip.
 
-    The channel ``acting diameter`` is that of the needle at the narrowest section: there the
-    pressure steps from one side to the other.  Closed it is the sealing diameter, which the
-    ``pressure-face`` of both sides take; it is 0 where the bore is the narrowest section.
+    The channel ``acting diameter`` is that of the needle at the narrowest section, where the
+    pressure steps: closed the sealing diameter, which the ``pressure-face`` of both sides take, and
+    0 where the bore is narrowest.
 
     With ``tip_side`` the pressure faces follow: the seat adds to their force, of constant area,
 

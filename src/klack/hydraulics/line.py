@@ -53,15 +53,15 @@ class Line(Component):
     lumps between pieces that meet in junctions.  Where the pressure between two segments would fall
     below that of vapour, a cavity opens there and collapses later (discrete vapour cavities).
 
-    Two segments damp every mode of a line that is open at one end, and the odd ones of a closed
-    line; oils of 50 mm^2/s and more want 4 to 8, cavities a segment for each place.
+    Two segments damp every mode of a line open at one end, and the odd ones of a closed line; oils
+    of 50 mm^2/s and more need 4 to 8, cavities a segment for each place.
 
     Limits: one sound speed and density, those at ``pressure`` (steps of some 10 bar change them by
-    a few per cent, free gas by far more: a run in which the pressure at an end makes more than 10 %
-    of either says so, with both speeds); laminar friction, which fits transients of ms from rest
-    also above Re = 2300, but for ``turbulent``, whose memory is that of laminar flow as well; bends
-    and fittings are a pressure-loss.  A line needs a chamber, a junction or a pressure at each end;
-    a junction alone closes it.
+    a few per cent, free gas by far more; a run warns where the pressure at an end changes either by
+    more than 10 %); laminar friction, which fits transients of ms from rest also above Re = 2300,
+    but for ``turbulent``, whose memory is that of laminar flow as well; bends and fittings are a
+    pressure-loss.  A line needs a chamber, a junction or a pressure at each end; a junction alone
+    closes it.
     Sources: Wylie & Streeter 1993, ch. 1 (speed in a thin-walled tube that may lengthen), 3 and 8;
     Krus et al. (transmission-line modelling); Kagawa et al. 1983.
     """

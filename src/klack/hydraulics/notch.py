@@ -22,10 +22,10 @@ Beyond the edge of the land, each strip of the triangular notch has the shortest
 bottom: with ``q`` from 0 at a flank to 1 in the middle ``(x + L q) sin(be)``, and ``sqrt(x^2 + t^2
 q^2)`` where ``q < x L/t^2``.
 
-Limits: the surface of the spool is plane across a notch, ``b`` small against the diameter; the
-edges are sharp; both areas are those of a quasi-steady flow, in series only as the smaller one.
-Sources: elementary geometry, derived here; the subject is that of Borghi, Milani & Paoluzzi,
-Int. J. Fluid Power 6 (2005) no. 2, which was not read.
+Limits: the surface of the spool is plane across a notch, ``b`` small against the diameter; sharp
+edges; quasi-steady flow, through the smaller one of both areas only.
+Sources: elementary geometry; Borghi, Milani & Paoluzzi, Int. J. Fluid Power 6 (2005) no. 2, on the
+same subject, was not read.
 """
 
 from math import atan, log, log1p, pi, sqrt

@@ -20,9 +20,9 @@ square of this ratio: a leakage that depends on the gap, and pulls.  The field a
 :func:`~klack.magnetics.air_gap.edges_beside_wall` with its correction for round cores; the part of
 it that both poles send to the yoke together is the slot of Carter.
 
-The coil itself: with a current density ``J`` in the window and a radial field ``~1/r`` the axial
-field is ``n I f(r)``, ``f = ln(r/r_i)/ln(r_o/r_i) - (r - r_c)/(r_o - r_c)`` (the second term only
-within the coil).  Along ``z`` the field of the gap falls by ``V g(r)``, ``g = 1 - ln(r/r_i)/
+With a current density ``J`` in the window and a radial field ``~1/r`` the axial field of the coil
+is ``n I f(r)``, ``f = ln(r/r_i)/ln(r_o/r_i) - (r - r_c)/(r_o - r_c)`` (the second term only within
+the coil).  Along ``z`` the field of the gap falls by ``V g(r)``, ``g = 1 - ln(r/r_i)/
 ln(r_o/r_i)``.  Their co-energy, :math:`\tfrac12 L I^2 + c\,I V`, is that of one more flux tube
 beside the gap with a share of the turns.
 """

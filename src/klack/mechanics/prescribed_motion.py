@@ -35,9 +35,8 @@ class PrescribedMotion(Component):
     another program.
 
     The force that the motion needs is recorded as ``<component> drive force``, positive along +z;
-    its work is the supply ``<component> motion`` of the energy balance, negative while the body is
-    pushed along.  Displacements are exact at the end of every step, and in between the speed is
-    constant.
+    its work is the supply ``<component> motion``, negative while the body is pushed along.
+    Displacements are exact at the end of every step, with a constant speed in between.
 
     Limits: no mass, so the force is that of its surroundings alone; an end stop or friction may
     join it to a body that can move, not to the ground.  The check of strokes before a run does not

@@ -12,12 +12,11 @@ pointers to ``float64``.
              branch: ``mdot, dmdot/dp_a, dmdot/dp_b | forces | next state | books``
 ===========  =====================================================================================
 
-``t`` [s] is the start of the step and ``h`` [s] its length; ``y0`` and ``y1`` [m] are the
-displacements of a port at both ends of the step, along +z.  A force [N] is the mean over the step,
-positive along +z, *on the body*: the work done on the body is exactly ``F (y1 - y0)``.  Pressures
-[Pa] are absolute, densities [kg/m^3] belong to them, both as they *act in the step*: between its
-middle and its end, implicit; the mass flow ``mdot`` [kg/s], the mean over the step, runs from a to
-b.
+The step begins at ``t`` [s] and is ``h`` [s] long; ``y0`` and ``y1`` [m] are the displacements of a
+port along +z at its ends.  A force [N] is the mean over the step, positive along +z, *on the body*:
+the work on the body is exactly ``F (y1 - y0)``.  Pressures [Pa] are absolute and, like their
+densities [kg/m^3], those that *act in the step*: between its middle and its end, implicit.  The
+mass flow ``mdot`` [kg/s], the mean over the step, runs from a to b.
 
 Energies [J]: a *store* is held at the end of the step; a *supply* came in from outside during it; a
 *loss* was turned into heat.  An element must satisfy, to round-off, ``sum F (y1 - y0) + change of

@@ -1,8 +1,8 @@
 r"""One time step of an interface: contact and squeeze film, parallel, in series with a compliance.
 
 With a constant force ``F`` over a step the modes move exactly, so the gap between the bodies ends
-at ``g1 = g_free + G F`` and the work taken from them is exactly ``-F (g1 - g0)``.  All laws act on
-the gap ``z = g + e`` between the surfaces; ``e`` is the compression of a massless series compliance
+at ``g1 = g_free + G F`` and the work taken from them is exactly ``-F (g1 - g0)``.  Laws act on the
+gap ``z = g + e`` between the surfaces, with the compression ``e`` of a massless series compliance
 ``D``.  Contact force, film force and compression are discrete gradients (Gonzalez 1996):
 
 .. math::
@@ -14,19 +14,17 @@ with the film impulse ``Pi(z) = cubic/(2 x^2) + linear ln(1/x)``, ``x = max(z, 0
 
 .. math:: -F (g_1 - g_0) = \Delta V + \Delta\frac{e^2}{2D} + \text{contact loss} + \text{film loss}
 
-for every step size, and no loss is negative.  All of it is one equation for ``z1``, whose left side
+for every step size, without negative losses.  This is one equation for ``z1``, whose left side
 rises with a slope of 1 or more.
 
 ``theta`` is 1/2 (second order, no loss) while the contact is closed.  While it is open, the
 compliance relaxes through the film with the time constant ``D c``; where that is below half a step,
-1/2 would let ``e`` change its sign in every step.  ``theta = 1 - D c / h`` is the smallest
-value that does not; without a film it is 1, and a compression left at release vanishes with its
-energy counted as a loss.
+``theta = 1 - D c / h`` is the smallest value with which ``e`` does not change its sign in every
+step.  Without a film it is 1, and a compression left at release becomes a loss.
 
-At first touch the film ends while the contact begins, and what only the film had compressed is
-lost: ``theta`` is 1 in the step after it.  With 1/2 this share of ``e`` would change its sign in
-every step of the contact, and end in the rebound with one sign or the other.  That one step is of
-order 1.
+At first touch what only the film had compressed is lost: ``theta`` is 1 in the step after it, which
+is of order 1.  With 1/2 this share of ``e`` would change its sign in every step of the contact, and
+end in the rebound with one sign or the other.
 """
 
 from math import log

@@ -28,7 +28,7 @@ class GasOrifice(RestrictionComponent):
     or the diameter or area, of which ``discharge`` acts as an ideal nozzle.  In the last thousandth
     of the pressure ratio the flow is laminar.
 
-    Positive flow runs from a to b; reversed, it has the same law.
+    Positive flow runs from a to b, reversed by the same law.
 
     Limits: quasi-steady, no heat exchange: the enthalpy passes unchanged.  Reference density of dry
     air, 1.1884 kg/m^3; the standard has 1.185 kg/m^3 of air with 65 % humidity (0.3 %).  For
