@@ -1,4 +1,4 @@
-"""How every command of an analysis ends: result, report, tables, JSON, exit."""
+"""End of every analysis command: result, report, tables, JSON, exit."""
 
 import sys
 from collections.abc import Callable, Iterator

@@ -1,4 +1,4 @@
-"""Incomplete results: failed levels of an impact next to those that ran."""
+"""Incomplete results: failed levels beside those that ran."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager

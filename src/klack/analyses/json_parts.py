@@ -1,4 +1,4 @@
-"""Objects of JSON, each described once: keys, types, meanings and values."""
+"""Objects of JSON, each described once."""
 
 from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property

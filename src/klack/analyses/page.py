@@ -1,4 +1,4 @@
-"""Common parts of reports and of tables beside them."""
+"""Common parts of reports."""
 
 import csv
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""What describes a sample: mean, standard deviation, quantiles."""
+"""Statistics of a sample."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass

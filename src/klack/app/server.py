@@ -1,4 +1,4 @@
-"""Server of ``klack app``: pages, sounds and reports, behind the guard."""
+"""Server of ``klack app``."""
 
 import asyncio
 import socket

@@ -1,4 +1,4 @@
-"""Bodies for the pages, in their own process: scenes of cases, results, STEP files."""
+"""Bodies for the pages, in their own process."""
 
 import gzip
 import json

@@ -1,4 +1,4 @@
-"""Shared by all pages: the folder, its runs, the reading process, sounds."""
+"""State of all pages."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Study files as text: checked with their case, and made from choices."""
+"""Study files as text."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""Parts of a schematic in px: boxes, labels, symbols of strokes, wires."""
+"""Parts of a schematic, in px."""
 
 from dataclasses import dataclass, replace
 from functools import lru_cache

@@ -1,4 +1,4 @@
-"""Evolutionary search of the unit cube with one to four objectives, in batches."""
+"""Evolutionary search with one to four objectives, in batches."""
 
 import warnings
 from collections.abc import Iterator

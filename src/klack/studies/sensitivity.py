@@ -1,4 +1,4 @@
-"""Dependence of a measure on parameters: shares of variance, and screening."""
+"""Variance shares and screening of parameters."""
 
 from dataclasses import dataclass
 

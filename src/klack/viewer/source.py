@@ -1,4 +1,4 @@
-"""What a user names: a case, a mesh or CAD file, or the folder of a result."""
+"""Sources of a page: a case, a mesh or CAD file, or a result."""
 
 from collections.abc import Iterable
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What a page shows: bodies as triangles, where they touch, and how they move."""
+"""Content of a page: bodies, contacts and motion."""
 
 import json
 import re

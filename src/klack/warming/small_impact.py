@@ -1,4 +1,4 @@
-"""Smallest impacts with the types of real ones, without a mesh."""
+"""Smallest impacts with real types, without a mesh."""
 
 from dataclasses import replace
 from math import inf

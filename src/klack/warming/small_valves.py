@@ -1,4 +1,4 @@
-"""Smallest valves with one of everything, on the axis and in three dimensions."""
+"""Smallest valves with one of everything."""
 
 from pathlib import Path
 from typing import Literal

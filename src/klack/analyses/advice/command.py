@@ -1,4 +1,4 @@
-"""``klack advise``: mesh sizes, modes and steps for a target, from measured convergence."""
+"""Command ``klack advise``."""
 
 import os
 from pathlib import Path

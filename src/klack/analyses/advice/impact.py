@@ -1,4 +1,4 @@
-"""``klack advise`` for one impact: runs that differ in mesh, modes or step alone."""
+"""``klack advise`` for one impact."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

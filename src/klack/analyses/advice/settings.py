@@ -1,4 +1,4 @@
-"""Settings that are made finer or coarser together: sizes, layers, modes, steps."""
+"""Settings that are made finer or coarser together."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""``klack calibrate``: fit chosen numbers of a valve to measured strokes."""
+"""Command ``klack calibrate``."""
 
 from pathlib import Path
 from typing import Annotated

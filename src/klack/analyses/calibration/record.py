@@ -1,4 +1,4 @@
-"""Record of ``klack calibrate``: parameters with their uncertainty."""
+"""Record of ``klack calibrate``."""
 
 from dataclasses import dataclass
 from operator import attrgetter

@@ -1,4 +1,4 @@
-"""``klack calibrate``: fit chosen numbers of a valve to measured strokes."""
+"""``klack calibrate``: fit parameters of a valve to measured strokes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

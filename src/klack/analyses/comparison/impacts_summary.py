@@ -1,4 +1,4 @@
-"""Measures and summary of an impact beside measured pulses."""
+"""Measures and summary of an impact beside pulses."""
 
 from collections.abc import Iterator
 

@@ -1,4 +1,4 @@
-"""Measures and summary of shots beside measured drops."""
+"""Measures and summary of shots beside drops."""
 
 from collections.abc import Iterator
 from math import isfinite

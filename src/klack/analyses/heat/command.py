@@ -1,4 +1,4 @@
-"""``klack heat``: warm-up of a valve stroke by stroke."""
+"""Command ``klack heat``."""
 
 from pathlib import Path
 from typing import Annotated

@@ -1,4 +1,4 @@
-"""Record of a warm-up, or of strokes at soak temperatures."""
+"""Record of ``klack heat``."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""``klack heat``: strokes at temperatures, and the heat network between them."""
+"""``klack heat``: strokes at temperatures, and heat network between them."""
 
 import json
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""``klack impact``: one dry impact at one or several levels."""
+"""Command ``klack impact``."""
 
 from pathlib import Path
 from typing import Annotated

@@ -1,4 +1,4 @@
-"""Figures of an impact report, with the units of the workshop: us, N, um, kHz."""
+"""Figures of an impact report, in workshop units: us, N, um, kHz."""
 
 from dataclasses import replace
 from math import ceil, floor

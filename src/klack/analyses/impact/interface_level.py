@@ -1,4 +1,4 @@
-"""Interface level of a case: both bodies as modes, the contact point by point."""
+"""Interface level of a case."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""One impact at one level: lumped, or reduced in its variants."""
+"""Lumped and reduced levels."""
 
 from collections.abc import Mapping
 from dataclasses import replace

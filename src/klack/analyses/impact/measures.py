@@ -1,4 +1,4 @@
-"""Measures of a level of an impact, and of the difference of two levels."""
+"""Measures of a level, and of the difference of two."""
 
 from math import isfinite
 from operator import attrgetter

@@ -1,4 +1,4 @@
-"""Record of an impact study, without the solver."""
+"""Record of an impact study."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace

@@ -1,4 +1,4 @@
-"""``klack impact``: one dry impact at the requested levels."""
+"""``klack impact``: one dry impact at requested levels."""
 
 import warnings
 from collections.abc import Mapping, Sequence

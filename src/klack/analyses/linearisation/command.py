@@ -1,4 +1,4 @@
-"""``klack linearise``: the linear state space of a valve about its operating point."""
+"""Command ``klack linearise``."""
 
 from pathlib import Path
 from typing import Annotated, Literal

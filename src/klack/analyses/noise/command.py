@@ -1,4 +1,4 @@
-"""``klack noise``: from the force of the impacts to the sound, for one or two designs."""
+"""Command ``klack noise``."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Measures of noise: of a design, a stop and a body."""
+"""Measures of noise."""
 
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Record of a noise study, from force to click."""
+"""Record of a noise study."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""Forces and bodies for a noise study, from stored results or cases."""
+"""Forces and bodies for a noise study."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

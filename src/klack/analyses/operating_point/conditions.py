@@ -1,4 +1,4 @@
-"""Conditions of an operating point, and what a sweep changes."""
+"""Conditions of operating points, and sweeps."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

@@ -1,4 +1,4 @@
-"""Quantities of an operating point, and its residuals."""
+"""Quantities of an operating point."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

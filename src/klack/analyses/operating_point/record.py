@@ -1,4 +1,4 @@
-"""Record of operating points along no, one or two swept quantities."""
+"""Record of operating points."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""``klack reduce``: bodies to reduced bodies, with their transfer functions."""
+"""Command ``klack reduce``."""
 
 from pathlib import Path
 

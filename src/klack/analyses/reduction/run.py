@@ -1,4 +1,4 @@
-"""``klack reduce``: both bodies reduced at their contact, and how far up they can be trusted."""
+"""``klack reduce``: both bodies reduced at their contact, and limits of trust."""
 
 import csv
 from collections.abc import Mapping

@@ -1,1 +1,1 @@
-"""Derivatives of the measures of a stroke with its parameters."""
+"""Derivatives of measures with parameters."""

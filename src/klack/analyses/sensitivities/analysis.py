@@ -1,4 +1,4 @@
-"""Derivatives of a stroke for scripts and terminals; nothing is stored."""
+"""Derivatives for scripts and terminals; nothing is stored."""
 
 from collections.abc import Iterator, Mapping
 from operator import itemgetter

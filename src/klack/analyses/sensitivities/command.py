@@ -1,4 +1,4 @@
-"""``klack sensitivities``: derivatives of the measures of a stroke with its parameters."""
+"""Command ``klack sensitivities``."""
 
 from typing import Annotated
 

@@ -1,4 +1,4 @@
-"""Record of ``klack sensitivities``: derivatives of measures, and how far they hold."""
+"""Record of ``klack sensitivities``."""
 
 from dataclasses import dataclass
 

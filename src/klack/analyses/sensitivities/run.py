@@ -1,4 +1,4 @@
-"""``klack sensitivities``: derivatives of the measures of a stroke with its parameters."""
+"""Derivatives of a stroke by exact tangents."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

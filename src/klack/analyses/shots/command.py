@@ -1,4 +1,4 @@
-"""``klack shots``: many drops or strokes of one valve, each a little different."""
+"""Command ``klack shots``."""
 
 from typing import TYPE_CHECKING, Annotated
 

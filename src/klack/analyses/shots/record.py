@@ -1,4 +1,4 @@
-"""Record of ``klack shots``: drops in rows, and the centred drop."""
+"""Record of ``klack shots``."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""``klack shots``: many drops of one valve, each a little different, and the centred one."""
+"""``klack shots``: many drops of one valve, and the centred one."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

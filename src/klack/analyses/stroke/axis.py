@@ -1,4 +1,4 @@
-"""Axis of a needle in three dimensions: at each touch, and in figures."""
+"""Axis of a needle in three dimensions."""
 
 from dataclasses import dataclass
 

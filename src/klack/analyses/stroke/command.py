@@ -1,4 +1,4 @@
-"""``klack stroke``: one actuation of a whole valve."""
+"""Command ``klack stroke``."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated

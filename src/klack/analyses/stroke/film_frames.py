@@ -1,4 +1,4 @@
-"""Animated pressure in sectors of squeeze films at first impacts."""
+"""Animated film pressure at first impacts."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -1,4 +1,4 @@
-"""Record of a stroke study: a valve in several variants."""
+"""Record of a stroke study."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

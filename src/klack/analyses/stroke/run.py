@@ -1,4 +1,4 @@
-"""``klack stroke``: one actuation in the requested variants."""
+"""``klack stroke``: one actuation in requested variants."""
 
 import warnings
 from collections import defaultdict

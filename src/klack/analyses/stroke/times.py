@@ -1,4 +1,4 @@
-"""When a valve opens and closes: passing 10, 50 and 90 % of its lift, and touching its stops."""
+"""Times of opening and closing."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""One stroke of many: where it starts, and its numbers."""
+"""One stroke of many."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Record of ``klack shots`` of a whole valve, in rows."""
+"""Record of ``klack shots`` of a whole valve."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""``klack shots`` of a whole valve: strokes in three dimensions, and the centred one."""
+"""``klack shots`` of a whole valve, in three dimensions."""
 
 import pickle
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""Scatter of many strokes: intervals, ratios, correlations; and in words."""
+"""Scatter of many strokes."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""``klack study`` and ``klack optimise``: a case at many points of its parameter space."""
+"""Commands ``klack study`` and ``klack optimise``."""
 
 import os
 from contextlib import contextmanager

@@ -1,4 +1,4 @@
-"""Content of a study's report before its layout."""
+"""Content of a study's report."""
 
 from collections.abc import Sequence
 from math import isfinite, nan

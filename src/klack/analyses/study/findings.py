@@ -1,4 +1,4 @@
-"""Findings from all points: sensitivities, missed bounds, surrogates."""
+"""Findings from all points of a study."""
 
 from collections.abc import Sequence
 

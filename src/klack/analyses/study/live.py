@@ -1,4 +1,4 @@
-"""What a study shows while it runs: pace, points on disk, page of its search."""
+"""What a study shows while it runs."""
 
 from collections.abc import Callable
 from contextlib import suppress

@@ -1,4 +1,4 @@
-"""A case as form and text, both ways, with the checker's messages."""
+"""Editor of a case, as form and text."""
 
 import asyncio
 import json

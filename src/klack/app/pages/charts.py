@@ -1,4 +1,4 @@
-"""Charts of answers as data for Plotly, and the page that compares two results."""
+"""Charts of answers, and the page that compares two results."""
 
 import asyncio
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""Parts of every page: bar, text, buttons, fields, tables, and errors in words."""
+"""Parts of every page."""
 
 import asyncio
 from collections.abc import Awaitable, Callable, Iterator, Mapping

@@ -1,4 +1,4 @@
-"""A new study of a case: parameters, measures, number of points."""
+"""Page for a new study of a case."""
 
 import asyncio
 from collections.abc import Mapping

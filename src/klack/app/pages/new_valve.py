@@ -1,4 +1,4 @@
-"""Guide for a new valve: parts, faces, materials, motion, checks, case file."""
+"""Guide for a new valve."""
 
 import asyncio
 from collections.abc import Callable, Mapping

@@ -1,4 +1,4 @@
-"""Bodies in three dimensions on a page: the component of ``klack show``."""
+"""Bodies in three dimensions on a page."""
 
 import asyncio
 from collections.abc import Callable, Mapping

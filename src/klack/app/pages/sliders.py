@@ -1,4 +1,4 @@
-"""Sliders: force, motion, bands and sound of the stored bodies."""
+"""Page with sliders: force, motion, bands and sound of stored bodies."""
 
 import asyncio
 from collections.abc import Mapping

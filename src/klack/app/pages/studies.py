@@ -1,4 +1,4 @@
-"""A study on pages: above its text, and the page of its points."""
+"""Pages of a study."""
 
 import asyncio
 import time
