@@ -229,7 +229,6 @@ def _step_rows(content: StepContent) -> Iterator[Row]:
 
 
 def _box(part: StepPart) -> str:
-    """Box around a part, along each axis."""
     spans = zip("xyz", part.low, part.high, strict=True)
     return ", ".join(f"{axis} {_range(np.array([low, high]))}" for axis, low, high in spans)
 
@@ -318,7 +317,6 @@ def _fmu_rows(fmu: FmuDescription) -> Iterator[Row]:
 
 
 def _around(mesh: Mesh, nodes: np.ndarray) -> str:
-    """Height and distance from the axis of some nodes."""
     points = mesh.points[nodes]
     radius = points[:, 0] if mesh.dimension == 2 else np.hypot(points[:, 0], points[:, 1])
     return f"z {_range(points[:, -1])}, r {_range(radius)}"

@@ -84,7 +84,6 @@ def _unread(_: Any) -> Value:
 
 
 def _under(key: str, of: Any) -> Value:
-    """Value of a key or attribute."""
     value: Value = of[key] if isinstance(of, Mapping) else getattr(of, key)
     return value
 

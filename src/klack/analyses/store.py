@@ -129,7 +129,6 @@ def stored_format(folder: Path) -> str:
 
 
 def _open(path: Path) -> dict[str, Any]:
-    """Attributes of a store."""
     _require_plain_files(path)
     try:
         return _described(path / "zarr.json")["attributes"]
@@ -306,7 +305,6 @@ def _words_checksum(values: Mapping[str, Any], order: list[str]) -> int:
 
 
 def _described(file: Path) -> dict[str, Any]:
-    """Description of a node."""
     about = json.loads(file.read_text(encoding="utf-8"))
     known = isinstance(about, dict) and isinstance(about.get("attributes"), dict)
     if not known or about.get("zarr_format") != 3:

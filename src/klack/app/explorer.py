@@ -525,11 +525,9 @@ class _Impacts:
         self._near = {name: NearLoads() for name in self._bodies.pools}
 
     def close(self) -> None:
-        """Free the factorisations."""
         self._bodies.close()
 
     def at(self, case: Case) -> _Computed:
-        """One impact."""
         study = self._study(case, certify=False)
         level = study.levels[self.run]
         source = impact_sources(study, (self.run,), case)[0]
@@ -577,7 +575,6 @@ class _Strokes:
         """Nothing has to be freed."""
 
     def at(self, case: ValveCase) -> _Computed:
-        """One stroke."""
         network = filled_network(case, self._valve.reduced, self._valve.laws)
         valve = replace(self._valve, case=case, network=network)
         roles = find_roles(case, network)

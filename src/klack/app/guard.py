@@ -273,7 +273,6 @@ class Guard:
         )
 
     async def _login(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Form for the password, and its answer."""
         query = parse_qs(scope.get("query_string", b"").decode("latin-1"))
         target = _local(query.get("next", ["/"])[0])
         if scope["method"] == "GET":

@@ -166,7 +166,6 @@ def _add_refusal(state: State) -> None:
 
 
 def _nothing(state: State, request: Request, error: KlackError) -> Response:
-    """A page that tells why there is none."""
     with Client(ui.page(""), request=request) as client, frame(state, _NOTHING):
         dead_end(error)
     return client.build_response(request, 404)

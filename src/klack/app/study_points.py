@@ -265,7 +265,6 @@ def _column(
 
 
 def _places(which: NDArray[np.bool_]) -> list[int]:
-    """Places among the drawn points."""
     return [int(place) for place in np.flatnonzero(which)]
 
 

@@ -234,7 +234,6 @@ def _reaches(advice: Advice) -> list[str]:
 
 
 _Named = Callable[[NDArray[np.float64]], dict[str, float]]
-"""Errors by the names of the measures."""
 
 
 class _Advised(NamedTuple):
@@ -248,7 +247,6 @@ def _errors_of(advised: AdvisedCase) -> _Named:
 
 
 def _names(advised: AdvisedCase) -> list[str]:
-    """Measures as keys."""
     return [
         item.name.replace(" ", "_") + ("_dB" if item.decibel else "")
         for item in advised.advice.measures

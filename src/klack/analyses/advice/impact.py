@@ -109,8 +109,6 @@ class _Base:
 
 @dataclass(slots=True)
 class _Log:
-    """Notes, and how many cases were run."""
-
     notes: list[str] = field(default_factory=list)
     runs: int = 0
 
@@ -381,7 +379,6 @@ class _Family:
 
     @property
     def fine(self) -> bool:
-        """Whether anything is finer than the case."""
         return min(self.rest) < 1.0
 
     @cached_property
@@ -505,7 +502,6 @@ def _no_run(setting: Setting, factor: float, error: KlackError) -> str:
 
 
 def _run(case: Case, level: AdviceLevel, threads: int | None) -> tuple[ImpactHistory, int]:
-    """Impact with new meshes, and the degrees of freedom of both bodies."""
     problem = build_problem(case, silent, threads=threads)
     try:
         pools = mode_pools(problem, at_least=1, progress=silent)
@@ -618,7 +614,6 @@ def _richest(case: Case, advised: Case, step: float, threads: int | None) -> Imp
 
 
 def _advised(base: _Base, case: Case, changes: Mapping[Key, float]) -> Case:
-    """Case, or what its twin knows of it, with the advice."""
     if case is base.case:
         return applied(case, changes)
     known: dict[Key, float] = {}

@@ -278,7 +278,6 @@ def _confirmed(
     now: Mapping[str, NDArray[np.float64]],
     threads: int | None,
 ) -> Advice:
-    """Compare both valves with one at least as fine as all runs and as both."""
     reference = _impacts(applied(case, advice.finest), threads)
     advised = _impacts(applied(case, advice.changes), threads)
     return replace(

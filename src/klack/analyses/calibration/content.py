@@ -327,7 +327,6 @@ def _parameter_table(study: CalibrationStudy) -> Table:
 
 
 def _profile_span(item: CalibratedParameter, profile: ProfileCurve) -> str:
-    """Ends of an interval that may be open towards a bound."""
     ends = (profile.lower, profile.upper)
     return _span(
         quantity(end, item.unit, item.digits) if isfinite(end) else "bound" for end in ends

@@ -415,7 +415,6 @@ def _begin(model: StrokeModel, motion: Motion, values: Vector) -> float:
 def _impacts(
     strokes: StrokeSet, measured: Impacts, before: Impacts, after: Impacts
 ) -> tuple[FittedImpact, ...]:
-    """First impact on both stops, measured and computed, read alike."""
     runs = [measured, before, after]
     lifts = strokes.matrix("lift")
     openings = [_first(run, "opening", -np.inf) for run in runs]

@@ -41,8 +41,6 @@ _POINTS = 2000
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Record:
-    """One recording in SI, with its pulse."""
-
     name: str
     channel: str
     time: Floats

@@ -88,7 +88,6 @@ _US = ("us", 1e6, ".2f")
 
 
 def _pair(key: str, definition: str) -> tuple[Measure[ComparedPulse], ...]:
-    """One time of the pulse, measured and computed."""
     words = key.replace("_", " ")
     return (
         Measure(

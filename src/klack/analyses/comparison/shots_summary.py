@@ -74,7 +74,6 @@ _STUDY = JsonForm(
 
 
 def _told(study: MeasuredShotsStudy) -> Iterator[TextTable | Notes | str]:
-    """Both distributions, and what follows from them."""
     title = f"{study.title}: beside {len(study.names)} measured drops"
     yield TextTable(title=title, columns=DROP_COLUMNS, rows=drop_rows(study), left=2)
     for item in study.rejected:

@@ -170,7 +170,6 @@ def _thermal(case: ValveCase) -> CaseThermal:
 
 
 def _with(part: Any, changes: Mapping[str, object], where: str) -> Any:
-    """A section with other values, checked like given ones."""
     kept = {name: getattr(part, name) for name in part.model_fields_set}
     try:
         return type(part)(**{**kept, **changes})
@@ -205,7 +204,6 @@ def _within_range(case: ValveCase, temperature: float) -> tuple[float, tuple[str
 
 
 def _with_viscosity(fluid: Fluid, warm: Fluid) -> Fluid:
-    """Fluid with only the viscosity of another temperature."""
     return replace(
         fluid,
         base_viscosity=warm.base_viscosity,
@@ -300,7 +298,6 @@ def _since(time: float | None, commands: Sequence[float]) -> float:
 
 
 def _uncommanded(way: str, delay: float, commands: Sequence[float]) -> tuple[str, ...]:
-    """Doubt about a delay that no driver begins."""
     if commands or isnan(delay):
         return ()
     return (

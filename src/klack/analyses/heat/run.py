@@ -229,7 +229,6 @@ def _soaked(strokes: _Strokes, network: HeatNetwork, soak: Sequence[float]) -> _
 
 
 def _warmed(strokes: _Strokes, network: HeatNetwork, thermal: CaseThermal) -> _Found:
-    """Strokes along a warm-up."""
 
     def mean_heat(temperature: Vector) -> Vector:
         sent = sent_heat(thermal, strokes.at(_nodes(network, temperature)).losses)

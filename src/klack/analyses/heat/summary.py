@@ -24,7 +24,6 @@ __all__ = ["HEAT", "answer", "cause_words", "cell", "main_columns", "rows_of_cau
 _ZERO_CELSIUS = 273.15
 _NOISE = 1e-9  # of the base: the rounding of a difference
 _TOLD = 40
-"""Points on a terminal."""
 
 
 _COLUMN = JsonForm(

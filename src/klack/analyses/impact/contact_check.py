@@ -494,7 +494,6 @@ def _extent(case: CaseFile, pair: BodyPair, expected: float) -> str:
 
 
 def _rounded_down(value: float) -> float:
-    """Two digits."""
     if not (isfinite(value) and value > 0.0):
         return inf
     unit = 10.0 ** (floor(log10(value)) - 1)

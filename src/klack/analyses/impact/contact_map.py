@@ -38,7 +38,6 @@ Floats = NDArray[np.float64]
 _RING = 0.25
 """Spread of the force over the mean radius below which a contact is a ring."""
 _WIDEST_GAP = 180.0
-"""Widest gap round the axis in a ring [deg]."""
 _EARLY = 0.1
 """Share of the peak force until which the contact is still the first touch."""
 _FAR = 2.0
@@ -133,7 +132,6 @@ def _about_axis(
 
 
 def _widest_gap(angle: Floats) -> float:
-    """Widest angle between neighbours [deg]."""
     turned = np.sort(angle)
     return float(np.diff(turned, append=turned[0] + 360.0).max())
 

@@ -122,7 +122,6 @@ def _next_steps(study: ImpactStudy) -> list[NextStep]:
 
 
 def _bodies_in_space(study: ImpactStudy) -> Section:
-    """Picture of solids, or why there is none; empty for others."""
     title = "The bodies in space"
     if not any(body.model == "3-D" and body.elements for body in study.bodies):
         return Section(title=title)
@@ -138,7 +137,6 @@ def _bodies_in_space(study: ImpactStudy) -> Section:
 
 
 def _bodies_at_peak(study: ImpactStudy) -> Section:
-    """Picture of the full order, or why there is none."""
     title = "The bodies at peak force"
     if study.sections:
         from klack.analyses.impact.section_figure import section_figure
@@ -161,7 +159,6 @@ def _bodies_at_peak(study: ImpactStudy) -> Section:
 
 
 def _number_table(study: ImpactStudy) -> Table:
-    """Quantities down, levels across; deviations below the values."""
     results = study.ordered
     names = [result.level for result in results]
     rows = [
@@ -181,7 +178,6 @@ def _number_table(study: ImpactStudy) -> Table:
 
 
 def _standing(study: ImpactStudy, name: str) -> str:
-    """Role of a level, below its name."""
     result = study.levels[name]
     if result.measures.cut_off:
         return "\n(cut off)"

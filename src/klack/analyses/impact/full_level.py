@@ -169,7 +169,6 @@ def _friction(case: Case, result: FullOrderResult) -> FrictionRecord | None:
 
 
 def _known(problem: ContactProblem, kept: Mapping[str, Modes]) -> list[KnownBody]:
-    """Modes of both bodies, and compliance at the points of the static contact."""
     pair, condensed = problem.pair, problem.condensed
     return [
         KnownBody(modes=kept[body.name], compliance=compliance.diagonal())

@@ -239,7 +239,6 @@ def _degrees(cells: Cells) -> Floats:
 
 
 def _around(view: PressureView, load: Floats) -> str:
-    """Mean line load at the peak force, and its range."""
     around = load[view.peak]
     mean, low, high = (float(value) for value in (around.mean(), around.min(), around.max()))
     text = f"{1e-3 * mean:.1f} N/mm on average"

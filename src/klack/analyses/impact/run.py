@@ -248,7 +248,6 @@ def impact_of_bodies(
 
 
 def _modes_needed(case: Case, levels: Sequence[str]) -> int:
-    """Elastic modes of each body for these levels and their comparisons."""
     needed = [1]
     if case.run.transfer is not None:
         needed.append(TRANSFER_MODES)
@@ -339,7 +338,6 @@ class _Work:
         }
 
     def run_levels(self, wanted: Sequence[Level], clock: StageClock) -> None:
-        """All levels but the full order."""
         clock("reduced", 0.5)
         loops = self.yielding.loops
         for level in wanted:
@@ -411,7 +409,6 @@ class _Work:
         )
 
     def find_structures(self, near: Mapping[str, NearLoads] | None, clock: StageClock) -> None:
-        """Held bodies, for their sound."""
         clock("radiating surfaces", 0.0)
         self.structures = impact_structures(self.problem, self.pools, self.own, near)
         clock("radiating surfaces", 1.0)
@@ -454,7 +451,6 @@ class _Work:
         )
 
     def study(self, notes: Sequence[str], begin: float, clock: StageClock) -> ImpactStudy:
-        """Results so far, the best level as the answer."""
         case, certificate = self.case, self.certificate
         results = doubt_modal_levels(self.results, **self.flat)
         if not self.twins:

@@ -96,7 +96,6 @@ def section_picture(mesh: Mesh, displacement: Floats, time: float, body: str) ->
 
 
 def _mean_axial(points: Floats, axial: Floats, triangles: Ints) -> float:
-    """Mean axial displacement [m] of the body of revolution."""
     corner = points[triangles]
     (ax, ay), (bx, by) = (corner[:, 1] - corner[:, 0]).T, (corner[:, 2] - corner[:, 0]).T
     area = 0.5 * np.abs(ax * by - ay * bx)

@@ -176,7 +176,6 @@ def _draw_zoom(
 
 
 def _near(picture: SectionPicture, spot: Floats, reach: float) -> SectionPicture:
-    """Triangles around the contact; others only cost bytes."""
     corners = picture.points[picture.triangles]
     low, high = corners.min(axis=1), corners.max(axis=1)
     seen = np.all((low < spot + reach) & (high > spot - reach), axis=1)
@@ -247,7 +246,6 @@ def _distance_to_segments(points: Floats, start: Floats, end: Floats) -> Floats:
 
 
 def _reach(study: ImpactStudy, size: float) -> float:
-    """Half the side of the enlarged window [m]."""
     half_width = study.contact.half_width
     usable = half_width > 0 and isfinite(half_width)
     return min(6 * half_width, 0.2 * size) if usable else 0.05 * size

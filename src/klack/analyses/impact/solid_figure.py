@@ -46,7 +46,6 @@ _WIDTH = 720
 _BELOW = 0.1
 """Room below the bodies, of their height, for the scale and the axes."""
 _TALLEST = 1.5
-"""Height over width of the windows, at most."""
 _LAMP = np.array([-0.45, 0.65, -0.61])
 """Direction of the light: right, up, away from the viewer."""
 _STEEPEST = 0.05
@@ -131,7 +130,6 @@ def _middle(skin: Skin, touching: NDArray[np.bool_]) -> Floats:
 
 
 def _reach(study: ImpactStudy, touching: list[NDArray[np.bool_]]) -> float:
-    """Half the width of the enlarged window [m]."""
     touch, half_width = study.pictures[1].touch, study.contact.half_width
     if goes_round(touch):
         return 2.2 * float(_radii(touch).max())
@@ -306,7 +304,6 @@ def _draw_axes(axes: Any, window: Window) -> None:
 
 
 def _draw_frame(axes: Any, near: Window, whole: Window) -> None:
-    """Where the enlarged window lies."""
     corner = np.array([near.left - whole.left, near.bottom - whole.bottom]) / whole.pixel
     size = near.pixel / whole.pixel * np.array([near.columns, near.rows])
     axes.add_patch(Rectangle(tuple(corner), *size, fill=False, edgecolor=_INK, linewidth=0.8))

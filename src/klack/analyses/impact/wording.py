@@ -186,7 +186,6 @@ def worst_error(study: ImpactStudy, level: str) -> float:
 
 
 def _verdict(study: ImpactStudy, level: str) -> str:
-    """Judge the largest error, unless the contact is in doubt."""
     if doubts := study.contact.doubts:
         return (
             "both share the same contact, which cannot be relied on, because "

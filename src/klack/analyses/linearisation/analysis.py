@@ -19,7 +19,6 @@ __all__ = ["LINEARISATION", "eigenvalue_rows", "loop_rows", "stability_text", "s
 
 
 _TOLD = 24
-"""Eigenvalues on a terminal."""
 _PARTS = 3
 
 EIGENVALUE_HEADS = ("", "frequency", "damping ratio", "time constant", "components")

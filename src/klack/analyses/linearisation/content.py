@@ -387,7 +387,6 @@ def _margins(record: LinearModel) -> tuple[Table, ...]:
 
 
 def _signals(record: LinearModel) -> tuple[Table, ...]:
-    """Names for --from, --to and the matrices."""
     return tuple(
         Table(
             columns=(kind, "unit"), rows=tuple((x.name, x.unit or "1") for x in signals[:_LISTED])

@@ -183,7 +183,6 @@ def _crossings(
     at: Callable[[float], float],
     where: NDArray[np.bool_] | None,
 ) -> list[float]:
-    """Frequencies at which something is zero."""
     found = []
     for i in np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) < 0.0):
         if where is None or (where[i] and where[i + 1]):

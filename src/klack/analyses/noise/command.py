@@ -89,7 +89,6 @@ def _sources(
     progress: Progress,
     threads: int | None,
 ) -> tuple["NoiseSource", ...]:
-    """Forces and bodies of a stored result, or of a case run now."""
     from klack.analyses.noise.source import load_sources, run_sources
 
     if case is None:
@@ -99,7 +98,6 @@ def _sources(
 
 
 def _names(paths: Sequence[Path], sources: Sequence["NoiseSource"]) -> tuple[str, ...]:
-    """Short distinct names of the designs."""
     per_path = len(sources) // len(paths)
     folders = [_short(paths[i // per_path]) for i in range(len(sources))]
     candidates = (

@@ -226,7 +226,6 @@ def _compared(
     differences: Sequence[Curve],
     bands: tuple[Band, ...] = (),
 ) -> tuple[Panel, ...]:
-    """Levels, and below them differences from the first design."""
     levels = replace(_level_panel(label, unit, curves, depth), bands=bands)
     if not differences:
         return (levels,)

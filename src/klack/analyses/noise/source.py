@@ -375,7 +375,6 @@ def _require_structures(study: ImpactStudy | StrokeStudy) -> None:
 
 
 def _require_stops(case: str, variant: StrokeVariant) -> None:
-    """Refuse a valve in which nothing hits anything."""
     if not variant.result.interfaces:
         raise InputError(
             f"result of case {case}",
@@ -409,7 +408,6 @@ def _kept_up_to(bodies: Sequence[BodySummary]) -> float:
 def _noise_of(
     text: str, case: Case | ValveCase | None
 ) -> tuple[CaseNoise, bool, Mapping[str, CaseMaterial]]:
-    """Section ``noise``, whether it is given, and materials."""
     if case is not None:
         return case.noise or CaseNoise(), case.noise is not None, case.materials
     data = YAML(typ="safe").load(text)  # faster than the reader of cases, which knows the lines

@@ -21,9 +21,7 @@ __all__ = ["OPERATING_POINT", "residual_rows", "shown_quantities"]
 
 
 _TOLD = 40
-"""Points of a sweep on a terminal."""
 _MAIN = 6
-"""Quantities of a sweep on a terminal."""
 
 
 _SWEPT = JsonForm(

@@ -133,7 +133,6 @@ def _axis(label: str, values: Vector, unit: str) -> tuple[AxisSpec, float]:
 def _chart(
     record: OperatingPoints, x: SweptQuantity | PointQuantity, group: Sequence[PointQuantity]
 ) -> Chart:
-    """Quantities of one kind over another."""
     alone = len(group) == 1
     label = group[0].name if alone else group[0].quantity.split()[-1]
     label = "volume flow" if not alone and group[0].unit == "m^3/s" else label

@@ -262,7 +262,6 @@ def _differs(rows: Rows, one: OperatingPoint, other: OperatingPoint) -> bool:
 
 
 def _travels(rows: Rows) -> dict[str, float]:
-    """Way [m] between the stops of every free body."""
     travel, found = Travel.of(rows), dict[str, float]()
     for row in rows.bodies:
         if row.body.rigid_count:
@@ -273,7 +272,6 @@ def _travels(rows: Rows) -> dict[str, float]:
 
 
 def _require_reached(rows: Rows, roles: ValveRoles, lift: float) -> None:
-    """Refuse a lift beyond the stops."""
     travel = Travel.of(rows)
     low, high = travel.lowest({roles.needle: 1.0})[0], travel.highest({roles.needle: 1.0})[0]
     slack = _BEYOND * (high - low) if np.isfinite(high - low) else 0.0
@@ -288,7 +286,6 @@ def _require_reached(rows: Rows, roles: ValveRoles, lift: float) -> None:
 
 
 def _other_note(rows: Rows, roles: ValveRoles, point: OperatingPoint, other: OperatingPoint) -> str:
-    """Words for a second operating point."""
     port = f"{roles.needle}.{roles.point}"
     travels = _travels(rows)
 

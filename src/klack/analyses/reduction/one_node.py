@@ -203,7 +203,6 @@ def _sides(problem: ContactProblem, ports: tuple[Port, Port]) -> tuple[_Side, _S
 def _nearest_node(
     problem: ContactProblem, side: _Side, place: tuple[float, ...]
 ) -> tuple[int, float]:
-    """Nearest node to a place of the drawing, and the distance [m]."""
     mesh = side.body.mesh
     where = f"{problem.case.path or 'case'}: run.transfer.nodes.{side.body.name}"
     at = placed_point(np.array(place), side.pose)

@@ -33,8 +33,6 @@ _SLOPE = JsonForm(
 
 
 class _Sloped(NamedTuple):
-    """A measure, and its derivatives by parameter."""
-
     measure: MeasureSlopes
     slopes: Mapping[str, tuple[float | None, float | None]]
 

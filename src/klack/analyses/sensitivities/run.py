@@ -127,7 +127,6 @@ def _left_out(
     names: Sequence[str],
     chosen: Sequence[ChosenMeasure],
 ) -> tuple[str, ...]:
-    """What a study has without a derivative here."""
     found = []
     if space.skipped:
         found.append(
@@ -298,7 +297,6 @@ def _doubts(
     impacts: Sequence[ImpactSlope],
     others: _Others | None = None,
 ) -> tuple[str, ...]:
-    """Derivatives that do not predict another run, and why."""
     found = []
     wrong = [item.name for item in measures if item.is_doubtful]
     if wrong:

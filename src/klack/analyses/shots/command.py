@@ -105,7 +105,6 @@ def _strokes(
     variants: tuple[str, ...],
     wanted: WantedResult,
 ) -> int:
-    """Many strokes of a whole valve."""
     with show_progress(wanted.quiet):
         from klack.analyses.stroke_shots.analysis import STROKE_SHOTS
         from klack.analyses.stroke_shots.one_stroke import STROKE_LOG, shots_of_valve

@@ -84,7 +84,6 @@ def shots_content(study: ShotsStudy) -> Content:
 
 
 def _rule(study: ShotsStudy) -> str:
-    """Place of the centred impact, and correlations of the rebound."""
     rank, text = study.rule.rank, "No shot rebounds as high as the centred impact."
     if rank:
         those = "One shot rebounds" if rank == 1 else f"{rank} shots rebound"
@@ -106,7 +105,6 @@ def _related(study: ShotsStudy, shown: Shown) -> float:
 
 
 def _drawn_numbers(study: ShotsStudy) -> list[Shown]:
-    """Varying quantities that may explain the rebound."""
     candidates = (
         Shown("eccentricity", "eccentricity", *length_unit(study.shots.eccentricity)),
         Shown("tilt", "tilt", "°", np.degrees(1.0)),

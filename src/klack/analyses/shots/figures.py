@@ -127,7 +127,6 @@ def rebound_chart(study: ShotsStudy, over: Shown) -> Chart:
 
 
 def _rebound_panel(study: ShotsStudy, over: Shown, shown: Shown) -> Panel:
-    """One measure over one drawn number."""
     every, best, centred = _dots(study, over, shown)
     middle = centred.y[0]
     bias = Curve(
@@ -146,7 +145,6 @@ def _rebound_panel(study: ShotsStudy, over: Shown, shown: Shown) -> Panel:
 
 
 def _dots(study: ShotsStudy, over: Shown, shown: Shown) -> tuple[Curve, Curve, Curve]:
-    """All shots, the highest, and the centred one."""
     x, y, best = over.of(study.shots), shown.of(study.shots), study.highest
     alone = over.of(study.centric), shown.of(study.centric)
     return (

@@ -154,7 +154,6 @@ def _model(
 def _candidates(
     case: Case, problem: ContactProblem, height: float, drawn_height: float
 ) -> ContactSpace:
-    """Contact points that close in centred or farthest placements."""
     farthest = extreme_placements(case, drawn_height)
     off_axis = max(float(np.linalg.norm(aside)) for aside, _ in farthest)
     about, centre = np.array([0.0, 0.0, height]), problem.pair.upper.centre_of_mass

@@ -260,7 +260,6 @@ def highest_of(shots: ShotColumns) -> int | None:
 def _pressures(
     setup: ShotSetup, pictured: Mapping[str, tuple[ShotDraw, Worn | None]]
 ) -> dict[str, PressureRecord]:
-    """Point forces of the first impact of some shots, on their faces."""
     records = {}
     for name, (draw, worn) in pictured.items():
         result = simulate_shot(setup, draw, impacts=1, points=True, worn=worn)
@@ -353,7 +352,6 @@ def guide_in_words(guide: CaseGuide | None) -> str:
 
 
 def _unfinished(shots: ShotColumns) -> tuple[str, ...]:
-    """Note on shots without a rebound."""
     unfinished = int(np.sum(~np.isfinite(shots.rebound_height)))
     if not unfinished:
         return ()

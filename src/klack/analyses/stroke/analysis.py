@@ -78,7 +78,6 @@ AXIS_COLUMNS = ("axis at seat x, y [um]", "tilt x, y [mrad]")
 CHANGES = "what changes when all time steps are doubled"
 
 _TOLD = 20
-"""Impacts of a variant on a terminal."""
 
 
 class _Variant(NamedTuple):
@@ -303,7 +302,6 @@ def change_name(event: ImpactEvent, change: ImpactChange) -> str:
 
 
 def _changes_told(variant: StrokeVariant) -> Iterator[TextTable]:
-    """Changes of promised impacts with doubled steps, if asked for."""
     pairs = zip(variant.result.events, variant.changes, strict=False)
     named = [(change_name(event, change), change) for event, change in pairs if change.promised]
     if named:
@@ -312,7 +310,6 @@ def _changes_told(variant: StrokeVariant) -> Iterator[TextTable]:
 
 
 def _axis_told(study: StrokeStudy, variant: StrokeVariant) -> Iterator[TextTable]:
-    """Axis at the start and at each touch, in three dimensions."""
     moments = [("start", float(variant.result.time[0]))]
     moments += [(event.stop, event.time) for event in variant.result.events[:_TOLD]]
     rows = [

@@ -324,7 +324,6 @@ def _time_tables(study: StrokeStudy) -> tuple[Table, ...]:
 
 
 def _number_table(study: StrokeStudy) -> Table:
-    """Quantities down, variants across."""
     variants = list(study.variants.values())
     shown = [_row(measure, variants) for measure in VARIANT_MEASURES if measure.page]
     first = 1 + max(i for i, row in enumerate(shown) if row[0] in ("closing time", "impacts"))

@@ -276,7 +276,6 @@ def _runs(
     begins: Mapping[Variant, NetworkResult | None],
     progress: Progress,
 ) -> tuple[dict[Variant, VariantRun], ConvergenceError | None]:
-    """Variants up to the first that fails, with its part and its error."""
     runs: dict[Variant, VariantRun] = {}
     for name, after in begins.items():
         try:
@@ -361,7 +360,6 @@ def _attempt(
     after: NetworkResult | None = None,
     sizes: StepSizes | None = None,
 ) -> _Attempt:
-    """Run a variant once."""
     stage = f"run {name}" if sizes is None else f"check steps of {name}"
     rows = variant_network(valve, name).rows()
     if after is not None and after.sizes.step != valve.case.run.fine_step:

@@ -134,7 +134,6 @@ def impact_changes(
 
 
 def _by_stop(*runs: Sequence[ImpactEvent]) -> dict[str, tuple[list[ImpactEvent], ...]]:
-    """Impacts of each run by stop, without slow touches."""
     fastest: dict[str, float] = {}
     for event in chain(*runs):
         fastest[event.stop] = max(fastest.get(event.stop, 0.0), event.approach_speed)

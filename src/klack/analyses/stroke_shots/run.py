@@ -280,7 +280,6 @@ def _distributions(case: ValveCase) -> dict[str, str]:
 
 
 def _doubts(variants: Sequence[Variant], count: int, log: StrokeLog) -> Iterator[str]:
-    """Doubts and failures of single strokes."""
     for name in variants:
         alone = log.done[name, CENTRED]
         for text in [*alone.doubts, *filter(None, [alone.failure])]:

@@ -49,7 +49,6 @@ __all__ = ["study_content"]
 
 _LISTED = 100
 _OF_FRONT = 24
-"""Points of a front in its table."""
 _MANY_ROWS = 1024
 _FEWEST = 8
 
@@ -164,7 +163,6 @@ def _answer(
 
 
 def _best_answer(record: StudyRecord, labels: dict[str, str]) -> str:
-    """Recommended point against that of today."""
     found = record.optimum
     if found is None or found.best < 0:
         return ""
@@ -355,7 +353,6 @@ def _share_tables(
 
 
 def _surrogate_sections(record: StudyRecord, labels: dict[str, str]) -> tuple[Section, ...]:
-    """How well surrogates predict, and what follows."""
     if not record.surrogates:
         return ()
     used = [item for item in record.surrogates if not item.reason]
@@ -410,7 +407,6 @@ def _surrogate_sections(record: StudyRecord, labels: dict[str, str]) -> tuple[Se
 def _word_effects(
     record: StudyRecord, used: list[StudySurrogate], labels: dict[str, str]
 ) -> tuple[Table, ...]:
-    """Main effects of parameters that are words."""
     rows = tuple(
         (
             labels[item.measure],

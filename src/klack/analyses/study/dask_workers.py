@@ -321,11 +321,9 @@ class _TaskSize:
         self._seconds: deque[float] = deque(maxlen=32)
 
     def learn(self, answer: Answer) -> None:
-        """Take note of the time that points took."""
         self._seconds.append(answer.seconds / max(len(answer.rows), 1))
 
     def points(self, left: int, tasks: int, own_bodies: bool) -> int:
-        """Points for the next task."""
         if not self._seconds:
             return 1
         usual = sorted(self._seconds)[len(self._seconds) // 2]

@@ -45,7 +45,6 @@ __all__ = [
 
 
 _ASIDE = ("study", "calibration", "measurement", "title", "description")
-"""Sections that no point depends on."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

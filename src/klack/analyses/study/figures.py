@@ -171,7 +171,6 @@ def _points(
     colour: Colour,
     width: float,
 ) -> Curve:
-    """Numbered dots at some points."""
     return dots(x[places], y[places], label, colour, width, (f"point {i}" for i in places))
 
 
@@ -273,7 +272,6 @@ def _main_effect(
 
 
 def _axis(item: StudyColumn, labels: Mapping[str, str]) -> tuple[AxisSpec, float]:
-    """Axis with a prefix, and the factor from SI."""
     own, to_own = shown_unit(item.unit)
     unit, factor = printed_unit(to_own * item.values, own)
     return AxisSpec(label=labels[item.name], unit=unit), to_own * factor

@@ -55,7 +55,6 @@ _ASIDE = (
     *("run", "lumped", "guide", "shots"),
     *("measurement", "noise", "study", "title", "description"),
 )
-"""Sections without influence on bodies and modes."""
 _OF_THE_IMPACT = (
     ("motion", "speed"),
     ("motion", "force"),
@@ -67,7 +66,6 @@ _OF_THE_IMPACT = (
     ("contact", "stribeck_speed"),
     ("reduction", "correction"),
 )
-"""Keys of an impact of the same bodies."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,7 +90,6 @@ class _Impacts(PointKind[Case, _Built]):
     )
 
     def asked_variant(self, study: CaseStudy) -> str | None:
-        """The level of the study."""
         refuse_if(
             study.variant is not None,
             "variant",
@@ -148,7 +145,6 @@ class _Impacts(PointKind[Case, _Built]):
         return _Built(bodies, shots)
 
     def close(self, built: _Built) -> None:
-        """Free the factorisations."""
         for bodies in (built.bodies, built.shots):
             if bodies is not None:
                 bodies.close()
@@ -161,7 +157,6 @@ class _Impacts(PointKind[Case, _Built]):
         check: Callable[[], None],
         taken: Taken,
     ) -> PointRow:
-        """Compute one point."""
         try:
             found = _point(asked, built, place, check)
             values = tuple(item.value(found.run) for item in asked.chosen)
@@ -181,7 +176,6 @@ class _Impacts(PointKind[Case, _Built]):
         )
 
     def pressure(self, asked: AskedPoints[Case], built: _Built, place: int) -> TimeSeries | None:
-        """Sound of a click."""
         noise = _point(asked, built, place, never_stopped).run.noise
         return None if noise is None else noise.pressure
 
@@ -211,7 +205,6 @@ class _Point:
 
     @property
     def model(self) -> str:
-        """What the numbers come from, in words."""
         meshes = ", ".join(f"{name} {nodes} nodes" for name, nodes in self.meshes)
         return "; ".join(filter(None, (*self.models, meshes)))
 
@@ -227,7 +220,6 @@ class _Point:
 def _point(
     asked: AskedPoints[Case], built: _Built, place: int, check: Callable[[], None]
 ) -> _Point:
-    """Impact and shots of a point, as its measures need them."""
     case = case_at(Case, asked.tree, asked.tree, asked.points.changes(place))
     level, progress = _level(asked), lambda stage, fraction: check()
     if built.shots is None:
@@ -240,7 +232,6 @@ def _point(
 
 
 def _impact(case: Case, bodies: ImpactBodies | None, level: str, progress: Progress) -> _Point:
-    """Impact of a point."""
     levels = case.require_levels((level,))
     if bodies is None:
         study = run_impact(case, levels=levels, progress=progress, threads=1)

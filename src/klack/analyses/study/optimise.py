@@ -177,8 +177,6 @@ def _require_same_draws(source: StudySource) -> None:
 
 
 class _Work:
-    """Points of a search in order, with their rows."""
-
     def __init__(
         self,
         asked: AskedPoints,
@@ -216,7 +214,6 @@ class _Work:
     def rows(
         self, written: Sequence[Mapping[str, PointValue]], names: Sequence[str]
     ) -> list[PointRow]:
-        """Rows of these points."""
 
         def told(stage: str, fraction: float) -> None:
             self._progress(stage, min((self.done + fraction * len(written)) / self._most, 1.0))
@@ -268,7 +265,6 @@ class _Work:
     def _computed(
         self, values: Sequence[Values], sides: Sequence[Side]
     ) -> tuple[list[PointRow], list[PointRow], Mapping[Side, NDArray[np.float64]]]:
-        """Rows of designs and of made valves, and columns for the goals."""
         rows = self.rows([self.space.written(point) for point in values], self.names)
         table = np.array([row.numbers for row in rows])
         columns = {side: table[:, self.names.index(side[0])] for side in sides}
@@ -308,7 +304,6 @@ class _Front:
     def add(
         self, columns: Mapping[Side, NDArray[np.float64]]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Take the next measures; return objectives and violations."""
         objectives = self.goals.objective_values(columns)
         violations = self.goals.violations(columns)
         new = np.arange(len(self.objectives), len(self.objectives) + len(objectives))
@@ -318,18 +313,15 @@ class _Front:
         return objectives, violations
 
     def exchange(self, places: Sequence[int], columns: Mapping[Side, NDArray[np.float64]]) -> None:
-        """Take other measures of some points."""
         self.objectives[places] = self.goals.objective_values(columns)
         self.violations[places] = self.goals.violations(columns)
         self.choose(np.arange(len(self.objectives)))
 
     def choose(self, places: NDArray[np.int64]) -> None:
-        """Find the front among some points."""
         found = find_front(self.objectives[places], self.violations[places])
         self.points, self.feasible = places[found.points], found.feasible
 
     def row(self, point: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Objectives and violations of a point."""
         return self.objectives[point], self.violations[point]
 
     @property

@@ -160,7 +160,6 @@ def versions_here() -> Mapping[str, str]:
 
 
 _CASES = 4
-"""Cases that a worker keeps, with their bodies."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,8 +214,6 @@ _TURN = Lock()
 
 
 class _CaseAtWork:
-    """A checked case, with the bodies of its latest points."""
-
     def __init__(self, sent: SentCase) -> None:
         self._case, self._tree = sent.read()
         self._builds = Builds()

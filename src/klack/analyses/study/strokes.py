@@ -62,7 +62,6 @@ _ASIDE = (
     *("run", "lumped", "shots", "noise", "study", "measurement", "calibration"),
     *("title", "description"),
 )
-"""Sections without influence on bodies, laws and stops."""
 _RADIATING = ("noise", "surfaces")
 """but for these surfaces of bodies."""
 
@@ -104,7 +103,6 @@ class _Strokes(PointKind[ValveCase, _Built]):
     )
 
     def asked_variant(self, study: CaseStudy) -> str | None:
-        """The variant of the study."""
         refuse_if(
             study.level is not None,
             "level",
@@ -115,7 +113,6 @@ class _Strokes(PointKind[ValveCase, _Built]):
         return study.variant
 
     def variant(self, case: ValveCase, name: str | None, chosen: Sequence[ChosenMeasure]) -> str:
-        """The first one of the case by default."""
         return case.one_variant(name)
 
     def measures(self, case: ValveCase, names: Iterable[str]) -> tuple[ChosenMeasure, ...]:
@@ -152,7 +149,6 @@ class _Strokes(PointKind[ValveCase, _Built]):
         case: ValveCase,
         progress: Progress,
     ) -> _Built:
-        """Bodies and laws."""
         with collected_warnings() as notes:
             valve = build_valve(case, progress, threads=1)
         places = [key.place for key in asked.points.keys if key.place not in group.made]
@@ -215,7 +211,6 @@ class _Strokes(PointKind[ValveCase, _Built]):
         check: Callable[[], None],
         taken: Taken,
     ) -> PointRow:
-        """Compute one point, in whichever thread."""
         try:
             whole, steps, roles = _point_run(asked, built, place, check)
             values = tuple(item.value(whole) for item in asked.chosen)
@@ -236,7 +231,6 @@ class _Strokes(PointKind[ValveCase, _Built]):
     def pressure(
         self, asked: AskedPoints[ValveCase], built: _Built, place: int
     ) -> TimeSeries | None:
-        """Sound of a click."""
         return _point_run(asked, built, place, never_stopped)[0].noise.pressure
 
 
@@ -245,7 +239,6 @@ STROKES = _Strokes()
 
 
 def _valve_at(asked: AskedPoints[ValveCase], built: _Built, i: int) -> Valve:
-    """Valve of a point, checked as a whole."""
     changes = asked.points.changes(i)
     own = {place: value for place, value in changes.items() if place not in built.made}
     case = case_at(ValveCase, built.tree, built.parts, own)

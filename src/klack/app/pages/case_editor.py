@@ -84,7 +84,6 @@ class _Editor:
         self._open = {"case", "motion", "contact", "parameters", "objectives"}
 
     def build(self) -> None:
-        """Make the page, then check the text."""
         self._panel = StudyPanel(self._state, self._case)
         with ui.element("div") as self._above:
             self._panel.build()

@@ -69,7 +69,6 @@ class _Guide:
         self._is_checking = False  # the step that is shown has not its answer yet
 
     def build(self) -> None:
-        """Make the page, then read the parts."""
         with ui.element("nav").classes("k-steps") as steps:
             steps.props["aria-label"] = "Steps of the guide"
             self._steps = [
@@ -99,7 +98,6 @@ class _Guide:
 
     @property
     def plan(self) -> ValvePlan:
-        """All choices so far."""
         return self._plan
 
     async def keep(self, plan: ValvePlan) -> None:

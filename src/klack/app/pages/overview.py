@@ -77,7 +77,6 @@ class _Overview:
         self._found, self._sought = _NONE, ""
 
     async def build(self) -> None:
-        """Make the page, then fill it."""
         self._jobs = ui.element("section").classes("k-section")
         with ui.element("section").classes("k-section"):
             self._head = ui.element("div")

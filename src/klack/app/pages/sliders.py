@@ -335,7 +335,6 @@ class _Sliders:
         self._moved.set()
 
     async def _write(self) -> None:
-        """Keep the text as draft, and open the editor."""
         try:
             text = await self._worker.call("text_at", dict(self._values))
         except KlackError as error:
