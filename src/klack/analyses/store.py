@@ -258,7 +258,6 @@ def _write(place: Path, name: str, value: Any, form: RecordFormat) -> None:
 
 
 def _columns(records: Sequence[Any]) -> dict[str, Any]:
-    """Fields of like records: numbers as an array, words as a tuple."""
     columns: dict[str, Any] = {}
     for field in fields(records[0]):
         values = [getattr(record, field.name) for record in records]

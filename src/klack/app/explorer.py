@@ -239,7 +239,6 @@ def sliders_of(case: AnyCase, tree: CaseTree) -> tuple[Slider, ...]:
 
 
 def _offered(case: Case, tree: CaseTree) -> Iterator[Slider]:
-    """Missing keys of an impact that may move: closing force, damping of bodies."""
     if written_at(tree.data, ("motion", "force")) is None:
         yield _from_zero(("motion", "force"), "closing force", "N", 100.0)
     for body in case.bodies:

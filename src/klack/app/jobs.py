@@ -127,7 +127,6 @@ class Jobs:
     def _started(
         self, command: str, case: str, path: Path, out: str, options: Sequence[str], study: str
     ) -> Job:
-        """Start it, unless too much runs; the caller holds the lock."""
         running = [job for job in self.all() if job.state == "running"]
         if len(running) >= _MOST_RUNNING:
             raise _refused(f"{len(running)} runs at a time", f"at most {_MOST_RUNNING}")
@@ -162,7 +161,6 @@ class Jobs:
             held.remove(name)
 
     def _launch(self, name: str, held: HeldFolder, arguments: list[str]) -> None:
-        """Start the process of a run, and note which it is."""
         # by its handle where the system can: nothing is written behind a link in its place
         place, new = held.steady_path, os.O_WRONLY | os.O_CREAT | os.O_EXCL
         with (

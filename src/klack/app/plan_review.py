@@ -284,7 +284,6 @@ _Numbers = dict[str, float]
 
 
 def _numbers(plan: ValvePlan) -> _Numbers | tuple[Finding, ...]:
-    """Speed, force and gap in SI, or their errors."""
     found, wrong = {}, []
     kinds = {"speed": SPEED, "force": FORCE, "gap": LENGTH}
     for name, kind in kinds.items():

@@ -152,7 +152,6 @@ def _numbers(record: Any) -> tuple[Number, ...]:
 
 
 def _answer(record: ImpactStudy | StrokeStudy) -> tuple[Answer, TimeSeries | None]:
-    """Curves, numbers and click of a result."""
     doubts = list(_doubts(record))
     pressure, bands, levels = None, np.zeros(0), np.zeros(0)
     try:

@@ -169,7 +169,6 @@ def front_of(record: StudyRecord) -> Front:
 
 
 def _goals(record: StudyRecord) -> Goals | None:
-    """Objectives and bounds of the study, if all were computed."""
     path = Path("study.yaml")
     text = record.study_text or record.case_text
     data, lines = parse(text, path)

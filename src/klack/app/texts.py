@@ -230,7 +230,6 @@ def _is_number_like_word(text: str) -> bool:
 
 
 def _comment(text: str) -> str:
-    """Text as a comment: one printable line."""
     line = " ".join(text.split())
     return "".join(sign for sign in line if sign.isprintable())[:160]
 

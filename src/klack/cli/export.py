@@ -284,7 +284,6 @@ def _impact_only(case: Any, to: str) -> Any:
 def _export_calculix(
     case: "Case", folder: Path, numbers: tuple[float | None, ...], run: bool, wanted: Wanted
 ) -> Written:
-    """Write the deck of an impact; with ``run``, run CalculiX on it."""
     from klack.exchange.calculix_case import calculix_impact, calculix_settings
     from klack.exchange.calculix_deck import write_deck
     from klack.exchange.calculix_run import require_calculix, run_calculix
@@ -344,7 +343,6 @@ def _export_models(
 
 
 def _write_models(models: Sequence["ModalModel"], to: str, folder: Path, choice: Choice) -> None:
-    """Write models into a folder."""
     if to == "mat":
         from klack.exchange.matlab_model import write_matlab
 
@@ -366,7 +364,6 @@ def _write_models(models: Sequence["ModalModel"], to: str, folder: Path, choice:
 
 
 def _described(model: "ModalModel") -> str:
-    """One line on what a model is."""
     inputs = ", ".join(item.name for item in model.inputs)
     highest = model.frequencies.max() / 1e3 if model.mode_count else 0.0
     words = f"{model.name}: {model.mode_count} modes up to {highest:.4g} kHz, inputs {inputs}"
@@ -434,7 +431,6 @@ def _export_points(study: "StudyRecord", to: str, folder: Path) -> Written:
 
 
 def _parquet_is_for_studies(got: str) -> InputError:
-    """The error where Parquet cannot be written."""
     return InputError(
         "--to parquet",
         got=got,
@@ -468,7 +464,6 @@ def _export_point(source: Path, point: int | None, out: Path | None) -> tuple[st
 def _run_and_export(
     case: "Case | ValveCase", to: str, folder: Path, wanted: Wanted
 ) -> tuple[Written, Exception | None]:
-    """Run a case, write its result, and return why a run ended early."""
     from klack.analyses.impact.run import run_impact
     from klack.analyses.incomplete import IncompleteImpactError
     from klack.analyses.stroke.record import IncompleteStrokeError
@@ -495,7 +490,6 @@ def _run_and_export(
 
 
 def _export_fields(case: "Case", folder: Path, choice: Choice, wanted: Wanted) -> Written:
-    """Write displacement, velocity and stress of an impact over time, for ParaView."""
     from klack.exchange.results.vtk_series import write_impact_series
 
     with show_progress(wanted.quiet) as progress, staged_folder(folder) as stage:
@@ -514,7 +508,6 @@ def _export_fields(case: "Case", folder: Path, choice: Choice, wanted: Wanted) -
 def _export_stored_impact(
     source: Path, out: Path | None, choice: Choice, own: "OwnComponents", wanted: Wanted
 ) -> tuple[str, Written]:
-    """Write the bodies and the line load of an impact of a stored stroke, for ParaView."""
     from klack.analyses.catalogue import load_result
     from klack.analyses.stroke.record import StrokeStudy
     from klack.case.any_case import read_valve_case

@@ -303,7 +303,6 @@ def _key(name: str, key: "DescribedKey") -> str:
 
 
 def _components_json(types: "Sequence[DescribedType]") -> "ComponentsJson":
-    """The same for programs, equations as LaTeX."""
     return {
         "schema": "klack-show-components/1",
         "types": {

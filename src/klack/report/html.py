@@ -48,7 +48,6 @@ def render_html(content: Content) -> str:
 
 @cache
 def _plotly() -> dict[str, str]:
-    """Version and packed library, always the same."""
     version = get_plotlyjs_version()
     packed = remembered(
         result_cache(),

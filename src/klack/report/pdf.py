@@ -118,6 +118,5 @@ def _drawing() -> str:
 
 
 def _lies(image: bytes) -> bool:
-    """Whether an SVG is wider than high."""
     box = ElementTree.fromstring(image).get("viewBox", "0 0 1 1").split()
     return float(box[2]) > float(box[3])

@@ -118,7 +118,6 @@ def _lead_width(ports: Sequence[PlannedPort]) -> float:
 def _lead(
     component: str, port: PlannedPort, side: Side, edge: float, inner: float, y: float
 ) -> "_Drawn":
-    """Line, name, pin and mark of a port, from ``edge`` to ``inner``."""
     way = 1.0 if side == "left" else -1.0
     start = edge + way * _MARK if port.mark else edge
     text, joint = _port_text(port), f"{component}.{port.name}"

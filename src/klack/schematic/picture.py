@@ -306,7 +306,6 @@ def _label(label: Label) -> str:
 
 
 def _safe(text: str) -> str:
-    """XML text: escaped, without forbidden letters."""
     return escape(_FORBIDDEN.sub("\N{REPLACEMENT CHARACTER}", text), {'"': "&quot;"})
 
 

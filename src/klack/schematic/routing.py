@@ -111,7 +111,6 @@ def _ordered(runs: Sequence[Run]) -> list[Run]:
 
 
 def _crossings(first: Run, second: Run) -> int:
-    """Crossings if the first trunk is on the left."""
     over = sum(second.low < y < second.high for y in first.right)
     return over + sum(first.low < y < first.high for y in second.left)
 

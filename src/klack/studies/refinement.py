@@ -394,8 +394,6 @@ class _Path:
 
 @dataclass(frozen=True, slots=True)
 class _Best:
-    """Point, objectives, violation and achievement."""
-
     point: NDArray[np.float64]
     objectives: NDArray[np.float64]
     rank: tuple[float, float]

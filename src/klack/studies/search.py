@@ -146,7 +146,6 @@ def _spread(objectives: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _start_points(settings: SearchSettings, start: ArrayLike | None) -> NDArray[np.float64]:
-    """Different start points, in their order."""
     if start is None:
         return np.empty((0, settings.parameters))
     points = points_in_cube(start, settings.parameters, "start points of a search")

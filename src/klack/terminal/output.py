@@ -86,7 +86,6 @@ def write_json(path: Path, data: Mapping[str, Any]) -> None:
 
 
 def _write_to_stream(path: Path, text: str) -> None:
-    """Write to a device or a pipe with a reader."""
     handle = os.open(path, os.O_WRONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0))
     os.set_blocking(handle, True)
     with os.fdopen(handle, "w", encoding="utf-8") as file:

@@ -108,7 +108,6 @@ class _Lines:
             print(line, file=sys.stderr, flush=True)
 
     def stop(self) -> None:
-        """Say nothing more."""
         self._ended.set()
 
     def _tell(self, words: str) -> None:
@@ -124,11 +123,9 @@ class _Lines:
         self.fraction = fraction
 
     def remark(self, line: str) -> None:
-        """Print a line of text."""
         print(line, file=sys.stderr, flush=True)
 
     def finish(self) -> None:
-        """Report the stage that ends, if it took long."""
         elapsed = time.perf_counter() - self.start
         if self.stage and elapsed > _PATIENCE:
             print(f"{self.stage}: {elapsed:.1f} s", file=sys.stderr, flush=True)
@@ -216,7 +213,6 @@ class _Compiling:
             event.register(kind, self._listener)
 
     def forget(self) -> None:
-        """Listen no more."""
         if self._listener is not None:
             from numba.core import event
 

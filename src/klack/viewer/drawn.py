@@ -207,7 +207,6 @@ def _named(view: View, study: ImpactStudy | StrokeStudy, folder: Path) -> View:
 
 
 def _place_of_case(study: ImpactStudy | StrokeStudy, folder: Path) -> Path:
-    """Where files are looked for that the case of a result names."""
     return folder.absolute() / f"{study.case}.yaml"
 
 
@@ -400,7 +399,6 @@ def _without_case(study: StrokeStudy, folder: Path, variant: StrokeVariant, erro
 
 
 def _stroke_histories(study: StrokeStudy, variant: StrokeVariant) -> tuple[Curve, ...]:
-    """Lift, and the force of each stop."""
     wanted = [(study.channels.lift, "lift", 1e6, "µm")]
     wanted += [(f"{stop.name} peak force", f"{stop.name} force", 1.0, "N") for stop in study.stops]
     found = [(variant.channel(name), words, factor, unit) for name, words, factor, unit in wanted]

@@ -290,7 +290,6 @@ def heated_stroke(
 
 
 def _since(time: float | None, commands: Sequence[float]) -> float:
-    """Time since the last command before it, or since the start."""
     if time is None:
         return float("nan")
     before = [command for command in commands if command <= time]

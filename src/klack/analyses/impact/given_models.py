@@ -131,7 +131,6 @@ def _reduced(case: Case, pair: GivenPair, setup_time: float) -> LevelResult:
 
 
 def _contact(case: Case, pair: GivenPair, peak: float) -> ContactSummary:
-    """Static approach of the ports: law, residual compliance and modes in series."""
     force = np.linspace(0.0, 1.2 * peak, _POINTS + 1)[1:]
     local = _indentation(pair.law, force)
     linear = pair.series_compliance + pair.modal_compliance

@@ -296,8 +296,6 @@ def _study(
 
 
 class _Work:
-    """Impact in progress: the answer first, additions last."""
-
     def __init__(self, problem: ContactProblem, bodies: ImpactBodies) -> None:
         self.problem, self.bodies = problem, bodies
         self.case, self.pools = problem.case, bodies.pools

@@ -230,7 +230,6 @@ def _stability(
     clock: StageClock,
     threads: int | None,
 ) -> StabilitySweep:
-    """Slowest decay of an oscillation at every value of a sweep."""
     count = len(sweep.values)
     told = np.full((3, count), np.nan)
     unstable, failures = np.full(count, -1, dtype=np.int64), list[str]()

@@ -347,7 +347,6 @@ def _swept(sweeps: Sequence[Sweep]) -> tuple[SweptQuantity, ...]:
 
 
 def _quantities(found: Sequence[Measured | None]) -> tuple[PointQuantity, ...]:
-    """Columns of all points; nan where a point has none."""
     keys = dict.fromkeys(key for point in found if point is not None for key in point.values)
     return tuple(
         PointQuantity(

@@ -198,7 +198,6 @@ def _is_fixed(space: Space, name: str) -> bool:
 
 
 def _reason(case: AnyCase, item: VariedKey, linked: Sequence[Linked]) -> tuple[str, str] | None:
-    """Why a parameter has no derivative, and what to do instead."""
     if item.size == 0.0:
         return "a value of zero", "a range in a study tells how large a small change of it is."
     follow = [other.name for other in linked if item.name in other.words.values()]

@@ -100,7 +100,6 @@ class MeasureSlopes:
 
     @property
     def _is_apart(self) -> bool:
-        """Whether the predictions differ by more than the steps resolve."""
         if self.predicted is None or self.secant is None:
             return False
         return abs(self.predicted - self.secant) > self.resolution

@@ -186,7 +186,6 @@ _ShotText = Callable[[dict[str, float]], str]
 
 
 def _columns(study: ShotsStudy) -> tuple[tuple[str, _ShotText, str, bool], ...]:
-    """Head, text, column, and whether it is shown without variation."""
     unit, factor = length_unit(study.shots.rebound_height)
     return (
         ("eccentricity\n[µm]", _fixed("eccentricity", 1e6, 2), "eccentricity", True),

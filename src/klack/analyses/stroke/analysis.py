@@ -373,7 +373,6 @@ def start_text(variant: StrokeVariant) -> str:
 
 
 def _from_to(displacements: list[float]) -> str:
-    """Displacements of the points of a body; one if it is rigid."""
     ends = dict.fromkeys((min(displacements), max(displacements)))
     return " to ".join(format_si(y, "m", 3) for y in ends)
 

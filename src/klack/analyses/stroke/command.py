@@ -145,7 +145,6 @@ def _checked_case(
     *,
     check_steps: bool | None = None,
 ) -> "ValveCase":
-    """Read the case, with duration, step and accuracy of the command line."""
     from klack.case.any_case import load_valve_case
 
     case = load_valve_case(path, components)

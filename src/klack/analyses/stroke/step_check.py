@@ -219,7 +219,6 @@ def _change(event: ImpactEvent, other: ImpactEvent, number: int) -> ImpactChange
 
 
 def _unlike(run: Sequence[ImpactEvent], other: Sequence[ImpactEvent], k: int) -> str:
-    """Why impacts ``k`` of two runs differ; empty if they are the same."""
     if k >= len(other):
         return "missing with longer steps"
     if not _near(run, other, k):

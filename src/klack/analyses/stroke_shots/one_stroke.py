@@ -336,7 +336,6 @@ def _stroke_numbers(
 def _energies(
     valve: Valve, setup: StrokeSetup, variant: Variant, run: VariantRun
 ) -> tuple[Numbers, list[str]]:
-    """Energy through ports and surfaces of held bodies, or why it is missing."""
     found = dict.fromkeys(_ENERGIES, _NAN)
     if run.failure is not None:
         return found, []

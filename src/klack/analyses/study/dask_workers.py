@@ -129,7 +129,6 @@ class DaskTasks:
         return []
 
     def _again(self, future: "Future") -> None:
-        """Send points of a lost task once more, one by one; or give them up."""
         from distributed import KilledWorker
 
         places = self._places.pop(future)

@@ -291,7 +291,6 @@ def step_columns(rows: Sequence[PointRow]) -> NDArray[np.float64]:
 
 
 def _model(rows: Sequence[PointRow], today: PointRow) -> str:
-    """Model of the case, and how many points differ; empty for strokes."""
     first = next((row.model for row in (today, *rows) if row.model), "")
     others = sum(1 for row in rows if row.model not in ("", first))
     points = "1 point" if others == 1 else f"{others} points"

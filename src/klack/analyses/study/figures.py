@@ -152,7 +152,6 @@ def _front_chart(
 def _framed(
     item: StudyColumn, shown: NDArray[np.bool_], labels: Mapping[str, str]
 ) -> tuple[AxisSpec, float]:
-    """Axis over the points shown and today, with a margin."""
     spec, factor = _axis(item, labels)
     values = factor * np.append(item.values[shown], item.today)
     values = values[np.isfinite(values)]

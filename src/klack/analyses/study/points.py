@@ -495,7 +495,6 @@ def _drawn(source: StudySource, space: Space) -> StudyPoints:
 
 
 def _cube(source: StudySource, varied: Sequence[Parameter]) -> tuple[NDArray[np.float64], str]:
-    """Points of the unit cube of a drawn design, and its name."""
     design, count = source.study.design, len(varied)
     if design.kind == "saltelli":
         return saltelli_design(count, design.points, design.seed), "Saltelli's design"

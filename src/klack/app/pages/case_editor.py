@@ -151,7 +151,6 @@ class _Editor:
         return self._count
 
     async def _settle(self) -> None:
-        """Write what waits, then check the text, after the check before."""
         async with self._turn:
             await self._write()
             await self._check()
@@ -297,7 +296,6 @@ class _Editor:
         element("input", "k-input", placeholder=hint, **kind | common)
 
     async def _changed(self, event: Any) -> None:
-        """Write a form value into the text, nothing else."""
         box, value, count = event.args
         item = self._items[box]
         if not value:  # to remove a key is for the text, which shows what goes with it
@@ -348,7 +346,6 @@ class _Editor:
         return True
 
     async def _run(self) -> None:
-        """Run the case if the file is as seen; else offer to save it."""
         if self._is_too_long:
             self._message.set_text(f"Not run. {_TOO_LONG}")
             return

@@ -70,7 +70,6 @@ def answer_figures(now: Answer, ghost: Answer, names: tuple[str, str]) -> list[d
 def _curves_figure(
     now: Sequence[Curve], ghost: Sequence[Curve], x: str, y: str, names: tuple[str, str]
 ) -> dict[str, Any]:
-    """Lines over time, the pinned ones dashed and grey behind."""
     several = len(now) > 1 or len(ghost) > 1
     data = [
         _line(curve, _GHOST, f"{curve.name}, {names[1]}" if several else names[1], dash="dash")
@@ -84,7 +83,6 @@ def _curves_figure(
 
 
 def _bands_figure(now: Answer, ghost: Answer, names: tuple[str, str]) -> dict[str, Any]:
-    """Third octaves within 60 dB of the highest, as steps."""
     data = []
     for answer, colour, name, dash in (
         (ghost, _GHOST, names[1], "dash"),

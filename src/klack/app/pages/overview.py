@@ -114,7 +114,6 @@ class _Overview:
             await self._show_results()
 
     async def _find(self, event: Any) -> None:
-        """Show cases and results whose names contain a text."""
         self._sought = mine = str(event.args)[:200].lower()
         await asyncio.sleep(_REST)
         if mine == self._sought and self._found is not _NONE:
@@ -125,7 +124,6 @@ class _Overview:
         return tuple(name for name in names if self._sought in name.lower())
 
     async def _follow(self) -> None:
-        """Show progress of runs; look for results when one ends."""
         jobs = await asyncio.to_thread(self._state.jobs.all)
         states = tuple((job.name, job.state) for job in jobs)
         ended = {job.name for job in jobs if job.state != "running"}

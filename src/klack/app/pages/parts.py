@@ -214,7 +214,6 @@ class PartsStep:
                 plain(f"{found.words}; {turned}", "p").classes("k-read").props("role=status")
 
     def _show_models(self) -> None:
-        """Half sections or solids, if there is a choice; made again if that changes."""
         facts = [self._facts().get(body) for body in BODIES]
         read = [found for found in facts if isinstance(found, PartFacts)]
         shown = ""

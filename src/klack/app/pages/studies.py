@@ -99,7 +99,6 @@ class StudyPanel:
         self._show_choice(cases, found)
 
     def _cases(self) -> tuple[str, ...]:
-        """Case files, those of the same folder first."""
         cases = [case for case in self._state.folder.look().cases if case != self._path]
         here = self._path.rpartition("/")[0]
         return tuple(sorted(cases, key=lambda case: case.rpartition("/")[0] != here))
@@ -345,7 +344,6 @@ class _Page:
             await self._listen()
 
     async def _listen(self) -> None:
-        """Compute the click of the chosen point, the latest if several."""
         if self._is_busy or self._point is None:
             return
         self._is_busy = True
