@@ -79,6 +79,15 @@ def test_single_equivalents_of_two_reception_plates() -> None:
         assert values == pytest.approx(known[name], rel=1e-6, abs=0.0)
 
 
+def test_reception_plates_with_point_contacts_leave_rotations_free() -> None:
+    """A beam with its tilts at the feet gives the same numbers; feet with a size give others."""
+    f = np.array([500.0, 4000.0])
+    plain, tilted = single_equivalents(beam_source(f)), beam_source(f, slopes=True)
+    assert single_equivalents(tilted).force == pytest.approx(plain.force, rel=1e-9, abs=0.0)
+    wide = single_equivalents(tilted, radius=5e-3).force
+    assert (np.abs(wide / plain.force - 1.0) > 1e-4).all()
+
+
 def test_velocity_of_a_joint_over_time() -> None:
     """On the shifted contour 5e-7 of the peak; the table has every twentieth value."""
     known = table("coupled_time_signal")["v_m_s"]
@@ -99,10 +108,33 @@ def test_a_record_that_rings_longer_than_it_lasts_is_refused() -> None:
     with pytest.raises(InputError, match="energy in the last tenth"):
         signal(50.0)
     found = signal(0.5)
+    assert found.step == pytest.approx(5e-6, rel=1e-12)
     exact = two_masses_exact(4000)
     # a free source keeps its momentum: the mass on its spring swings, so only the band counts
     assert np.abs(found.velocity[:4000, 0] - exact).max() < 0.02 * np.abs(exact).max()
     assert "Faded out" in found.notes[0]
+
+
+def test_the_ends_of_a_measured_band_are_faded() -> None:
+    """Lines from 400 to 4000 Hz: half cosines over a third octave at both ends, and notes."""
+    f = np.arange(400.0, 4000.5, 1.0)
+    receiver = KnownReceiver(
+        points=two_masses(f, 0.0).points,
+        freedoms=two_masses(f, 0.0).freedoms,
+        mobility=lambda s: (1e-3 + 0.0 * s)[:, None, None],
+    )
+    found = measured_signal(two_masses, lambda source: couple(source, receiver), f, step=1e-4)
+    joined = couple(two_masses(f, 0.0), receiver)
+    fade = np.ones_like(f)
+    for low, high in ((400.0, 400.0 * 2 ** (1 / 3)), (4000.0, 4000.0 / 2 ** (1 / 3))):
+        inside = (f - low) * (f - high) <= 0
+        fade[inside] = 0.5 - 0.5 * np.cos(np.pi * (f[inside] - low) / (high - low))
+    whole = np.zeros(5001, dtype=complex)
+    whole[400:4001] = joined.velocity[:, 0] * fade
+    expected = np.roll(np.fft.irfft(whole, 10000) * 1e4, 75)[:9500]
+    assert found.start == pytest.approx(-3 / 400.0, rel=1e-12)
+    assert found.velocity[:, 0] == pytest.approx(expected, rel=1e-9, abs=1e-12 * expected.max())
+    assert [note.split()[0] for note in found.notes] == ["Faded", "Nothing"]
 
 
 # --------------------------------------------------------------------------- bodies
@@ -123,15 +155,16 @@ def dynamic(body: tuple[np.ndarray, ...], s: np.ndarray) -> np.ndarray:
 class Pair:
     """Nine freedoms with three internal forces on a receiver of eight, joined at six."""
 
-    def __init__(self, seed: int = 1) -> None:
-        draw = np.random.default_rng(seed)
+    def __init__(self, shift: float = 0.0) -> None:
+        draw = np.random.default_rng(1)
         self.f = np.array([20.0, 300.0, 4000.0])
-        self.s = laplace(self.f)
+        self.s = laplace(self.f, shift)
         self.Z_S, self.Z_R = (dynamic(network(draw, size), self.s) for size in (9, 8))
         self.push = draw.normal(size=3)
         Y = np.linalg.inv(self.Z_S)
         self.source = SourceAtMounts(
             frequency=self.f,
+            shift=shift,
             points=POINT,
             freedoms=freedoms_of("a"),
             free_velocity=Y[:, :6, 6:] @ self.push,
@@ -201,6 +234,15 @@ def test_springs_in_two_directions_as_assembled() -> None:
     assert lost == pytest.approx(by_hand, rel=1e-9, abs=0.0)
 
 
+def test_damped_springs_beside_the_axis_as_assembled() -> None:
+    """At ``s`` with a real part of 900 1/s, as time signals need it."""
+    pair = Pair(shift=900.0)
+    spring = Spring(values={2: 3e5}, damping={2: 40.0})
+    found = couple(pair.source, pair.receiver, isolators={"a": spring})
+    across = np.array([[[k, -k], [-k, k]] for k in 3e5 + 40.0 * pair.s])
+    same(found, pair.direct(blocks=[(1, across)], rigid=[0, 2, 3, 4, 5]))
+
+
 def test_an_element_with_inertia_as_assembled() -> None:
     """50 g between two springs in z, a spring in x, the rest rigid."""
     pair = Pair()
@@ -259,6 +301,23 @@ def test_directions_that_are_reversed_and_points_with_axes_of_their_own() -> Non
     assert own.power == pytest.approx(plain.power, rel=1e-9, abs=0.0)
 
 
+def test_a_source_with_a_reversed_direction() -> None:
+    """Its force along -z is minus that along z; powers stay."""
+    pair = Pair()
+    sign = np.array([1, 1, -1, 1, -1, 1])
+    source = SourceAtMounts(
+        frequency=pair.f,
+        points=POINT,
+        freedoms=freedoms_of("a", ("x", "y", "-z", "rx", "-ry", "rz")),
+        free_velocity=pair.source.free_velocity * sign,
+        blocked_force=pair.source.blocked_force * sign,
+        mobility=pair.source.mobility * sign * sign[:, None],
+    )
+    reversed_, plain = couple(source, pair.receiver), couple(pair.source, pair.receiver)
+    assert reversed_.force == pytest.approx(plain.force * sign, rel=1e-9, abs=0.0)
+    assert reversed_.pressure == pytest.approx(plain.pressure, rel=1e-9, abs=0.0)
+
+
 def test_missing_freedoms_are_listed_and_blocked_or_freed_on_demand() -> None:
     """Without rotations: blocked is a receiver of zero mobility, free a source without them."""
     pair = Pair()
@@ -288,6 +347,8 @@ def test_blocked_force_in_situ_through_isolators() -> None:
         test = virtual_test(junction(pair.source, pair.receiver, isolators=isolators), length=0.03)
         assert test.deviation.max() < 1e-9
         assert test.exact == pytest.approx(pair.source.blocked_force, rel=1e-9, abs=0.0)
+    scaled = test.assembly * np.array([1, 1, 1, 0.03, 0.03, 0.03])
+    assert test.condition == pytest.approx(np.linalg.cond(scaled), rel=1e-6)
     with pytest.raises(InputError, match="2 indicators for 6"):
         virtual_test(junction(pair.source, pair.receiver), length=0.03, indicators=["a.x", "a.y"])
 
@@ -374,6 +435,17 @@ def test_plates_are_reciprocal_and_take_power() -> None:
             assert (np.abs(Y - Y.transpose(0, 2, 1)).max(axis=(1, 2)) < 1e-12 * size).all()
             lowest = np.linalg.eigvalsh(0.5 * (Y + Y.conj().transpose(0, 2, 1)))[:, 0]
             assert (lowest > -1e-12 * size).all()
+
+
+def test_a_plate_at_its_first_resonance() -> None:
+    """``phi^2 / (2 zeta omega)``, 4 / (m S eta omega) in the middle."""
+    plate = Plate(thickness=1.5e-3, area=1.0, material=PLATE_STEEL, loss_factor=0.002)
+    middle = (InterfacePoint(name="a", position=np.array([0.25, 0.3, 0.0])),)
+    model = finite_plate(plate, (0.5, 0.6), middle, highest=2e3)
+    own = np.sqrt(plate.bending_stiffness / plate.mass_per_area) * np.pi**2 * (4 + 1 / 0.36)
+    Y = model.at(np.array([1j * own])).mobility[0, 0, 0]
+    expected = 4.0 / (plate.mass_per_area * 0.3 * 0.002 * own)
+    assert Y.real == pytest.approx(expected, rel=1e-4)
 
 
 def test_limits_of_plates_are_told() -> None:

@@ -494,6 +494,15 @@ def test_a_virtual_point_of_a_rigid_face_is_exact(model) -> None:
     assert min(receiver.consistency.values()) > 1.0 - 1e-12
 
 
+def test_a_virtual_point_with_a_reversed_freedom(model) -> None:
+    """Reversed as asked."""
+    names = ("x", "y", "-z", "rx", "ry", "rz")
+    point = VirtualPoint(position=CENTRE, nodes=["1", "2", "3"], freedoms=names)
+    found = measured_receiver(face(model), {"front": point}).mobility
+    sign = np.array([1, 1, -1, 1, 1, 1])
+    assert found == pytest.approx(model[0][:, :6, :6] * sign * sign[:, None], rel=1e-9, abs=0.0)
+
+
 @pytest.mark.filterwarnings("ignore:.*reciprocity")
 def test_a_channel_with_a_wrong_sign_is_named(model) -> None:
     """Its consistency is the lowest."""

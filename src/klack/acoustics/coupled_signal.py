@@ -9,7 +9,8 @@ hold at ``s``: modal damping does, a constant loss factor does not.
 **Measured** responses exist on the axis alone, at lines ``df`` apart, and a record of ``1/df``
 must hold all of the ringing.  So the energy before time zero and at the end of the record is
 judged, and the time signal refused where it is too much.  Nothing is extrapolated: the ends of the
-measured band are faded by half a cosine over one third octave.
+measured band are faded by half a cosine over one third octave.  A band that begins above 0 rings
+before its cause, about three periods of its lowest frequency; these belong to the signal.
 """
 
 from collections.abc import Callable
@@ -30,6 +31,7 @@ _DECAYS = 13.8  # alpha T: what is left at the end is 1e-6 of what it was
 _RINGING = 1e-4  # share of the energy in the last tenth before what precedes time zero
 _BEFORE = 1e-3  # share of the energy before time zero
 _THIRD = 2.0 ** (1.0 / 3.0)
+_PERIODS = 3.0  # of the lowest frequency, in which a band that begins there rings before its cause
 
 SourceAt = Callable[[Vector, float], SourceAtMounts]
 """Source at frequencies (k,) [Hz] and a shift [1/s]."""
@@ -39,11 +41,13 @@ Coupling = Callable[[SourceAtMounts], Coupled]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CoupledSignal:
-    """Signals over time, from the beginning of the click.
+    """Signals over time.
 
     Parameters
     ----------
     step [s]
+    start [s]
+        Time of the first value; the source's spectra count from 0.
     force, velocity (t, n) [N], [m/s]
         On the receiver and of it, by freedom.
     pressure (t, ears) [Pa]
@@ -52,6 +56,7 @@ class CoupledSignal:
     """
 
     step: float
+    start: float = 0.0
     ears: tuple[str, ...]
     force: Matrix
     velocity: Matrix
@@ -68,7 +73,7 @@ class CoupledSignal:
             hint="ears are pressures per force in the receiver's responses.",
         )
         values = self.pressure[:, self.ears.index(name)]
-        return TimeSeries(step=self.step, values=values, unit="Pa", name=name)
+        return TimeSeries(step=self.step, start=self.start, values=values, unit="Pa", name=name)
 
 
 def model_signal(
@@ -149,16 +154,22 @@ def measured_signal(
         full[first : last + 1] = spectra * fade[:, None]
         return np.asarray(scipy.fft.irfft(full, count, axis=0) * (apart * count))
 
+    before = count // 20  # of the record is what precedes time zero
+    early = 0 if first <= 1 else min(round(_PERIODS / (frequency[0] * step)), before // 2)
     velocity, pressure = over_time(joined.velocity), over_time(joined.pressure)
-    kept = count - count // 20  # the rest is what precedes time zero
     for name, values in (("velocity", velocity), ("pressure", pressure)):
-        _judge(name, values, kept, apart)
+        _judge(name, values, count - before, count - early, apart)
+
+    def kept(values: Matrix) -> Matrix:
+        return np.roll(values, early, axis=0)[: count - before]
+
     return CoupledSignal(
         step=step,
+        start=-early * step,
         ears=joined.ears,
-        force=over_time(joined.force)[:kept],
-        velocity=velocity[:kept],
-        pressure=pressure[:kept],
+        force=kept(over_time(joined.force)),
+        velocity=kept(velocity),
+        pressure=kept(pressure),
         notes=notes,
     )
 
@@ -179,20 +190,20 @@ def _fade(frequency: Vector, *, whole: bool) -> tuple[Vector, tuple[str, ...]]:
     return fade, tuple(notes)
 
 
-def _judge(name: str, values: Matrix, kept: int, apart: float) -> None:
-    """Refuse a record that ends before its ringing, or rings before time zero."""
+def _judge(name: str, values: Matrix, last: int, cause: int, apart: float) -> None:
+    """Refuse a record that ends before its ringing, or rings before its cause."""
     energy = np.sum(values**2, axis=1)
     whole = float(energy.sum())
     if whole == 0.0:
         return
-    late = float(energy[kept - values.shape[0] // 10 : kept].sum()) / whole
-    early = float(energy[kept:].sum()) / whole
+    late = float(energy[last - values.shape[0] // 10 : last].sum()) / whole
+    early = float(energy[last:cause].sum()) / whole
     if late < _RINGING and early < _BEFORE:
         return
     raise InputError(
         f"time signal of the {name}",
         got=f"{100 * late:.2g} % of the energy in the last tenth of {1.0 / apart:.3g} s and "
-        f"{100 * early:.2g} % before time zero",
+        f"{100 * early:.2g} % before its cause",
         expected=f"less than {100 * _RINGING:g} % and {100 * _BEFORE:g} %: all of the ringing "
         "inside the record, and none before its cause",
         hint="measure lines closer together (or with the damping of the mounted machine), or use "

@@ -231,6 +231,9 @@ _QUANTITIES = {
     **dict.fromkeys(("pressure", "p"), "pressure"),
 }
 _UNNAMED = ("y", "h", "frf")
+_AXES = ("frequency", "frequencies", "f", "freq")
+_KNOWN = {*_QUANTITIES, *_UNNAMED, *_AXES, "outputs", "inputs", "ears", "quantity"}
+_KNOWN |= {"nodes", "positions"}
 
 Arrays = Mapping[str, Any]
 
@@ -251,7 +254,7 @@ def read_array_responses(path: Path) -> FrequencyResponses:
         hint="check the path.",
     )
     held = {key.lower(): value for key, value in _arrays(path).items()}
-    f = next((held[key] for key in ("frequency", "frequencies", "f", "freq") if key in held), None)
+    f = next((held[key] for key in _AXES if key in held), None)
     refuse_if(
         f is None,
         str(path),
@@ -315,10 +318,8 @@ def _of_matrix(
 def _complex(held: Arrays, key: str) -> NDArray[Any] | None:
     if key in held and isinstance(held[key], np.ndarray):
         return np.asarray(held[key])
-    for real, imag in (("_real", "_imag"), ("_re", "_im")):
-        if key + real in held and key + imag in held:
-            return np.asarray(held[key + real]) + 1j * np.asarray(held[key + imag])
-    return None
+    real, imag = held.get(f"{key}_real"), held.get(f"{key}_imag")
+    return None if real is None or imag is None else np.asarray(real) + 1j * np.asarray(imag)
 
 
 def _words(value: Any) -> list[str]:
@@ -328,7 +329,9 @@ def _words(value: Any) -> list[str]:
     if isinstance(value, np.ndarray) and value.dtype.kind not in "OSU":
         return []
     items = [v[0] if isinstance(v, tuple | list) and len(v) == 1 else v for v in value]
-    return [(v.decode() if isinstance(v, bytes) else str(v)).strip() for v in items]
+    return [
+        (v.decode("utf-8", "replace") if isinstance(v, bytes) else str(v)).strip() for v in items
+    ]
 
 
 def _places(path: Path, held: Arrays) -> dict[str, Vector]:
@@ -377,7 +380,7 @@ def _npz(path: Path) -> Arrays:
 
 
 def _hdf5(path: Path) -> Arrays:
-    """Data sets and texts of the file itself and its attributes; links are not followed."""
+    """Known data sets and texts of the file itself and its attributes; links are not followed."""
     h5py = optional_package("h5py", f"reading {path.name} (HDF5)", "measurement")
     arrays: dict[str, Any] = {}
     with (
@@ -387,6 +390,8 @@ def _hdf5(path: Path) -> Arrays:
         arrays |= {key: value for key, value in file.attrs.items() if not key.startswith("_")}
         matlab = "MATLAB_class" in {k for key in file for k in _attributes(h5py, file, key)}
         for key in file:
+            if key.lower().removesuffix("_real").removesuffix("_imag") not in _KNOWN:
+                continue
             item = file.get(key, getlink=True)
             if not isinstance(item, h5py.HardLink) or not isinstance(file[key], h5py.Dataset):
                 continue
