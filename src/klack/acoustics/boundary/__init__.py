@@ -1,0 +1,1 @@
+"""Sound around closed surfaces: boundary elements, and what they make of the motion of a body."""
