@@ -230,6 +230,8 @@ COVERS = {
     "sound": "From force to ear: one-third octaves, weighting, levels, and loudness of ISO 532-1.",
     "structure-borne": "A source on a receiver: rods and beams joined, plates, isolators, "
     "blocked forces, reception plates of EN 15657, time signals.",
+    "radiation": "Sound of moving surfaces by boundary elements: spheres, cylinders, small rigid "
+    "bodies.",
     "measurement": "Lift sensor, differentiation and impacts found in records of exact flights.",
     "measured": "Measurements of others: strain pulses of struck bars, oblique impacts of spheres.",
     "mechanics": "Mass, spring, friction, gravity and forces in the time loop, against closed "

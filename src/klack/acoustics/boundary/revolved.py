@@ -28,6 +28,8 @@ from klack.machine.compiling.jit import inner, njit
 
 __all__ = ["Meridian"]
 
+Complexes = NDArray[np.complex128]
+
 _AROUND = np.polynomial.legendre.leggauss(8)
 _ALONG = np.polynomial.legendre.leggauss(5)
 _PHASE = 6.0  # of a wave within a panel, for eight points
@@ -114,7 +116,7 @@ class Meridian:
             return np.column_stack([nr, z * nr - r * nz])
         return np.zeros((len(r), 2))
 
-    def kernels(self, points: Matrix, wave_number: float) -> tuple[NDArray, NDArray]:
+    def kernels(self, points: Matrix, wave_number: float) -> tuple[Complexes, Complexes]:
         """G and H (k, n) [m; -] of all elements at points (k, 2), on the surface or off it."""
         places = np.ascontiguousarray(points, dtype=float)
         return _kernels(places, self.nodes, wave_number, self.order, *_AROUND, *_ALONG)
@@ -125,7 +127,7 @@ class Meridian:
         found = spread_inside(self.nodes, count, draw, lambda at: _within(loop, at), self._distance)
         return found
 
-    def far_field(self, wave_number: float, angles: Vector) -> tuple[NDArray, NDArray]:
+    def far_field(self, wave_number: float, angles: Vector) -> tuple[Complexes, Complexes]:
         """Far pressure (a, n) for unit pressure and velocity [m], times ``exp(-ikr)/r``.
 
         Parameters
@@ -135,12 +137,19 @@ class Meridian:
         """
         from scipy.special import jv
 
-        (r, z), (nr, nz), k, m = self.centres.T, self.normals.T, wave_number, self.order
+        k, m = wave_number, self.order
         sin, cos = np.sin(angles)[:, None], np.cos(angles)[:, None]
-        x = k * r * sin
-        j, slope = jv(m, x), (jv(m - 1, x) - jv(m + 1, x)) / 2.0
-        turn = 0.5j * k * self.lengths * r * np.exp(1j * k * z * cos) * 1j**m
-        return turn * (nr * sin * -1j * slope + nz * cos * j), turn * j
+        nr, nz = self.normals.T
+        by_pressure = np.zeros((len(angles), len(nr)), dtype=complex)
+        by_velocity = by_pressure.copy()
+        for u, weight in zip(*_ALONG, strict=True):
+            r, z = (self.centres + 0.5 * u * np.diff(self.nodes, axis=0)).T
+            x = k * r * sin
+            bessel, slope = jv(m, x), (jv(m - 1, x) - jv(m + 1, x)) / 2.0
+            turn = 0.25j * k * weight * self.lengths * r * np.exp(1j * k * z * cos) * 1j**m
+            by_pressure += turn * (nz * cos * bessel - 1j * nr * sin * slope)
+            by_velocity += turn * bessel
+        return by_pressure, by_velocity
 
     def _distance(self, points: Matrix) -> Vector:
         a, d = self.nodes[:-1], np.diff(self.nodes, axis=0)
@@ -163,7 +172,18 @@ def _within(loop: Matrix, points: Matrix) -> NDArray[np.bool_]:
 
 
 @inner
-def _around(r, z, s, t, nr, nz, k, m, x, w):
+def _around(
+    r: float,
+    z: float,
+    s: float,
+    t: float,
+    nr: float,
+    nz: float,
+    k: float,
+    m: int,
+    x: Vector,
+    w: Vector,
+) -> tuple[complex, complex]:
     """Both kernels of a ring (s, t) with normal (nr, nz), seen from (r, z), times its radius."""
     near = (r - s) ** 2 + (z - t) ** 2
     wide = np.sqrt(max(r * s, 1e-300))
@@ -177,7 +197,6 @@ def _around(r, z, s, t, nr, nz, k, m, x, w):
         for q in range(x.size):
             phi = begin + half * (1.0 + x[q])
             lift = np.sin(0.5 * phi) ** 2
-            c = 1.0 - 2.0 * lift
             R = np.sqrt(near + 4.0 * r * s * lift)
             dn = ((s - r) * nr + 2.0 * r * nr * lift + (t - z) * nz) / R
             value = half * w[q] * np.cos(m * phi) / (2.0 * np.pi * R)
@@ -189,7 +208,16 @@ def _around(r, z, s, t, nr, nz, k, m, x, w):
 
 
 @njit(nogil=True, error_model="numpy")
-def _kernels(points, nodes, k, m, around, around_weights, along, along_weights):
+def _kernels(
+    points: Matrix,
+    nodes: Matrix,
+    k: float,
+    m: int,
+    around: Vector,
+    around_weights: Vector,
+    along: Vector,
+    along_weights: Vector,
+) -> tuple[Complexes, Complexes]:
     """G and H of all elements at points."""
     count = nodes.shape[0] - 1
     G = np.zeros((points.shape[0], count), dtype=np.complex128)

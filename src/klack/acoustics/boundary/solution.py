@@ -18,12 +18,13 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from klack.arrays import Matrix, Vector
+from klack.arrays import Floats, Matrix, Vector
 from klack.errors import ConvergenceError
 
 __all__ = ["LARGEST_RESIDUAL", "BoundaryMesh", "Radiation", "radiation"]
 
 Complexes = NDArray[np.complex128]
+Motions = Floats | Complexes
 
 LARGEST_RESIDUAL = 0.02
 """Of the largest pressure: what may be left in the inside, where silence is the solution."""
@@ -70,7 +71,7 @@ class Radiation:
 
     mesh: BoundaryMesh
     wave_number: float
-    velocity: NDArray
+    velocity: Motions
     pressure: Complexes
     residual: float
 
@@ -97,7 +98,7 @@ class Radiation:
         return np.asarray(H @ self.pressure + 1j * self.wave_number * (G @ self.velocity))
 
 
-def radiation(mesh: BoundaryMesh, wave_number: float, velocity: NDArray) -> Radiation:
+def radiation(mesh: BoundaryMesh, wave_number: float, velocity: Motions) -> Radiation:
     """Solve for the pressure of all motions; ConvergenceError where the inside is not silent.
 
     Points inside come from one draw, the judgement from another that the solution does not know;
@@ -127,14 +128,13 @@ def radiation(mesh: BoundaryMesh, wave_number: float, velocity: NDArray) -> Radi
             )
     raise ConvergenceError(
         f"boundary elements at {wave_number:.4g} per metre: {100 * residual:.3g} % of the largest "
-        f"pressure is left inside the body, where there must be none (allowed: "
-        f"{100 * LARGEST_RESIDUAL:g} %).",
-        hint="take smaller elements, six or more to a wavelength, and two or more across the "
-        "thinnest part; or 'radiation: piston'.",
+        "pressure is left inside the body, where there must be none (allowed: "
+        f"{100 * LARGEST_RESIDUAL:g} %).\nTry: smaller elements, six or more to a wavelength and "
+        "two or more across the thinnest part."
     )
 
 
-def _rows(G: Complexes, left: Complexes, k: float, v: NDArray) -> tuple[Complexes, Complexes]:
+def _rows(G: Complexes, left: Complexes, k: float, v: Motions) -> tuple[Complexes, Complexes]:
     return left, 1j * k * (G @ v)
 
 
