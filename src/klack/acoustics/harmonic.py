@@ -16,7 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.acoustics.mount import Mount, moved_mass, support_mobility
+from klack.acoustics.at_mounts import blocked_force, mount_impedance
+from klack.acoustics.interface import laplace
+from klack.acoustics.mount import Mount, axial_freedom, moved_mass, support_mobility
 from klack.acoustics.plate import Plate
 from klack.bodies.reduction.structure import Structure
 from klack.errors import InputError
@@ -68,13 +70,15 @@ def harmonic_response(
     w, zeta = structure.omega, structure.damping
     receptance = 1.0 / (w**2 - omega**2 + 2j * zeta * w * omega)
     phi, p = structure.port_shapes[:, at], structure.participation
-    omega = omega[:, 0]
-    blocked = np.asarray(1.0 + omega**2 * (receptance @ (p * phi)), dtype=complex)
-    velocity, force = np.zeros(f.size, dtype=complex), blocked
+    omega, s = omega[:, 0], laplace(f)
+    driven_port = np.zeros((f.size, count), dtype=complex)
+    driven_port[:, at] = 1.0
+    force = blocked_force(axial_freedom(structure, structure.mass), driven_port, s)[:, 0]
+    velocity = np.zeros(f.size, dtype=complex)
     if mount is not None or plate is not None:
-        apparent = moved_mass(structure, mount) + omega**2 * (receptance @ p**2)
+        own = mount_impedance(axial_freedom(structure, moved_mass(structure, mount)), s)[:, 0, 0]
         below = support_mobility(f, mount, plate)
-        force = blocked / (1.0 + 1j * omega * apparent * below)
+        force = force / (1.0 + own * below)
         velocity = force * below
     fields = np.zeros((f.size, m + count + 1), dtype=complex)
     driven = phi - 1j * (omega * velocity)[:, None] * p

@@ -19,10 +19,11 @@ import scipy
 from numpy.typing import NDArray
 
 from klack.acoustics.plate import Plate
+from klack.bodies.reduction.craig_bampton import CraigBampton
 from klack.bodies.reduction.structure import Structure
 from klack.errors import InputError, require_nonnegative, require_positive
 
-__all__ = ["Mount", "mounted", "moved_mass", "support_mobility"]
+__all__ = ["Mount", "axial_freedom", "mounted", "moved_mass", "support_mobility"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,6 +62,24 @@ def moved_mass(structure: Structure, mount: Mount | None) -> float:
     return mass
 
 
+def axial_freedom(structure: Structure, mass: float) -> CraigBampton:
+    """All held surfaces as one mount that moves along the axis, with a mass [kg] on it."""
+    none = np.zeros((1, 1))
+    return CraigBampton(
+        omega=structure.omega,
+        damping=structure.damping,
+        mounts=("support",),
+        directions=(3,),
+        participation=structure.participation[:, None],
+        mass=np.full((1, 1), mass),
+        stiffness=none,
+        loss=none,
+        port_names=structure.port_names,
+        port_shapes=structure.port_shapes,
+        port_motion=np.ones((1, len(structure.port_names))),
+    )
+
+
 def support_mobility(
     frequency: NDArray[np.float64], mount: Mount | None, plate: Plate | None
 ) -> NDArray[np.complex128]:
@@ -87,9 +106,8 @@ def mounted(structure: Structure, mount: Mount) -> Structure:
     Johnson & Kienholz 1982), as long as damped modes do not overlap.
     """
     mass, m = moved_mass(structure, mount), len(structure.omega)
-    M, K = np.eye(m + 1), np.diag([*structure.omega**2, mount.stiffness])
-    M[m, :m] = M[:m, m] = structure.participation
-    M[m, m] = mass
+    M, K = axial_freedom(structure, mass).matrices()
+    K[m, m] = mount.stiffness
     squares, psi = scipy.linalg.eigh(K, M)
     omega = np.sqrt(squares)
     fixed, motion = psi[:m], psi[m]

@@ -8,6 +8,7 @@ from math import pi, sqrt
 import numpy as np
 import scipy
 
+from klack.acoustics.at_mounts import source_at_mounts
 from klack.acoustics.coupled_signal import model_signal
 from klack.acoustics.coupling import Coupled, couple, junction
 from klack.acoustics.in_situ import virtual_test
@@ -24,8 +25,16 @@ from klack.acoustics.plate import Plate
 from klack.acoustics.receivers.plates import InfinitePlate, finite_plate
 from klack.acoustics.source_levels import single_equivalents
 from klack.arrays import Vector
+from klack.bodies.elasticity.body import elastic_body
+from klack.bodies.elasticity.eigen import eigenmodes
+from klack.bodies.elasticity.statics import Flexibility
+from klack.bodies.reduction.craig_bampton import craig_bampton
+from klack.bodies.reduction.damping import RayleighDamping
+from klack.bodies.reduction.mounting import interface_of, mounting_surface
+from klack.bodies.reduction.ports import surface_port
 from klack.materials.material import Material
 from klack.verification.check import Check, ComparedCurve, check
+from klack.verification.lattice import lattice_mesh
 
 __all__ = [
     "KnownReceiver",
@@ -67,11 +76,20 @@ RODS = (
     (43210.0, 2.0904021002e-02, 4.8540377228e-04, 6.5557313933e-03),
 )
 
+# frequency [Hz], free velocity [m/s], mobility [m/(N s)], blocked force [N] of the first rod
+MOUNTED_ROD = (
+    (1000.0, 4.0833903685e-03, 4.0759081076e-03, 1.0018357286e00),
+    (7300.0, 5.7765166661e-04, 5.2214121654e-04, 1.1063130975e00),
+    (20000.0, 2.6399384200e-04, 9.2966494948e-05, 2.8396665072e00),
+    (43210.0, 4.9263806743e-04, 4.2619604117e-04, 1.1558954562e00),
+)
+
 
 def checks() -> list[Check]:
     """Run all checks of this group."""
     return [
         *_rods(),
+        *_own_rod(),
         *_rod_between(),
         *_beam(),
         *_blocked(),
@@ -157,6 +175,48 @@ def _rods() -> Iterator[Check]:
                 1e-9,
                 source,
                 reason=_DIGITS,
+            )
+
+
+def _own_rod() -> Iterator[Check]:
+    """The first rod as a Craig-Bampton body of finite elements; 1 N at its free end."""
+    length, radius = 0.05, sqrt(1e-4 / pi)
+    material = Material(name="rod", young=210e9, poisson=0.0, density=7800.0)
+    mesh = lattice_mesh("quad8", [np.array([0.0, radius]), np.linspace(0.0, length, 41)])
+    mount = mounting_surface(mesh, ["top"], "end", kind="rigid")
+    body = elastic_body("rod", mesh, {"solid": material}, fixed_nodes=mount.nodes)
+    pattern = surface_port(mesh, "bottom", "z", name="push").pattern[:, None]
+    with Flexibility(body) as flexibility:
+        modes = eigenmodes(body, count=40, flexibility=flexibility)
+        found = [
+            source_at_mounts(
+                [
+                    craig_bampton(
+                        flexibility,
+                        [interface_of(body, mount)],
+                        modes,
+                        # at one frequency viscous losses are those of a complex modulus
+                        damping=RayleighDamping(alpha=0.0, beta=1e-3 / (2.0 * pi * f)),
+                        port_names=("push",),
+                        patterns=pattern,
+                    )
+                ],
+                [np.ones((1, 1), dtype=complex)],
+                _END,
+                np.array([f]),
+            )
+            for f, *_ in MOUNTED_ROD
+        ]
+    whole = [(x.free_velocity[0, 0], x.mobility[0, 0, 0], x.blocked_force[0, 0]) for x in found]
+    for i, what in enumerate(("free velocity [m/s]", "mobility [m/(N s)]", "blocked force [N]")):
+        for (f, *known), values in zip(MOUNTED_ROD, whole, strict=True):
+            yield check(
+                f"{what} of a rod of finite elements with 40 modes, {f / 1e3:g} kHz",
+                expected=known[i],
+                computed=abs(values[i]),
+                tolerance=5e-4,
+                source="exact rod with a complex modulus",
+                reason="modes that are left out; largest beside a resonance of the free rod",
             )
 
 
