@@ -17,6 +17,7 @@ from klack.acoustics.interface import (
 from klack.acoustics.receivers.measured import (
     VirtualPoint,
     frequencies_within,
+    heard_receiver,
     measured_receiver,
 )
 from klack.acoustics.receivers.modal import ModalReceiver, body_receiver
@@ -27,6 +28,7 @@ from klack.bodies.reduction.damping import ModalDamping
 from klack.bodies.reduction.from_modal_data import body_of_craig_bampton
 from klack.errors import AccuracyWarning, InputError
 
+HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
 F = np.linspace(50.0, 1000.0, 381)
 S = laplace(F)
 FREEDOMS = (*freedoms_of("front"), *freedoms_of("rear", ("x", "z")))
@@ -424,6 +426,20 @@ def test_pressures_of_another_file_on_other_lines(model) -> None:
     assert "room" in receiver.notes[-1]
 
 
+def test_a_model_gets_ears_from_a_file(model, source) -> None:
+    """Force and pressure as of the receiver whose ears it has; moments without a blow are told."""
+    found = responses(model)
+    alone = measured_receiver(found, BOTH)
+    with_ears = heard_receiver(alone, found, {"driver": "ear"})
+    expected = couple(source, measured_receiver(found, BOTH, ears={"driver": "ear"}))
+    heard = couple(source, with_ears)
+    assert heard.force == pytest.approx(expected.force, rel=1e-12, abs=0.0)
+    assert heard.pressure == pytest.approx(expected.pressure, rel=1e-12, abs=0.0)
+    assert heard.ears == ("driver",)
+    with pytest.raises(InputError, match="no pressure per force at front"):
+        heard_receiver(alone, found, {"driver": "ear"}, nodes={"front": "elsewhere"})
+
+
 def test_responses_on_different_lines_are_brought_together() -> None:
     """Linear functions of frequency stay what they are; without a common range it is an error."""
     pair = channel_of("a.z"), channel_of("a.z")
@@ -492,6 +508,14 @@ def test_a_virtual_point_of_a_rigid_face_is_exact(model) -> None:
     assert receiver.transfers[:, 0] == pytest.approx(model[1][:, 0, :6], rel=1e-9, abs=0.0)
     assert len(receiver.consistency) == 9
     assert min(receiver.consistency.values()) > 1.0 - 1e-12
+
+
+def test_a_virtual_point_of_a_small_foot(model) -> None:
+    """Rotations are scaled by the distance of the channels: 0.2 mm are as good as 20 mm."""
+    near = {node: CENTRE + 0.01 * (place - CENTRE) for node, place in CORNERS.items()}
+    point = VirtualPoint(position=CENTRE, nodes=["1", "2", "3"])
+    found = measured_receiver(face(model, nodes=near), {"front": point}).mobility
+    assert found == pytest.approx(model[0][:, :6, :6], rel=1e-7, abs=0.0)
 
 
 def test_a_virtual_point_with_a_reversed_freedom(model) -> None:
@@ -593,6 +617,68 @@ def test_tables_of_elements_that_cannot_be_used(old, new, says, tmp_path) -> Non
 
 
 # --------------------------------------------------------------------------- bad files
+
+
+def damaged(data: bytes, draw: np.random.Generator) -> bytes:
+    """Truncated, bytes changed, or a piece missing."""
+    kind, at = draw.integers(3), int(draw.integers(1, len(data) - 300))
+    if kind == 0:
+        return data[:at]
+    if kind == 1:
+        return data[:at] + data[at + int(draw.integers(1, 200)) :]
+    changed = bytearray(data)
+    for place in draw.integers(0, len(data), 8):
+        changed[place] = int(draw.integers(256))
+    return bytes(changed)
+
+
+@pytest.mark.parametrize("name", ["bracket.csv", "bracket.uff", "bracket.npz", "bracket.mat"])
+@pytest.mark.filterwarnings("ignore::klack.errors.AccuracyWarning")
+def test_damaged_files_are_read_or_refused(name: str, tmp_path: Path) -> None:
+    """Thirty of each: values within the file, or one error of klack."""
+    whole = read_responses(HOW_TO / "bracket.csv")
+    file = tmp_path / name
+    if name.endswith(".csv"):
+        file.write_bytes((HOW_TO / "bracket.csv").read_bytes())
+    elif name.endswith(".uff"):
+        pyuff = pytest.importorskip("pyuff")
+        for node, values in ((1, whole.values[:, 0, 0]), (2, whole.values[:, 1, 0])):
+            pyuff.UFF(str(file)).write_sets(
+                pyuff.prepare_58(
+                    **{"func_type": 4, "rsp_node": node, "rsp_dir": 3, "ref_node": 1},
+                    **{"ref_dir": 3, "data": values, "x": whole.frequency, "binary": node - 1},
+                    **{"ordinate_spec_data_type": 11, "orddenom_spec_data_type": 13},
+                    **{"abscissa_spec_data_type": 18, "num_pts": whole.frequency.size},
+                    **{"abscissa_spacing": 1, "abscissa_min": 100.0, "abscissa_inc": 10.0},
+                    **{"ord_data_type": 6, "id1": "FRF"},
+                ),
+                "add",
+            )
+    else:
+        from scipy.io import savemat
+
+        names = [str(channel) for channel in whole.sources]
+        held = {"frequency": whole.frequency, "mobility": whole.values[:, :2], "outputs": names}
+        held["inputs"] = names
+        savemat(file, held) if name.endswith(".mat") else np.savez(file, **held)
+    data, draw = file.read_bytes(), np.random.default_rng(7)
+    refused = 0
+    for _ in range(30):
+        file.write_bytes(damaged(data, draw))
+        try:
+            assert np.all(np.isfinite(read_responses(file).frequency))
+        except InputError:
+            refused += 1
+    assert refused > 5
+
+
+def test_kilohertz_and_phases_in_radians(tmp_path: Path) -> None:
+    """By the head of the table."""
+    file = tmp_path / "a.txt"
+    file.write_text("Freq. [kHz]\ta.z/a.z mag [mm/s/N]\ta.z/a.z phase [rad]\n1\t2\t0\n2\t2\t1\n")
+    found = read_responses(file)
+    assert found.frequency.tolist() == [1e3, 2e3]
+    assert found.values[:, 0, 0] == pytest.approx(2e-3 * np.exp([0.0, 1j]), rel=1e-12)
 
 
 @pytest.mark.parametrize(

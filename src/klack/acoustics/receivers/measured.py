@@ -33,6 +33,7 @@ from klack.acoustics.interface import (
     Complexes,
     Freedom,
     InterfacePoint,
+    Receiver,
     ReceiverResponse,
     freedoms_of,
 )
@@ -47,7 +48,14 @@ from klack.acoustics.receivers.sanity import (
 from klack.arrays import Matrix, Vector
 from klack.errors import AccuracyWarning, InputError, refuse_if
 
-__all__ = ["MeasuredReceiver", "VirtualPoint", "frequencies_within", "measured_receiver"]
+__all__ = [
+    "HeardReceiver",
+    "MeasuredReceiver",
+    "VirtualPoint",
+    "frequencies_within",
+    "heard_receiver",
+    "measured_receiver",
+]
 
 _CONSISTENT = 0.9
 _RANK = 1e-3  # smallest over largest singular value of R, rotations scaled
@@ -107,17 +115,92 @@ class MeasuredReceiver:
     def at(self, s: Complexes) -> ReceiverResponse:
         """Interpolate between the lines; InputError beside the axis and outside the range."""
         f = measured_frequency(self.name, self.frequency, s)
-        place = np.clip(np.searchsorted(self.frequency, f) - 1, 0, self.frequency.size - 2)
-        step = self.frequency[place + 1] - self.frequency[place]
-        share = ((f - self.frequency[place]) / step)[:, None, None]
-
-        def between(values: Complexes) -> Complexes:
-            return np.asarray((1.0 - share) * values[place] + share * values[place + 1])
-
-        return ReceiverResponse(mobility=between(self.mobility), transfers=between(self.transfers))
+        mobility, transfers = (
+            _between(self.frequency, values, f) for values in (self.mobility, self.transfers)
+        )
+        return ReceiverResponse(mobility=mobility, transfers=transfers)
 
 
-def frequencies_within(frequency: Vector, receiver: MeasuredReceiver) -> Vector:
+def _between(known: Vector, values: Complexes, f: Vector) -> Complexes:
+    """Straight lines between measured ones, (k, ...)."""
+    place = np.clip(np.searchsorted(known, f) - 1, 0, known.size - 2)
+    share = ((f - known[place]) / (known[place + 1] - known[place]))[:, None, None]
+    return np.asarray((1.0 - share) * values[place] + share * values[place + 1])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class HeardReceiver:
+    """Any receiver with pressures per force that were measured apart.
+
+    Parameters
+    ----------
+    receiver
+        Its mobility counts; its own ears, if any, do not.
+    name, frequency, transfers
+        As of a measured receiver, at the freedoms of ``receiver``.
+    """
+
+    receiver: Receiver
+    name: str
+    ears: tuple[str, ...]
+    frequency: Vector
+    transfers: Complexes
+
+    @property
+    def points(self) -> tuple[InterfacePoint, ...]:
+        """Those of the receiver."""
+        return self.receiver.points
+
+    @property
+    def freedoms(self) -> tuple[Freedom, ...]:
+        """Those of the receiver."""
+        return self.receiver.freedoms
+
+    def at(self, s: Complexes) -> ReceiverResponse:
+        """Mobility of the receiver, pressures between the measured lines."""
+        f = measured_frequency(self.name, self.frequency, s)
+        return ReceiverResponse(
+            mobility=self.receiver.at(s).mobility,
+            transfers=_between(self.frequency, self.transfers, f),
+        )
+
+
+def heard_receiver(
+    receiver: Receiver,
+    pressures: FrequencyResponses,
+    ears: Mapping[str, str | int],
+    *,
+    nodes: Mapping[str, str | int] | None = None,
+) -> HeardReceiver:
+    """Give a receiver ears from a file of pressures per force.
+
+    Parameters
+    ----------
+    receiver
+        A model, or one that was measured.
+    pressures
+        With a force at every freedom of the receiver.
+    ears
+        Name -> node of a pressure.
+    nodes
+        Point of the receiver -> node of the force; that of its name without.
+    """
+    named = nodes or {}
+    rows = []
+    for freedom in receiver.freedoms:
+        node = str(named.get(freedom.point, freedom.point))
+        blow = Channel(node, abs(freedom.direction)), freedom.sign
+        rows.append(_Row(freedom=freedom, outputs=None, sources=None, blows=(blow,)))
+    return HeardReceiver(
+        receiver=receiver,
+        name=pressures.name,
+        ears=tuple(ears),
+        frequency=pressures.frequency,
+        transfers=_transfers(pressures, _again(pressures, rows), ears),
+    )
+
+
+def frequencies_within(frequency: Vector, receiver: MeasuredReceiver | HeardReceiver) -> Vector:
     """Those frequencies [Hz] at which a receiver was measured; a doubt where some are left out.
 
     Raises
@@ -452,10 +535,8 @@ def _on_one_grid(receiver: MeasuredReceiver, heard: FrequencyResponses) -> Measu
         expected=f"some of {known[0]:.4g} to {known[-1]:.4g} Hz, as the mobilities",
         hint="measure both over one range.",
     )
-    f, shape = known[inside], receiver.transfers.shape[1:]
-    flat = receiver.transfers.reshape(heard.frequency.size, -1)
-    onto = [np.interp(f, heard.frequency, column) for column in flat.T]
-    transfers = np.array(onto).reshape(-1, f.size).T.reshape(f.size, *shape)
+    f = known[inside]
+    transfers = _between(heard.frequency, receiver.transfers, f)
     note = f"{heard.name}: pressures taken on the {f.size} lines of {receiver.name} in both ranges."
     return MeasuredReceiver(
         name=receiver.name,
