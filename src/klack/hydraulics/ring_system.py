@@ -15,234 +15,200 @@ and the rest of the elimination is unchanged: the remaining block of the next ce
 definite.
 """
 
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any, NamedTuple
 
-from klack.machine.compiling.jit import inner
+from klack.arrays import Vector
+from klack.machine.compiling.jit import FAST, inner, njit
 
-__all__ = ["eliminate_ring", "solve_ring"]
+__all__ = ["Ring", "ring_of", "solve_ring"]
 
-Cube = NDArray[np.float64]
-Matrix = NDArray[np.float64]
-Vector = NDArray[np.float64]
+_part = inner(_nrt=False, error_model="numpy", fastmath=FAST, forceinline=True)
 
 
-@inner(error_model="numpy")
-def _inverse(A: Matrix, X: Matrix) -> None:
+class Ring(NamedTuple):
+    """Numbers of a ring, and where they lie in its memory, row by row."""
+
+    S: int  # cells, at least 3
+    o: int  # unknowns of each
+    s: int  # unknowns that all share
+    n: int  # right sides
+    wide: int  # 2 o + s + n: columns of ``x``
+    blocks: int  # (S, o, o) of each cell
+    links: int  # (S, o, o) of a cell (rows) with the next one (columns)
+    shared: int  # (S, o, s) of a cell with what all share
+    corner: int  # (s, s)
+    y: int  # (s, n) right sides of what all share; out: what solves them
+    x: int  # (S, o, wide) those of the cells, in the n columns behind o + s others
+    all: int
+
+
+@njit(_nrt=False, forceinline=True)
+def ring_of(S: int, o: int, s: int, n: int) -> Ring:
+    """Lay out a ring; what is for work comes first."""
+    wide, b = 2 * o + s + n, o + s
+    blocks = 2 * b * b + b + b * (b + n) + o * wide
+    links = blocks + S * o * o
+    shared = links + S * o * o
+    corner = shared + S * o * s
+    y = corner + s * s
+    x = y + s * n
+    return Ring(S, o, s, n, wide, blocks, links, shared, corner, y, x, x + S * o * wide)
+
+
+@_part
+def _invert(M: Any, A: int, X: int, n: int) -> None:
     """Inverse of a small positive definite matrix, which is destroyed."""
-    n = A.shape[0]
     for i in range(n):
         for j in range(n):
-            X[i, j] = 1.0 if i == j else 0.0
+            M[X + i * n + j] = 1.0 if i == j else 0.0
     for i in range(n):
-        pivot = 1.0 / A[i, i]
+        pivot = 1.0 / M[A + i * n + i]
         for j in range(n):
-            A[i, j] *= pivot
-            X[i, j] *= pivot
+            M[A + i * n + j] *= pivot
+            M[X + i * n + j] *= pivot
         for k in range(n):
-            if k != i and A[k, i] != 0.0:
-                factor = A[k, i]
+            if k != i:
+                factor = M[A + k * n + i]
                 for j in range(n):
-                    A[k, j] -= factor * A[i, j]
-                    X[k, j] -= factor * X[i, j]
+                    M[A + k * n + j] -= factor * M[A + i * n + j]
+                    M[X + k * n + j] -= factor * M[X + i * n + j]
 
 
-@inner(error_model="numpy")
-def _keep_across(X: Matrix, normal: Vector) -> None:
-    """Restrict a symmetric inverse to motion of its first unknowns across ``normal``."""
-    n, along = X.shape[0], np.zeros(X.shape[0])
+@_part
+def _keep_across(M: Any, X: int, n: int, normal: Vector, o: int, along: int) -> None:
+    """Leave of a symmetric inverse what moves its first unknowns across ``normal`` only."""
     square = 0.0
     for i in range(n):
-        for j in range(len(normal)):
-            along[i] += X[i, j] * normal[j]
-    for j in range(len(normal)):
-        square += normal[j] * along[j]
+        M[along + i] = 0.0
+        for j in range(o):
+            M[along + i] += M[X + i * n + j] * normal[j]
+    for j in range(o):
+        square += normal[j] * M[along + j]
     for i in range(n):
         for j in range(n):
-            X[i, j] -= along[i] * along[j] / square
+            M[X + i * n + j] -= M[along + i] * M[along + j] / square
 
 
-@inner(error_model="numpy")
-def eliminate_ring(
-    blocks: Cube,
-    links: Cube,
-    shared: Cube,
-    corner: Matrix,
-    held: NDArray[np.bool_],
-    normal: Vector,
-    x: Cube,
-    y: Matrix,
-) -> tuple[Cube, Cube, Cube, Cube, Matrix]:
-    """Eliminate the chain of all cells but the last one, and solve for a first right-hand side.
-
-    Parameters
-    ----------
-    blocks (S, o, o)
-        Of each cell, S at least 3.
-    links (S, o, o)
-        Of a cell (rows) with the next one (columns).
-    shared (S, o, s)
-        Of a cell with what all share.
-    corner (s, s)
-    held (S,)
-    normal (o,)
-    x, y (S, o, 1), (s, 1)
-        In place, as of :func:`solve_ring`.
-
-    Returns
-    -------
-    inverses, passed : array (S - 1, o, o)
-        Of the remaining blocks, and the same times the links.
-    shared : array (S, o, s)
-    reduced : array (S - 1, o, o + s)
-        Solution of the chain for its coupling with the border.
-    closing : array (o + s, o + s)
-        Inverse of the remaining border.
-    """
-    S, o = blocks.shape[0], blocks.shape[1]
-    s = corner.shape[0]
-    m, b = S - 1, o + s
-    inverses, passed = np.empty((m, o, o)), np.empty((m, o, o))
-    reduced, left = np.zeros((m, o, b + 1)), np.empty((o, o))
+@_part
+def _border(M: Any, at: Ring, rest: int) -> None:
+    """What cells have to do with the border of the chain, in the columns before the right sides."""
+    o, s, n, wide, m, b = at.o, at.s, at.n, at.wide, at.S - 1, at.o + at.s
     for k in range(m):
         for i in range(o):
+            row = at.x + (k * o + i) * wide
+            for j in range(o):
+                M[row + j] = 0.0
+                M[row + b + n + j] = M[at.links + (k * o + i) * o + j]
             for j in range(s):
-                reduced[k, i, o + j] = shared[k, i, j]
-            reduced[k, i, b] = x[k, i, 0]
+                M[row + o + j] = M[at.shared + (k * o + i) * s + j]
     for i in range(o):
+        row = rest + i * (b + n)
         for j in range(o):
-            reduced[0, i, j] += links[m, j, i]
-            reduced[m - 1, i, j] += links[m - 1, i, j]
-    for k in range(m):
-        for i in range(o):
-            for j in range(o):
-                left[i, j] = blocks[k, i, j]
-        if k > 0:
-            for c in range(o):
-                for i in range(o):
-                    factor = links[k - 1, c, i]
-                    for j in range(o):
-                        left[i, j] -= factor * passed[k - 1, c, j]
-        _inverse(left, inverses[k])
-        if held[k]:
-            _keep_across(inverses[k], normal)
-        for i in range(o):
-            for j in range(o):
-                passed[k, i, j] = 0.0
-            for c in range(o):
-                factor = inverses[k, i, c]
-                for j in range(o):
-                    passed[k, i, j] += factor * links[k, c, j]
-    _chain(inverses, passed, reduced)
-    rest, closing = np.empty((b, b)), np.empty((b, b))
-    for i in range(o):
-        for j in range(o):
-            value = blocks[m, i, j]
-            for c in range(o):
-                value -= links[m, i, c] * reduced[0, c, j]
-                value -= links[m - 1, c, i] * reduced[m - 1, c, j]
-            rest[i, j] = value
-    for i in range(s):
+            M[at.x + i * wide + j] += M[at.links + (m * o + j) * o + i]
+            M[at.x + ((m - 1) * o + i) * wide + j] += M[at.links + ((m - 1) * o + i) * o + j]
+            M[row + j] = M[at.blocks + (m * o + i) * o + j]
         for j in range(s):
-            rest[o + i, o + j] = corner[i, j]
-            for k in range(m):
-                for c in range(o):
-                    rest[o + i, o + j] -= shared[k, c, i] * reduced[k, c, o + j]
-        for j in range(o):
-            value = shared[m, j, i]
-            for k in range(m):
-                for c in range(o):
-                    value -= shared[k, c, i] * reduced[k, c, j]
-            rest[j, o + i] = rest[o + i, j] = value
-    _inverse(rest, closing)
-    if held[m]:
-        _keep_across(closing, normal)
+            M[row + o + j] = M[at.shared + (m * o + i) * s + j]
+            M[rest + (o + j) * (b + n) + i] = M[at.shared + (m * o + i) * s + j]
+        for j in range(n):
+            M[row + b + j] = M[at.x + (m * o + i) * wide + b + j]
+    for i in range(s):
+        row = rest + (o + i) * (b + n)
+        for j in range(s):
+            M[row + o + j] = M[at.corner + i * s + j]
+        for j in range(n):
+            M[row + b + j] = M[at.y + i * n + j]
+
+
+@_part
+def _solve(M: Any, S: int, o: int, s: int, n: int, held: Vector, normal: Vector) -> None:
+    """As :func:`solve_ring`, for numbers of unknowns that the compiler may know."""
+    at = ring_of(S, o, s, n)
+    m, b, wide, links, blocks = S - 1, o + s, at.wide, at.links, at.blocks
+    left, inverse, along = 0, b * b, 2 * b * b
+    rest, solved = 2 * b * b + b, 2 * b * b + b + b * (b + n)
+    _border(M, at, rest)
+    for i in range(o * o):
+        M[left + i] = M[blocks + i]
     for k in range(m):
+        x = at.x + k * o * wide
+        _invert(M, left, inverse, o)
+        if held[k] > 0.0:
+            _keep_across(M, inverse, o, normal, o, along)
         for i in range(o):
-            x[k, i, 0] = reduced[k, i, b]
-    ring = inverses, passed, shared, reduced, closing
-    _close(ring, links, x, y)
-    return ring
-
-
-@inner(error_model="numpy")
-def _chain(inverses: Cube, passed: Cube, x: Cube) -> None:
-    """Solve for the open chain, in place; one column of ``x`` per right-hand side."""
-    m, o = inverses.shape[0], inverses.shape[1]
-    columns = x.shape[2]
-    hold = np.empty((o, columns))
-    for k in range(1, m):
-        for c in range(o):
+            for j in range(wide):
+                value = 0.0
+                for c in range(o):
+                    value += M[inverse + i * o + c] * M[x + c * wide + j]
+                M[solved + i * wide + j] = value
+        for i in range(b):
+            for j in range(b + n):
+                value = M[rest + i * (b + n) + j]
+                for c in range(o):
+                    value -= M[x + c * wide + i] * M[solved + c * wide + j]
+                M[rest + i * (b + n) + j] = value
+        if k < m - 1:
             for i in range(o):
-                factor = passed[k - 1, c, i]
-                for j in range(columns):
-                    x[k, i, j] -= factor * x[k - 1, c, j]
+                for j in range(b + n):
+                    value = M[x + (o + i) * wide + j]
+                    for c in range(o):
+                        value -= M[links + (k * o + c) * o + i] * M[solved + c * wide + j]
+                    M[x + (o + i) * wide + j] = value
+                for j in range(o):
+                    value = M[blocks + ((k + 1) * o + i) * o + j]
+                    for c in range(o):
+                        value -= M[links + (k * o + c) * o + i] * M[solved + c * wide + b + n + j]
+                    M[left + i * o + j] = value
+        for i in range(o * wide):
+            M[x + i] = M[solved + i]
+    for i in range(b):
+        for j in range(b):
+            M[left + i * b + j] = M[rest + i * (b + n) + j]
+    _invert(M, left, inverse, b)
+    if held[m] > 0.0:
+        _keep_across(M, inverse, b, normal, o, along)
+    last = at.x + m * o * wide
+    for j in range(n):
+        for i in range(b):
+            value = 0.0
+            for c in range(b):
+                value += M[inverse + i * b + c] * M[rest + c * (b + n) + b + j]
+            if i < o:
+                M[last + i * wide + b + j] = value
+            else:
+                M[at.y + (i - o) * n + j] = value
     for k in range(m - 1, -1, -1):
         for i in range(o):
-            for j in range(columns):
-                hold[i, j] = x[k, i, j]
-                x[k, i, j] = 0.0
-        for i in range(o):
-            for c in range(o):
-                factor = inverses[k, i, c]
-                for j in range(columns):
-                    x[k, i, j] += factor * hold[c, j]
-            if k < m - 1:
+            x = at.x + (k * o + i) * wide
+            for j in range(n):
+                value = M[x + b + j]
                 for c in range(o):
-                    factor = passed[k, i, c]
-                    for j in range(columns):
-                        x[k, i, j] -= factor * x[k + 1, c, j]
+                    value -= M[x + c] * M[last + c * wide + b + j]
+                for c in range(s):
+                    value -= M[x + o + c] * M[at.y + c * n + j]
+                if k < m - 1:
+                    for c in range(o):
+                        after = at.x + ((k + 1) * o + c) * wide
+                        value -= M[x + b + n + c] * M[after + b + j]
+                M[x + b + j] = value
 
 
-@inner(error_model="numpy")
-def solve_ring(
-    ring: tuple[Cube, Cube, Cube, Cube, Matrix], links: Cube, x: Cube, y: Matrix
-) -> None:
-    """Solve for several right-hand sides, in place.
+@inner(_nrt=False, error_model="numpy", fastmath=FAST)
+def solve_ring(M: Any, at: Ring, held: Vector, normal: Vector) -> None:
+    """Eliminate the chain of all cells but the last one, then the border; all right sides at once.
 
     Parameters
     ----------
-    ring
-        Of :func:`eliminate_ring`.
-    links (S, o, o)
-    x (S, o, n)
-        Right-hand sides of the cells.
-    y (s, n)
-        Of what all share.
+    M : pointer to ``at.all`` numbers
+    held (S,)
+        Above 0: cells whose unknowns move only across ``normal``.
+    normal (o,)
     """
-    _chain(ring[0], ring[1], x[: len(ring[0])])
-    _close(ring, links, x, y)
-
-
-@inner(error_model="numpy")
-def _close(ring: tuple[Cube, Cube, Cube, Cube, Matrix], links: Cube, x: Cube, y: Matrix) -> None:
-    """Close the ring of the solution of the open chain."""
-    inverses, _, shared, reduced, closing = ring
-    m, o, s = inverses.shape[0], inverses.shape[1], shared.shape[2]
-    columns, b = x.shape[2], o + s
-    left, found = np.empty((b, columns)), np.zeros((b, columns))
-    for j in range(columns):
-        for i in range(o):
-            left[i, j] = x[m, i, j]
-            for c in range(o):
-                left[i, j] -= links[m, i, c] * x[0, c, j] + links[m - 1, c, i] * x[m - 1, c, j]
-        for i in range(s):
-            left[o + i, j] = y[i, j]
-            for k in range(m):
-                for c in range(o):
-                    left[o + i, j] -= shared[k, c, i] * x[k, c, j]
-    for i in range(b):
-        for c in range(b):
-            for j in range(columns):
-                found[i, j] += closing[i, c] * left[c, j]
-    for j in range(columns):
-        for k in range(m):
-            for c in range(o):
-                value = x[k, c, j]
-                for i in range(b):
-                    value -= reduced[k, c, i] * found[i, j]
-                x[k, c, j] = value
-        for i in range(o):
-            x[m, i, j] = found[i, j]
-        for i in range(s):
-            y[i, j] = found[o + i, j]
+    S, o, s, n = at.S, at.o, at.s, at.n
+    # the films of strokes: loops that the compiler can write out
+    if o == 2 and s == 0 and n == 4:
+        _solve(M, S, 2, 0, 4, held, normal)
+    elif o == 3 and s == 0 and n == 4:
+        _solve(M, S, 3, 0, 4, held, normal)
+    else:
+        _solve(M, S, o, s, n, held, normal)

@@ -16,26 +16,34 @@ problem for the mean pressure of every sector) it is ``P^T K P`` or more.
 
 from dataclasses import dataclass
 from math import pi
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.arrays import Cube, Matrix, Vector
 from klack.errors import InputError, require_nonnegative, require_positive
-from klack.hydraulics.ring_system import eliminate_ring, solve_ring
-from klack.machine.compiling.jit import inner, njit
+from klack.hydraulics.ring_system import Ring, ring_of, solve_ring
+from klack.machine.compiling.jit import FAST, inner, njit
+from klack.network.step_function import first
 
 __all__ = [
+    "MOST_SECTORS",
+    "FilmRoom",
+    "FilmRows",
     "Land",
-    "Pressed",
     "SectorFilm",
-    "film_pressure",
-    "film_slopes",
+    "add_slopes",
+    "film_forces",
+    "film_room",
+    "film_rows",
     "land_of",
     "mean_mobility",
     "sector_film",
     "sector_forces",
     "sector_step",
+    "solve_film",
+    "solved_film",
 ]
 
 Array = NDArray[np.float64]
@@ -44,6 +52,12 @@ _POINTS, _FEWER = 12, 8  # Gauss points between two circles: faces that touch ha
 _FEWEST_SECTORS = 4
 _ACTIVE_SETS = 60  # before sectors change one at a time
 _TINY = 1e-12  # of the largest tension: round-off
+
+MOST_SECTORS = 360
+_STRIDE = MOST_SECTORS + 8
+"""From one row to the next: known to the compiler, so that it sees that rows are apart."""
+
+_part = inner(_nrt=False, error_model="numpy", fastmath=FAST, forceinline=True)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -140,6 +154,13 @@ def sector_film(
                 expected=f"at least {least}",
                 hint="36 sectors and 1 circle for a narrow land, 2 for a wide one.",
             )
+    if sectors > MOST_SECTORS:
+        raise InputError(
+            "sector_film: sectors",
+            got=f"{sectors}",
+            expected=f"at most {MOST_SECTORS}",
+            hint="36 sectors are within 0.5 % of many.",
+        )
     width, angle = outer_radius - inner_radius, 2.0 * pi / sectors
     panels = max(circles - 1, 1)
     points = _FEWER if outer_radius < 2.0 * inner_radius else _POINTS
@@ -233,7 +254,7 @@ def sector_forces(
     x = heights @ film.between.T
     edges = _edges(film, inner_pressure, outer_pressure)
     mobility = x**3 / (12.0 * viscosity)
-    return _solved(film, mobility, closing, np.zeros_like(x), edges, tension, 0.0)[0]
+    return solved_film(film, mobility, closing, np.zeros_like(x), edges, tension, 0.0)[0]
 
 
 def sector_step(
@@ -271,7 +292,7 @@ def sector_step(
     mobility = mean_mobility(x0, x1, viscosity)
     change = x0**2 * x1 * (2.0 * x0 + x1) / (6.0 * viscosity * (x0 + x1) ** 2)
     edges = _edges(film, inner_pressure, outer_pressure)
-    return _solved(film, mobility, (before - after) / step, change, edges, tension, 1.0 / step)
+    return solved_film(film, mobility, (before - after) / step, change, edges, tension, 1.0 / step)
 
 
 def mean_mobility(before: Array, after: Array, viscosity: float) -> Array:
@@ -286,7 +307,7 @@ def _edges(film: SectorFilm, inner: float, outer: float) -> tuple[Array, Array]:
     return (inner - outer) * film.head, outer * film.area + (inner - outer) * film.inward
 
 
-def _solved(
+def solved_film(
     film: SectorFilm,
     mobility: Array,
     closing: Array,
@@ -295,14 +316,29 @@ def _solved(
     tension: float,
     rate: float,
 ) -> tuple[Array, Array]:
+    """Forces on the circles, shape (S, N) [N], and with a rate their slopes with the heights.
+
+    Parameters
+    ----------
+    mobility, change : array (S, G)
+        ``h^3/12 mu`` at the points of all sectors, and its slope with the height.
+    closing : array (S, N) [m/s]
+    edges
+        Driving of the pressures at the edges [Pa], and forces on the circles [N].
+    rate [1/s]
+        How the closing falls with the heights: 1 over a step.
+    """
     heights = film.sectors * film.circles
-    ways = np.eye(heights) if rate else np.zeros((heights, 0))
-    land, head, still = land_of(film), *edges
-    closing = np.ascontiguousarray(closing, dtype=float)
-    held = np.zeros(film.sectors, dtype=np.bool_)
-    force, pressed = film_pressure(land, mobility, closing, head, still, tension, held)
-    slopes = film_slopes(land, pressed, mobility, change, head, rate, ways)
-    return np.asarray(force), np.asarray(slopes)
+    land = land_of(film, np.eye(heights) if rate else np.zeros((heights, 0)))
+    (N, G, Q), w, S = land[1:4], len(land.ways), film.sectors
+    room, at = film_room(*land[:5], w), film_rows(N, G, Q, w)
+    room.rows[at.mobility : at.change, :S], room.rows[at.change : at.all, :S] = mobility.T, change.T
+    room.rows[at.mobility : at.change, S] = mobility[0]
+    room.rows[at.closing : at.moves, :S] = closing.T
+    room.head[:], room.still[:] = edges
+    held, slopes = np.zeros(S), np.zeros((w, w))
+    film_forces(land, room, tension, held, rate, slopes)
+    return room.rows[at.force : at.closing, :S].T.copy(), slopes
 
 
 def _require_heights(where: str, film: SectorFilm, heights: Array) -> None:
@@ -317,266 +353,285 @@ def _require_heights(where: str, film: SectorFilm, heights: Array) -> None:
 
 
 class Land(NamedTuple):
-    """Arrays of a :class:`SectorFilm` for its pressure."""
+    """A :class:`SectorFilm` as its pressure is computed: sectors come last.
 
-    between: Array
-    along: Array
-    around: Array
-    load: Array
-    area: Array
+    Arrays may be larger than what the numbers say, so that films of several sizes fit in one.
+    """
+
+    sectors: int
+    circles: int
+    points: int
+    functions: int
     shared: int
+    ways: Cube  # (w, N, S) heights along each way that is asked for
+    worked: Cube  # (w, Q, S) [m^2] what drives the pressure along it
+    between: Matrix  # (G, N)
+    along: Cube  # (G, Q, Q)
+    around: Cube  # (G, Q, Q)
+    load: Matrix  # (N, Q) [m^2] force on a circle per unit of each function of the radius
+    area: Vector  # (N,)
 
 
-def land_of(film: SectorFilm) -> Land:
-    """Return the arrays of a film."""
-    along, around = np.ascontiguousarray(film.along), np.ascontiguousarray(film.around)
-    return Land(film.between, along, around, film.load, film.area, film.shared)
+def land_of(film: SectorFilm, ways: Array) -> Land:
+    """Return the arrays of a film, for slopes along some ways of its heights, shape (S N, w)."""
+    apart = ways.T.reshape(ways.shape[1], film.sectors, film.circles).transpose(0, 2, 1)
+    load = film.between.T @ film.load
+    return Land(
+        *(film.sectors, film.circles, *film.load.shape, film.shared),
+        np.ascontiguousarray(apart),
+        np.ascontiguousarray(np.einsum("ja,wjk->wak", load, apart)),
+        *(np.ascontiguousarray(part) for part in (film.between, film.along, film.around)),
+        load,
+        film.area,
+    )
 
 
-class Pressed(NamedTuple):
-    """Pressure over a land.
+class FilmRows(NamedTuple):
+    """Where the rows of a film lie in its memory, each with a number for every sector."""
 
-    ``amplitudes`` (S, Q) [Pa]; ``ring`` and ``links`` of
-    :func:`~klack.hydraulics.ring_system.eliminate_ring`; ``held``: sectors at the limit of tension;
-    ``raised`` (S, own): amplitudes that make a unit of force on them.
-    """
-
-    amplitudes: Array
-    ring: tuple[Array, Array, Array, Array, Array]
-    links: Array
-    held: NDArray[np.bool_]
-    raised: Array
-
-
-@njit(error_model="numpy")
-def film_pressure(
-    land: Land,
-    mobility: Array,
-    closing: Array,
-    head: Array,
-    still: Array,
-    tension: float,
-    held: NDArray[np.bool_],
-) -> tuple[Array, Pressed]:
-    """Forces on the circles, shape (S, N) [N], and the pressure.
-
-    Parameters
-    ----------
-    mobility (S, G) [m^3/(Pa s)]
-        ``h^3/12 mu`` at the points of all sectors.
-    closing (S, N) [m/s] head, still (G, Q) [Pa m^2], (N,) [N]
-        Of the pressures at the edges.
-    tension [Pa]
-    held (S,)
-        Sectors at the limit of tension; in: first guess.
-    """
-    shared = land.shared
-    S, N = closing.shape
-    Q = land.load.shape[1]
-    own = Q - shared
-    L = _loads(land)
-    blocks, links, border, corner = _stiffness(land, mobility)
-    x, y = np.zeros((S, own, 1)), np.zeros((shared, 1))
-    for k in range(S):
-        for a in range(Q):
-            drive = 0.0
-            for j in range(N):
-                drive += L[j, a] * closing[k, j]
-            for p in range(mobility.shape[1]):
-                drive -= mobility[k, p] * head[p, a]
-            if a >= shared:
-                x[k, a - shared, 0] = drive
-            else:
-                y[a, 0] += drive
-    mean, base = np.zeros(Q), tension * np.sum(land.area) + np.sum(still)
-    for j in range(N):
-        for a in range(Q):
-            mean[a] += L[j, a]
-    normal, common = mean[shared:], mean[:shared]
-    raised, square = np.zeros((S, own)), normal @ normal
-    X, Y = x.copy(), y.copy()
-    tries = 0
-    while True:
-        some = False
-        for k in range(S):
-            some = some or held[k]
-            for a in range(own):
-                raised[k, a] = normal[a] / square if held[k] else 0.0
-        if some:
-            ring = _hold(blocks, links, border, corner, held, normal, common, raised, base, X, Y)
-        else:
-            ring = eliminate_ring(blocks, links, border, corner, held, normal, X, Y)
-        if tension == np.inf or tries >= _ACTIVE_SETS + S * S:
-            break
-        one = tries >= _ACTIVE_SETS  # by one at a time, the first one: it never turns in a circle
-        if not _regroup(blocks, links, border, x, X, Y, mean, base, held, one):
-            break
-        tries += 1
-        X, Y = x.copy(), y.copy()
-    P, force = np.empty((S, Q)), np.empty((S, N))
-    for k in range(S):
-        for a in range(Q):
-            P[k, a] = X[k, a - shared, 0] if a >= shared else Y[a, 0]
-        for j in range(N):
-            force[k, j] = still[j]
-            for a in range(Q):
-                force[k, j] += L[j, a] * P[k, a]
-    return force, Pressed(P, ring, links, held, raised)
+    loads: int  # 2 Q + 1 [m^3/s]
+    drive: int  # Q [m^3/s]
+    amplitudes: int  # (1 + w) Q [Pa], then per unit of force along each way; the first one again
+    apart: int  # (1 + w) Q, the same less those of the next sector
+    stiff: int  # Q Q, and as many for the flow to the next sector
+    gained: int  # w N
+    force: int  # N [N] out
+    closing: int  # N [m/s]
+    moves: int  # N, 1 where a height follows the ways, 0 where it stays
+    mobility: int  # G [m^3/(Pa s)] h^3/12 mu at the points; that of the first sector again
+    change: int  # G [m^2/(Pa s)] slope of the mobility with the height
+    all: int
 
 
-@njit(error_model="numpy")
-def film_slopes(
-    land: Land,
-    pressed: Pressed,
-    mobility: Array,
-    change: Array,
-    head: Array,
-    rate: float,
-    ways: Array,
-) -> Array:
-    """Change of the forces along some directions of the heights, shape (S N, w) [N per unit].
+@njit(_nrt=False, forceinline=True)
+def film_rows(N: int, G: int, Q: int, w: int) -> FilmRows:
+    """Rows for so many circles, points, functions and ways; the first four are for work."""
+    loads, n = 4, (1 + w) * Q
+    amplitudes = loads + 1 + 3 * Q
+    stiff = amplitudes + 2 * n
+    gained = stiff + 2 * Q * Q
+    force = gained + w * N
+    mobility = force + 3 * N
+    return FilmRows(
+        loads,
+        loads + 1 + 2 * Q,
+        amplitudes,
+        amplitudes + n,
+        stiff,
+        gained,
+        force,
+        force + N,
+        force + 2 * N,
+        mobility,
+        mobility + G,
+        mobility + 2 * G,
+    )
 
-    Parameters
-    ----------
-    land, mobility, head
-        As of :func:`film_pressure`.
-    change (S, G) [m^2/(Pa s)]
-        Slope of the mobility with the height.
-    rate [1/s]
-        How the closing falls with the heights: 1 over a step.
-    ways (S N, w)
-        The directions.
-    """
-    between, along, around, shared = land.between, land.along, land.around, land.shared
-    S, G = mobility.shape
-    N, Q, count = between.shape[1], land.load.shape[1], ways.shape[1]
-    own, P, L = Q - shared, pressed.amplitudes, _loads(land)
-    X, Y = np.zeros((S, own, count)), np.zeros((shared, count))
-    moved, drive, gone = np.zeros((S, G, count)), np.empty((Q, count)), np.empty((own, count))
-    for k in range(S):
-        for p in range(G):
-            for j in range(N):
-                part = change[k, p] * between[p, j]
-                for d in range(count):
-                    moved[k, p, d] += part * ways[k * N + j, d]
-    for k in range(S):
-        drive[:] = 0.0
-        for a in range(Q):
-            for j in range(N):
-                for d in range(count):
-                    drive[a, d] -= rate * L[j, a] * ways[k * N + j, d]
-            for p in range(G):
-                load = head[p, a]
-                for b in range(Q):
-                    load += along[p, a, b] * P[k, b]
-                for d in range(count):
-                    drive[a, d] -= load * moved[k, p, d]
-        after = k + 1 if k < S - 1 else 0
-        gone[:] = 0.0
-        for p in range(G):
-            m, o = mobility[k, p], mobility[after, p]
-            here, there = 2.0 * (o / (m + o)) ** 2, 2.0 * (m / (m + o)) ** 2
-            for a in range(own):
-                load = 0.0
-                for b in range(shared, Q):
-                    load += around[p, a + shared, b] * (P[k, b] - P[after, b])
-                for d in range(count):
-                    gone[a, d] += load * (here * moved[k, p, d] + there * moved[after, p, d])
-        for d in range(count):
-            for a in range(shared):
-                Y[a, d] += drive[a, d]
-            for a in range(own):
-                X[k, a, d] += drive[a + shared, d] - gone[a, d]
-                X[after, a, d] += gone[a, d]
-    if shared and np.any(pressed.held):
-        common = np.zeros(shared)
-        for a in range(shared):
-            for j in range(N):
-                common[a] += L[j, a]
-        for d in range(count):
-            along_raised = 0.0
+
+class FilmRoom(NamedTuple):
+    """What a film is asked, and memory to answer."""
+
+    rows: Matrix  # (all, MOST_SECTORS + 8) see FilmRows
+    head: Matrix  # (G, Q) [Pa m^2] of the pressures at the edges
+    still: Vector  # (N,) [N] the same
+    ring: Vector  # with the drive, then a unit of force along each way, as right sides
+    border: Cube  # (S, o, s) of each cell with what all share
+    corner: Matrix  # (s, s)
+    raised: Matrix  # (S, o) amplitudes that make a unit of force on sectors at the limit of tension
+    pulled: Matrix  # (S, o)
+    mean: Vector  # (Q,)
+    cross: Vector  # (s,)
+
+
+@njit
+def film_room(S: int, N: int, G: int, Q: int, shared: int, w: int) -> FilmRoom:
+    """Room for films of so many sectors, circles, points, functions and ways."""
+    o = Q - shared
+    return FilmRoom(
+        np.ones((film_rows(N, G, Q, w).all, _STRIDE)),
+        np.zeros((G, Q)),
+        np.zeros(N),
+        np.zeros(ring_of(S, o, shared, 1 + w).all),
+        np.zeros((S, o, shared)),
+        np.zeros((shared, shared)),
+        np.zeros((S, o)),
+        np.zeros((S, o)),
+        np.zeros(Q),
+        np.zeros(shared),
+    )
+
+
+@_part
+def _stiffness(land: Land, room: FilmRoom, N: int, Q: int, w: int) -> None:
+    """Blocks and links of the ring, its coupling with what all share, and that itself."""
+    M, R, S, shared, n = first(room.rows), first(room.ring), land.sectors, land.shared, _STRIDE
+    at, ring = film_rows(N, land.points, Q, w), ring_of(S, Q - shared, shared, 1 + w)
+    own, mobility, stiff, flow = Q - shared, at.mobility * n, at.stiff * n, (at.stiff + Q * Q) * n
+    for a in range(Q):
+        for b in range(a, Q):
             for k in range(S):
-                for a in range(own):
-                    along_raised += pressed.raised[k, a] * X[k, a, d]
-            for a in range(shared):
-                Y[a, d] -= common[a] * along_raised
-        solve_ring(pressed.ring, pressed.links, X, Y)
-        for d in range(count):
-            part = 0.0
-            for a in range(shared):
-                part += common[a] * Y[a, d]
-            for k in range(S):
-                for a in range(own):
-                    X[k, a, d] -= pressed.raised[k, a] * part
-    else:
-        solve_ring(pressed.ring, pressed.links, X, Y)
-    slopes = np.zeros((S * N, count))
+                M[stiff + (a * Q + b) * n + k] = 0.0
+                M[flow + (a * Q + b) * n + k] = 0.0
+    for p in range(land.points):
+        for k in range(S):  # half a sector of each, in series
+            here, after = M[mobility + p * n + k], M[mobility + p * n + k + 1]
+            M[k], M[n + k] = here, 2.0 * here * after / (here + after)
+        for a in range(Q):
+            for b in range(a, Q):
+                along, around = land.along[p, a, b], land.around[p, a, b]
+                for k in range(S):
+                    M[stiff + (a * Q + b) * n + k] += along * M[k]
+                    M[flow + (a * Q + b) * n + k] += around * M[n + k]
     for k in range(S):
-        for j in range(N):
-            for a in range(Q):
-                for d in range(count):
-                    slopes[k * N + j, d] += L[j, a] * (
-                        X[k, a - shared, d] if a >= shared else Y[a, d]
-                    )
-    return slopes
-
-
-@inner(error_model="numpy")
-def _loads(land: Land) -> Array:
-    G, N = land.between.shape
-    L = np.zeros((N, land.load.shape[1]))
-    for p in range(G):
-        for j in range(N):
-            for a in range(L.shape[1]):
-                L[j, a] += land.between[p, j] * land.load[p, a]
-    return L
-
-
-@inner(error_model="numpy")
-def _stiffness(land: Land, mobility: Array) -> tuple[Array, Array, Array, Array]:
-    """Blocks and links of the ring, its coupling with the shared part, and that part."""
-    along, around, shared = land.along, land.around, land.shared
-    S, G = mobility.shape
-    Q = land.load.shape[1]
-    own = Q - shared
-    square, flow = np.zeros((S, Q * Q)), np.zeros((S, Q * Q))
-    stiff, weak = along.reshape((G, Q * Q)), around.reshape((G, Q * Q))
-    for k in range(S):
-        after = k + 1 if k < S - 1 else 0
-        for p in range(G):
-            m, m_after = mobility[k, p], mobility[after, p]
-            across = 2.0 * m * m_after / (m + m_after)  # half a sector of each, in series
-            for c in range(Q * Q):
-                square[k, c] += m * stiff[p, c]
-                flow[k, c] += across * weak[p, c]
-    blocks, links = np.empty((S, own, own)), np.empty((S, own, own))
-    border, corner = np.empty((S, own, shared)), np.zeros((shared, shared))
-    for k in range(S):
+        before = k - 1 if k > 0 else S - 1
         for a in range(own):
-            row = (a + shared) * Q + shared
             for b in range(own):
-                links[k, a, b] = -flow[k, row + b]
-                blocks[k, a, b] = square[k, row + b] + flow[k, row + b] + flow[k - 1, row + b]
+                c = (min(a, b) * Q + max(a, b) + shared * (Q + 1)) * n
+                place = (k * own + a) * own + b
+                R[ring.links + place] = -M[flow + c + k]
+                R[ring.blocks + place] = M[stiff + c + k] + M[flow + c + k] + M[flow + c + before]
             for b in range(shared):
-                border[k, a, b] = square[k, (a + shared) * Q + b]
-        for a in range(shared):
-            for b in range(shared):
-                corner[a, b] += square[k, a * Q + b]
-    return blocks, links, border, corner
+                room.border[k, a, b] = M[stiff + (b * Q + a + shared) * n + k]
+    for a in range(shared):
+        for b in range(shared):
+            room.corner[a, b] = 0.0
+            for k in range(S):
+                room.corner[a, b] += M[stiff + (min(a, b) * Q + max(a, b)) * n + k]
 
 
-@inner(error_model="numpy")
+@_part
+def _begin(land: Land, room: FilmRoom, N: int, Q: int, w: int) -> None:
+    """Coupling of the sectors, and what drives their pressure."""
+    M, S, n = first(room.rows), land.sectors, _STRIDE
+    at = film_rows(N, land.points, Q, w)
+    drive, closing, mobility = at.drive * n, at.closing * n, at.mobility * n
+    _stiffness(land, room, N, Q, w)
+    for a in range(Q):
+        for k in range(S):
+            value = 0.0
+            for j in range(N):
+                value += land.load[j, a] * M[closing + j * n + k]
+            M[drive + a * n + k] = value
+        for p in range(land.points):
+            head = room.head[p, a]
+            if head != 0.0:
+                for k in range(S):
+                    M[drive + a * n + k] -= head * M[mobility + p * n + k]
+
+
+@_part
+def _end(land: Land, room: FilmRoom, N: int, Q: int, w: int) -> None:
+    """Amplitudes of the pressure and per unit of force along each way; forces on the circles."""
+    M, R, S, shared, n = first(room.rows), first(room.ring), land.sectors, land.shared, _STRIDE
+    at, ring = film_rows(N, land.points, Q, w), ring_of(S, Q - shared, shared, 1 + w)
+    amplitudes, force = at.amplitudes * n, at.force * n
+    for d in range(1 + w):
+        for a in range(Q):
+            row = amplitudes + (d * Q + a) * n
+            for k in range(S):
+                place = ring.y + a * ring.n + d
+                if a >= shared:
+                    place = ring.x + (k * ring.o + a - shared) * ring.wide + Q + d
+                M[row + k] = R[place]
+            M[row + S] = M[row]
+    for j in range(N):
+        for k in range(S):
+            value = room.still[j]
+            for a in range(Q):
+                value += land.load[j, a] * M[amplitudes + a * n + k]
+            M[force + j * n + k] = value
+
+
+@_part
+def _ask(land: Land, room: FilmRoom, R: Any, ring: Ring) -> None:
+    """Right sides of the ring: what drives the pressure, and a unit of force along each way."""
+    S, Q, shared, n = land.sectors, land.functions, land.shared, ring.n
+    drive = film_rows(land.circles, land.points, Q, n - 1).drive
+    for a in range(shared):
+        for b in range(shared):
+            R[ring.corner + a * shared + b] = room.corner[a, b]
+        for d in range(n):
+            total = 0.0
+            way = room.rows[drive + a] if d == 0 else land.worked[d - 1, a]
+            for k in range(S):
+                total += way[k]
+            R[ring.y + a * n + d] = total
+    for k in range(S):
+        for a in range(ring.o):
+            row = ring.x + (k * ring.o + a) * ring.wide + Q
+            R[row] = room.rows[drive + a + shared, k]
+            for d in range(n - 1):
+                R[row + 1 + d] = land.worked[d, a + shared, k]
+            for b in range(shared):
+                R[ring.shared + (k * ring.o + a) * shared + b] = room.border[k, a, b]
+
+
+@_part
+def _pull(R: Any, ring: Ring, k: int, a: int, to: Any, first_of: int, wide: int) -> float:
+    """What unknown ``a`` of a cell feels of the amplitudes of it and of both neighbours."""
+    o, S = ring.o, ring.S
+    before, after, total = k - 1 if k > 0 else S - 1, k + 1 if k < S - 1 else 0, 0.0
+    for b in range(o):
+        total += R[ring.blocks + (k * o + a) * o + b] * to[first_of + (k * o + b) * wide]
+        total += R[ring.links + (k * o + a) * o + b] * to[first_of + (after * o + b) * wide]
+        total += R[ring.links + (before * o + b) * o + a] * to[first_of + (before * o + b) * wide]
+    return total
+
+
+@_part
+def _hold(land: Land, room: FilmRoom, R: Any, ring: Ring, base: float) -> None:
+    """Right sides and coupling with held sectors at the limit.
+
+    The amplitudes are ``w - raised (base + common y)``, where w of a held sector does not change
+    its mean pressure; ``base`` only of those of the drive.
+    """
+    raised, pulled, mean, cross = room.raised, room.pulled, room.mean, room.cross
+    S, Q, s, o, square = land.sectors, land.functions, land.shared, ring.o, 0.0
+    for k in range(S):
+        for a in range(o):
+            pulled[k, a] = _pull(R, ring, k, a, first(raised), 0, 1)
+            square += raised[k, a] * pulled[k, a]
+    for b in range(s):
+        cross[b] = 0.0
+        for k in range(S):
+            for a in range(o):
+                cross[b] += raised[k, a] * room.border[k, a, b]
+    for d in range(ring.n):
+        load, base_here = 0.0, base if d == 0 else 0.0
+        for k in range(S):
+            for a in range(o):
+                place = ring.x + (k * o + a) * ring.wide + Q + d
+                load += raised[k, a] * R[place]
+                R[place] += base_here * pulled[k, a]
+        for a in range(s):
+            R[ring.y + a * ring.n + d] += (
+                base_here * cross[a] - (square * base_here + load) * mean[a]
+            )
+    for b in range(s):
+        for a in range(s):
+            R[ring.corner + a * s + b] += square * mean[a] * mean[b]
+            R[ring.corner + a * s + b] -= cross[a] * mean[b] + mean[a] * cross[b]
+        for k in range(S):
+            for a in range(o):
+                R[ring.shared + (k * o + a) * s + b] -= pulled[k, a] * mean[b]
+
+
+@_part
+def _raise(land: Land, room: FilmRoom, R: Any, ring: Ring, base: float) -> None:
+    """Amplitudes of held sectors from what solves the ring."""
+    for d in range(ring.n):
+        part = base if d == 0 else 0.0
+        for a in range(ring.s):
+            part += room.mean[a] * R[ring.y + a * ring.n + d]
+        for k in range(ring.S):
+            for a in range(ring.o):
+                place = ring.x + (k * ring.o + a) * ring.wide + land.functions + d
+                R[place] -= room.raised[k, a] * part
+
+
+@_part
 def _regroup(
-    blocks: Array,
-    links: Array,
-    border: Array,
-    drive: Array,
-    x: Array,
-    y: Array,
-    mean: Array,
-    base: float,
-    held: NDArray[np.bool_],
-    one: bool,
+    land: Land, room: FilmRoom, R: Any, ring: Ring, base: float, held: Vector, one: bool
 ) -> bool:
     """Hold sectors with tension beyond its limit, release those that are pulled at.
 
@@ -584,88 +639,178 @@ def _regroup(
     primal-dual active set (Hintermueller, Ito and Kunisch 2003), or with ``one`` the least-index
     rule (Murty 1974), which ends for every positive definite K.  Returns whether any changed.
     """
-    S, own = drive.shape[0], drive.shape[1]
-    shared, changed = len(mean) - own, False
-    common = base
-    for a in range(shared):
-        common += mean[a] * y[a, 0]
+    mean, Q, s, o = room.mean, land.functions, land.shared, ring.o
+    drive = film_rows(land.circles, land.points, Q, ring.n - 1).drive
+    changed, common = False, base
+    for a in range(s):
+        common += mean[a] * R[ring.y + a * ring.n]
     largest = abs(base)
-    for k in range(S):
-        if held[k]:
-            before, after, lift = (k - 1) % S, (k + 1) % S, 0.0
-            for a in range(own):
-                force = -drive[k, a, 0]
-                for b in range(own):
-                    force += blocks[k, a, b] * x[k, b, 0] + links[k, a, b] * x[after, b, 0]
-                    force += links[before, b, a] * x[before, b, 0]
-                for b in range(shared):
-                    force += border[k, a, b] * y[b, 0]
-                lift += mean[a + shared] * force
+    for k in range(ring.S):
+        if held[k] > 0.0:
+            lift = 0.0
+            for a in range(o):
+                force = _pull(R, ring, k, a, R, ring.x + Q, ring.wide)
+                for b in range(s):
+                    force += room.border[k, a, b] * R[ring.y + b * ring.n]
+                lift += mean[a + s] * (force - room.rows[drive + a + s, k])
             other = lift < 0.0
         else:
-            room = common
-            for a in range(own):
-                room += mean[a + shared] * x[k, a, 0]
-            largest = max(largest, abs(room))
-            other = room < -_TINY * largest
+            free = common
+            for a in range(o):
+                free += mean[a + s] * R[ring.x + (k * o + a) * ring.wide + Q]
+            largest = max(largest, abs(free))
+            other = free < -_TINY * largest
         if other:
-            held[k] = not held[k]
+            held[k] = 1.0 - held[k]
             if one:
                 return True
             changed = True
     return changed
 
 
-@inner(error_model="numpy")
-def _hold(
-    blocks: Array,
-    links: Array,
-    border: Array,
-    corner: Array,
-    held: NDArray[np.bool_],
-    normal: Array,
-    common: Array,
-    raised: Array,
-    base: float,
-    x: Array,
-    y: Array,
-) -> tuple[Array, Array, Array, Array, Array]:
-    """Solve with held sectors at the limit, in place; returns the eliminated ring.
+@inner(_nrt=False, error_model="numpy", fastmath=FAST)
+def solve_film(land: Land, room: FilmRoom, tension: float, held: Vector) -> None:
+    """Forces of a film on its circles, and amplitudes of its pressure, into ``room``.
 
-    The amplitudes are ``w - raised (base + common y)``, where w of a held sector does not change
-    its mean pressure.
+    Parameters
+    ----------
+    tension [Pa]
+    held (S,)
+        In: sectors with which the search for those at the limit of tension begins, 0 or 1; out:
+        those.
     """
-    S, own, shared = raised.shape[0], raised.shape[1], len(common)
-    pulled, square, load = np.zeros((S, own)), 0.0, 0.0
-    for k in range(S):
-        before, after = (k - 1) % S, (k + 1) % S
-        for a in range(own):
-            for b in range(own):
-                pulled[k, a] += blocks[k, a, b] * raised[k, b] + links[k, a, b] * raised[after, b]
-                pulled[k, a] += links[before, b, a] * raised[before, b]
-            square += raised[k, a] * pulled[k, a]
-            load += raised[k, a] * x[k, a, 0]
-    side, middle = border, corner
-    if shared:
-        side, middle, cross = border.copy(), corner.copy(), np.zeros(shared)
+    mean, shared, R = room.mean, land.shared, first(room.ring)
+    S, N, Q, w = land.sectors, land.circles, land.functions, len(land.ways)
+    if Q == 2 and N == 1 and w == 3:  # the films of strokes: loops that the compiler can write out
+        _begin(land, room, 1, 2, 3)
+    elif Q == 3 and N == 2 and w == 3:
+        _begin(land, room, 2, 3, 3)
+    else:
+        _begin(land, room, N, Q, w)
+    base, square = 0.0, 0.0
+    for j in range(N):
+        base += tension * land.area[j] + room.still[j]
+    for a in range(Q):
+        mean[a] = 0.0
+        for j in range(N):
+            mean[a] += land.load[j, a]
+        if a >= shared:
+            square += mean[a] * mean[a]
+    ring, tries = ring_of(S, Q - shared, shared, 1 + w), 0
+    while True:
+        some = False
         for k in range(S):
-            for a in range(own):
-                for b in range(shared):
-                    cross[b] += raised[k, a] * border[k, a, b]
-                    side[k, a, b] -= pulled[k, a] * common[b]
-        for a in range(shared):
-            for b in range(shared):
-                middle[a, b] += square * common[a] * common[b]
-                middle[a, b] -= cross[a] * common[b] + common[a] * cross[b]
-            y[a, 0] += base * cross[a] - (square * base + load) * common[a]
-    for k in range(S):
-        for a in range(own):
-            x[k, a, 0] += base * pulled[k, a]
-    ring = eliminate_ring(blocks, links, side, middle, held, normal, x, y)
-    part = base
-    for a in range(shared):
-        part += common[a] * y[a, 0]
-    for k in range(S):
-        for a in range(own):
-            x[k, a, 0] -= raised[k, a] * part
-    return ring
+            some = some or held[k] > 0.0
+            for a in range(shared, Q):
+                room.raised[k, a - shared] = held[k] * mean[a] / square
+        _ask(land, room, R, ring)
+        if some:
+            _hold(land, room, R, ring, base)
+        solve_ring(R, ring, held, mean[shared:])
+        if some:
+            _raise(land, room, R, ring, base)
+        if tension == np.inf or tries >= _ACTIVE_SETS + S * S:
+            break
+        one = tries >= _ACTIVE_SETS  # by one at a time, the first one: it never turns in a circle
+        if not _regroup(land, room, R, ring, base, held, one):
+            break
+        tries += 1
+    if Q == 2 and N == 1 and w == 3:
+        _end(land, room, 1, 2, 3)
+    elif Q == 3 and N == 2 and w == 3:
+        _end(land, room, 2, 3, 3)
+    else:
+        _end(land, room, N, Q, w)
+
+
+@_part
+def _gain(land: Land, room: FilmRoom, rate: float, N: int, Q: int, w: int) -> None:
+    """What each height gains a unit of force along each way, with its sign.
+
+    Through the closing, and the change of the stiffness between both amplitudes: K is symmetric.
+    """
+    M, S, n, at = first(room.rows), land.sectors, _STRIDE, film_rows(N, land.points, Q, w)
+    amplitudes, apart, loads, gained = (
+        at.amplitudes * n, at.apart * n, at.loads * n, at.gained * n
+    )  # fmt: skip
+    mobility, change = at.mobility * n, at.change * n
+    for c in range((1 + w) * Q):
+        for k in range(S):
+            M[apart + c * n + k] = M[amplitudes + c * n + k] - M[amplitudes + c * n + k + 1]
+    for d in range(w):
+        for j in range(N):
+            for k in range(S):
+                value = 0.0
+                for a in range(Q):
+                    value += land.load[j, a] * M[amplitudes + ((1 + d) * Q + a) * n + k]
+                M[gained + (d * N + j) * n + k] = rate * value
+    for p in range(land.points):
+        for k in range(S):
+            here, after = M[mobility + p * n + k], M[mobility + p * n + k + 1]
+            share = 1.0 / (here + after)
+            M[k] = 2.0 * (after * share) ** 2
+            M[n + k] = 2.0 * (here * share) ** 2
+            M[2 * n + k] = M[change + p * n + k]
+        for a in range(Q):
+            for k in range(S):
+                one, other = room.head[p, a], 0.0
+                for b in range(Q):
+                    one += land.along[p, a, b] * M[amplitudes + b * n + k]
+                    other += land.around[p, a, b] * M[apart + b * n + k]
+                M[loads + a * n + k] = one
+                M[loads + (Q + a) * n + k] = other
+        for d in range(w):
+            for k in range(S):
+                one, other = 0.0, 0.0
+                for a in range(Q):
+                    one += M[amplitudes + ((1 + d) * Q + a) * n + k] * M[loads + a * n + k]
+                    other += M[apart + ((1 + d) * Q + a) * n + k] * M[loads + (Q + a) * n + k]
+                M[3 * n + k] = one + M[k] * other
+                M[loads + 2 * Q * n + k + 1] = M[n + k] * other
+            M[loads + 2 * Q * n] = M[loads + 2 * Q * n + S]
+            for j in range(N):
+                part = land.between[p, j]
+                for k in range(S):
+                    way = M[3 * n + k] + M[loads + 2 * Q * n + k]
+                    M[gained + (d * N + j) * n + k] += part * M[2 * n + k] * way
+
+
+@inner(_nrt=False, error_model="numpy", fastmath=FAST)
+def add_slopes(land: Land, room: FilmRoom, rate: float, slopes: Matrix) -> None:
+    """Add how forces along each way change with motion along each of them, shape (w, w) [N].
+
+    Parameters
+    ----------
+    room
+        As :func:`solve_film` leaves it, with the slopes of the mobility, and what moves.
+    rate [1/s]
+        How the closing falls with the heights: 1 over a step.
+    """
+    S, N, Q, w = land.sectors, land.circles, land.functions, len(land.ways)
+    if Q == 2 and N == 1 and w == 3:
+        _gain(land, room, rate, 1, 2, 3)
+    elif Q == 3 and N == 2 and w == 3:
+        _gain(land, room, rate, 2, 3, 3)
+    else:
+        _gain(land, room, rate, N, Q, w)
+    at = film_rows(N, land.points, Q, w)
+    for c in range(w):
+        for d in range(w):
+            total = 0.0
+            for j in range(N):
+                gained, moves, way = (
+                    room.rows[at.gained + c * N + j], room.rows[at.moves + j], land.ways[d, j]
+                )  # fmt: skip
+                for k in range(S):
+                    total += gained[k] * moves[k] * way[k]
+            slopes[c, d] -= total
+
+
+@njit
+def film_forces(
+    land: Land, room: FilmRoom, tension: float, held: Vector, rate: float, slopes: Matrix
+) -> None:
+    """:func:`solve_film`, then :func:`add_slopes`."""
+    solve_film(land, room, tension, held)
+    if rate > 0.0:
+        add_slopes(land, room, rate, slopes)

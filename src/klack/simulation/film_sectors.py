@@ -4,9 +4,9 @@ A step from the lift and tilts :math:`u_0` to :math:`u_1` has the heights
 
 .. math:: h = \max(g + r\,(t_x \cos\theta + t_y \sin\theta), 0) + h_r
 
-at its ends, from which :func:`klack.hydraulics.tilted_film.film_pressure` computes the mean forces
-of the sectors.  Divided by the area of a sector they are its mean pressure above ambient.  With the
-drag along a cone,
+at its ends, of which :func:`klack.hydraulics.tilted_film.solved_film` has the mean forces of the
+sectors over the step.  Divided by the area of a sector they are its mean pressure above ambient.
+With the drag along a cone,
 
 .. math:: f_s = c_s \frac{\ln(h_0 / h_1)}{h_0 - h_1} \frac{h_0 - h_1}{\Delta t}, \qquad
     F = s \Bigl(\sum_k F_k + f_s\Bigr),
@@ -22,10 +22,9 @@ from numpy.typing import NDArray
 from klack.arrays import Floats
 from klack.hydraulics.tilted_film import (
     SectorFilm,
-    film_pressure,
-    land_of,
     mean_mobility,
     sector_film,
+    solved_film,
 )
 from klack.simulation.spatial_impact import FilmLand, FilmMoments
 
@@ -99,10 +98,8 @@ def _forces(cut: SectorFilm, land: FilmLand, open0: Floats, open1: Floats, step:
     a, b = (np.maximum(gap @ cut.between.T, 0.0) + land.lowest for gap in (open0, open1))
     mobility = mean_mobility(a, b, land.viscosity)
     closing = (np.maximum(open0, 0.0) - np.maximum(open1, 0.0)) / step
-    head, still = np.zeros(cut.load.shape), np.zeros(land.circles)
-    held = np.zeros(land.sectors, dtype=np.bool_)
-    arrays = land_of(cut)
-    return np.asarray(film_pressure(arrays, mobility, closing, head, still, land.tension, held)[0])
+    edges = np.zeros(cut.load.shape), np.zeros(land.circles)
+    return solved_film(cut, mobility, closing, 0.0 * mobility, edges, land.tension, 0.0)[0]
 
 
 def _drag(land: FilmLand, lift0: float, lift1: float, step: float) -> float:

@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 
 from klack.arrays import Index, Matrix, Vector
 from klack.contact.step_constants import LEAST_WAY, SEPARATED, SETTLED, SWEEPS
-from klack.machine.compiling.jit import inner, njit
+from klack.machine.compiling.jit import FAST, inner, njit
 from klack.simulation.contact_step import law_potential, solve_step
 from klack.simulation.phase import compiled, phase
 
 __all__ = [
-    "FAST",
     "STATUS_CONTACTS",
     "STATUS_FINE",
     "Contacts",
@@ -93,7 +92,6 @@ class Record(NamedTuple):
 
 
 STATUS_FINE, STATUS_CONTACTS = 0, 1
-FAST = {"contract", "reassoc", "nsz", "arcp"}  # lets the sums over modes use vector registers
 
 
 @compiled(fastmath=FAST)

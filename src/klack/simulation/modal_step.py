@@ -15,8 +15,7 @@ ports.
 
 from typing import Any
 
-from klack.machine.compiling.jit import inner, njit
-from klack.simulation.kernel import FAST
+from klack.machine.compiling.jit import FAST, inner, njit
 
 __all__ = [
     "FIXED_ROWS",

@@ -1,6 +1,6 @@
 """The decorator of the parts that a compiled time loop is made of."""
 
-from klack.machine.compiling.jit import inner, njit
+from klack.machine.compiling.jit import FAST, inner, njit
 
 __all__ = [
     "STATUS_BRANCH",
@@ -13,6 +13,7 @@ __all__ = [
     "STATUS_REPEAT",
     "compiled",
     "phase",
+    "sums",
 ]
 
 
@@ -24,6 +25,9 @@ phases.  Not to be called from Python.  The loop of networks gives bundles as
 :func:`klack.network.step_function.pointers`, since access to an array checks for a negative index
 and loads a stride.
 """
+
+sums = inner(_nrt=False, error_model="numpy", forceinline=True, fastmath=FAST)
+"""The same for one that sums over many numbers, in any order."""
 
 compiled = inner
 """Compile a function that phases call without inlining it.  Not to be called from Python."""

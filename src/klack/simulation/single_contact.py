@@ -18,10 +18,9 @@ from klack.contact.step_constants import (
     LEAST_WAY,
     SEPARATED,
 )
-from klack.machine.compiling.jit import inner, njit
+from klack.machine.compiling.jit import FAST, inner, njit
 from klack.simulation.contact_step import solve_linear, solve_step
 from klack.simulation.kernel import (
-    FAST,
     STATUS_FINE,
     Contacts,
     Damped,

@@ -17,8 +17,7 @@ has to reduce the residual.
 import numpy as np
 
 from klack.arrays import Matrix, Vector
-from klack.machine.compiling.jit import inner
-from klack.simulation.kernel import FAST
+from klack.machine.compiling.jit import FAST, inner
 from klack.simulation.phase import phase
 from klack.transient.interface_arrays import Closed
 

@@ -40,7 +40,7 @@ import numpy as np
 
 from klack.arrays import Cube, Matrix, Vector
 from klack.hydraulics.guide_film import guide_film_step
-from klack.machine.compiling.jit import inner, njit
+from klack.machine.compiling.jit import FAST, inner, njit
 from klack.simulation.phase import phase
 from klack.transient.interface_arrays import Films, Guide, Modes, State, Step
 
@@ -160,7 +160,7 @@ def begin_rub(bore: Guide, before: Matrix, after: Matrix, rub: GuideRub) -> bool
     return rubs
 
 
-@inner
+@inner(_nrt=False, error_model="numpy", fastmath=FAST)
 def rub_guide(modes: Modes, rub: GuideRub, before: Vector, step: Step) -> float:
     """Let friction act against what the other forces make of a step; returns the spring's part [N].
 

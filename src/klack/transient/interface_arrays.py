@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from klack.arrays import Cube, Matrix, Vector
 from klack.errors import require_nonnegative
+from klack.hydraulics.tilted_film import FilmRoom
 
 __all__ = [
     "CONTACT_STEPS",
@@ -24,6 +25,7 @@ __all__ = [
     "ActiveSet",
     "Closed",
     "ContactPoints",
+    "FilmWork",
     "Films",
     "Grip",
     "Guide",
@@ -156,8 +158,8 @@ class Guide(NamedTuple):
 class Films(NamedTuple):
     """Films between faces: heights are lift + r (tilt_x cos + tilt_y sin) + what roughness leaves.
 
-    ``land`` holds the lands of all films in turn: see
-    :func:`klack.transient.tilting_films.land_at`.
+    Lands of several sizes have room in the arrays of the largest: ``sizes`` tells what is used
+    (:func:`klack.transient.tilting_films.land_at`).
     """
 
     rows: Cube  # (k, 3, M) lift and tilts per modal coordinate [-], [1/m]
@@ -174,8 +176,23 @@ class Films(NamedTuple):
     bearing: Vector  # (g,) [N s] of heights of the guide: mu L^3 R / c^2, see ``guide_film``
     room: Vector  # (g,) [m] c: clearance and what roughness leaves
     sizes: NDArray[np.int64]  # (k, 5) sectors, circles, points, functions, shared ones
-    start: NDArray[np.int64]  # (k,) in ``land``
-    land: Vector
+    ways: NDArray[np.float64]  # (k, 3, N, S) of each land, see hydraulics.tilted_film.Land
+    worked: NDArray[np.float64]  # (k, 3, Q, S)
+    between: Cube  # (k, G, N)
+    along: NDArray[np.float64]  # (k, G, Q, Q)
+    around: NDArray[np.float64]  # (k, G, Q, Q)
+    load: Cube  # (k, N, Q)
+    area: Matrix  # (k, N)
+
+
+class FilmWork(NamedTuple):
+    """What the films of a step work with."""
+
+    room: FilmRoom
+    soft: Cube  # (k, 3, 3) lift and tilts at the end of a step per mean force, and of the bulk
+    slopes: Matrix  # (3, 3)
+    stiffer: Matrix  # (3, 3)
+    held: Cube  # (k, 2, 3) force and moments of the contact forces at both ends of the step
 
 
 class ActiveSet(NamedTuple):
@@ -360,6 +377,7 @@ class Step(NamedTuple):
     moved: Vector  # (ways n,) [m] the part of the offsets that the modes move
     bent: Vector  # (ways n,) [m] the other part, at the end
     mu: Vector  # (n,) [-]
+    film: FilmWork | None  # with films only
 
 
 class Record(NamedTuple):

@@ -47,7 +47,7 @@ from numpy.typing import NDArray
 
 from klack.arrays import Matrix, Vector
 from klack.machine.compiling.jit import inner, njit
-from klack.simulation.phase import phase
+from klack.simulation.phase import sums
 from klack.transient.active_set import solve_active
 from klack.transient.guide_step import begin_rub, count_bearing, no_rub, rub_guide, squeeze_guide
 from klack.transient.interface_arrays import (
@@ -90,6 +90,9 @@ from klack.transient.tilting_films import (
     bend_faces,
     bulk_work,
     count_squeeze,
+    film_change,
+    film_work,
+    hold_films,
     squeeze,
     tell_land,
 )
@@ -156,7 +159,7 @@ def _spring_share(B1: NDArray, push: NDArray, spring: float) -> float:
     return 0.5 * spring / (1.0 + 0.5 * spring * yields)
 
 
-@phase
+@sums
 def _push_by_films(films: Films, bore: Guide | None, state: State, step: Step) -> None:
     for i in range(len(step.kick)):
         step.kick[i] = 0.0
@@ -169,7 +172,7 @@ def _push_by_films(films: Films, bore: Guide | None, state: State, step: Step) -
                     step.kick[i] += bore.traces[k, c, i] * state.bearing[k, c]
 
 
-@phase
+@sums
 def _hold(step: Step, modes: Modes) -> float:
     """Let the spring answer the next force; returns its part [N]."""
     kick, push, B1, share = step.kick, modes.push, modes.B1, step.share
@@ -183,7 +186,7 @@ def _hold(step: Step, modes: Modes) -> float:
     return -share * moved
 
 
-@phase
+@sums
 def _add(step: Step, modes: Modes, factor: float) -> None:
     for i in range(len(step.kick)):
         step.whole[i] += factor * step.kick[i]
@@ -191,7 +194,7 @@ def _add(step: Step, modes: Modes, factor: float) -> None:
         step.v[i] += factor * modes.B2[i] * step.kick[i]
 
 
-@phase
+@sums
 def _gather(traces: Matrix, force: Vector, factor: float, kick: Vector) -> None:
     for i in range(len(kick)):
         kick[i] = 0.0
@@ -251,7 +254,7 @@ def safe_flight(
     return safe
 
 
-@phase
+@sums
 def _payment(owed: float, slope: float, square: float) -> float:
     """Smaller root of ``owed + slope p + square p^2``; where it has none, its extremum."""
     inside = slope**2 - 4.0 * square * owed
@@ -261,7 +264,7 @@ def _payment(owed: float, slope: float, square: float) -> float:
     return -2.0 * owed / divisor if divisor != 0.0 else 0.0
 
 
-@phase
+@sums
 def _work(points: ContactPoints, before: Vector, step: Step) -> tuple[float, float]:
     """Work of the mean contact forces over a step, and the potential at its end [J]."""
     traces = points.traces
@@ -280,9 +283,14 @@ def _work(points: ContactPoints, before: Vector, step: Step) -> tuple[float, flo
 
 
 @inner
-def _start(modes: Modes, outside: Outside, bore: Guide | None, n: int, rubs: int) -> Step:
-    """Room for a step, the answer of the spring, and the drag on the shaft."""
+def _start(
+    modes: Modes, outside: Outside, bore: Guide | None, films: Films | None, n: int, rubs: int
+) -> Step:
+    """Room for a step, the answer of the spring, and how much drag brakes the shaft."""
     M, guides = len(modes.push), 0
+    work = None
+    if films is not None:
+        work = film_work(films, modes)
     if bore is not None:
         guides = len(bore.clearance)
     dragging = np.zeros(guides)
@@ -311,10 +319,11 @@ def _start(modes: Modes, outside: Outside, bore: Guide | None, n: int, rubs: int
         np.zeros(rubs),
         np.zeros(rubs),
         np.empty(n if rubs else 0),
+        work,
     )
 
 
-@phase
+@sums
 def _potential(points: ContactPoints, state: State) -> float:
     """Energy of the contact, -lam (gap + Phi q) / 2, since closed points have no gap [J].
 
@@ -332,7 +341,7 @@ def _potential(points: ContactPoints, state: State) -> float:
     return potential
 
 
-@phase
+@sums
 def _begin(modes: Modes, outside: Outside, bore: Guide | None, state: State, step: Step) -> float:
     """Forces known before the step, the guide's as they were; returns its drag [N]."""
     for i in range(len(modes.push)):
@@ -353,7 +362,7 @@ def _begin(modes: Modes, outside: Outside, bore: Guide | None, state: State, ste
     return braking
 
 
-@phase
+@sums
 def _move(modes: Modes, state: State, step: Step) -> float:
     """Move the bodies over the step under all known forces; returns the spring's [N]."""
     A11, A12, B1, q, v = modes.A11, modes.A12, modes.B1, state.q, state.v
@@ -373,7 +382,7 @@ def _move(modes: Modes, state: State, step: Step) -> float:
     return pull
 
 
-@phase
+@sums
 def _press(modes: Modes, bore: Guide, step: Step, k: int) -> float:
     """Keep the shaft in its disc of clearance; returns what the spring adds [N]."""
     step.normal[k, 0] = 0.0
@@ -405,7 +414,7 @@ def _press(modes: Modes, bore: Guide, step: Step, k: int) -> float:
     return answer
 
 
-@phase
+@sums
 def _look(points: ContactPoints, step: Step) -> tuple[float, float]:
     """Gaps without new contact forces: the smallest, and the largest magnitude [m]."""
     least, widest = 1e300, 0.0
@@ -417,7 +426,7 @@ def _look(points: ContactPoints, step: Step) -> tuple[float, float]:
     return least, widest
 
 
-@phase
+@sums
 def _turned(points: ContactPoints, state: State, step: Step) -> bool:
     """Whether the contact pushes opposite to the last one."""
     axial = 0.0
@@ -430,7 +439,7 @@ def _turned(points: ContactPoints, state: State, step: Step) -> bool:
     return False
 
 
-@phase
+@sums
 def _close(points: ContactPoints, state: State, step: Step) -> float:
     """Let the new contact forces act; returns the smallest gap [m]."""
     least = 1e300
@@ -443,7 +452,7 @@ def _close(points: ContactPoints, state: State, step: Step) -> float:
     return least
 
 
-@phase
+@sums
 def _touch(
     points: ContactPoints,
     grip: Grip | None,
@@ -475,7 +484,7 @@ def _touch(
     return solve_active(points.A, step.open_gap, state.contact, lam, gap, tolerance, diagonal)
 
 
-@phase
+@sums
 def _take_up(
     points: ContactPoints, limit: Limit | None, layer: Layer | None, state: State, step: Step
 ) -> float:
@@ -491,7 +500,7 @@ def _take_up(
     return taken
 
 
-@phase
+@sums
 def _pay(
     modes: Modes,
     points: ContactPoints,
@@ -550,7 +559,7 @@ def _pay(
     return pay, stored, answer
 
 
-@phase
+@sums
 def _balance(
     modes: Modes,
     points: ContactPoints,
@@ -600,7 +609,7 @@ def _balance(
     return stored, answer + weight * back
 
 
-@phase
+@sums
 def _settle(
     modes: Modes,
     points: ContactPoints,
@@ -618,7 +627,7 @@ def _settle(
     return _pay(modes, points, state, step, potential, answer, taken_up)
 
 
-@phase
+@sums
 def _tell_forces(
     points: ContactPoints, state: State, step: Step, pay: float, record: Record, taken: int
 ) -> None:
@@ -637,7 +646,7 @@ def _tell_forces(
         state.books[OPEN_STEPS] += 1.0
 
 
-@phase
+@sums
 def _count(
     modes: Modes, outside: Outside, bore: Guide | None, state: State, step: Step, axial: float
 ) -> None:
@@ -671,7 +680,7 @@ def _count(
         books[GUIDE_STRAIN] = held
 
 
-@phase
+@sums
 def _finish(
     modes: Modes,
     state: State,
@@ -721,13 +730,13 @@ def march(
         Out, for at least ``steps`` steps.
     """
     n, books = len(points.gap), state.books
-    step = _start(modes, outside, bore, n, len(state.rubbing.across))
+    step = _start(modes, outside, bore, films, n, len(state.rubbing.across))
     rubs_guide = False
     if bore is not None:
         guide = no_rub(len(bore.clearance), len(modes.push))
     if films is not None:
         for k in range(len(films.lowest)):
-            bend_faces(films, k, state.films[k, :3], points.gap)
+            bend_faces(films, k, film_change(state, k, 1.0, 0.0), points.gap)
     potential = _potential(points, state)
     smallest = 0.0  # gap of the step before
     for taken in range(steps):
@@ -742,13 +751,13 @@ def march(
             if rubs_guide:
                 axial += rub_guide(modes, guide, state.q, step)
         if films is not None:
-            begin_films(state, modes.step)
+            begin_films(films, step.film, state, modes.step, taken == 0)
             _push_by_films(films, bore, state, step)
             _add(step, modes, 1.0)
             for _ in range(_SWEEPS):
                 moved = 0.0
                 for k in range(len(films.lowest)):
-                    change = squeeze(films, k, modes, state, step.q, step.kick)
+                    change = squeeze(films, k, modes.step, state, step, step.film)
                     if change < 0.0:
                         return taken, FAILED
                     _add(step, modes, 1.0)
@@ -764,8 +773,8 @@ def march(
                 if moved <= _SETTLED:
                     break
             for k in range(len(films.lowest)):
-                tell_land(films, k, state, step.q, record.lands[taken, k])
-                bend_faces(films, k, state.films[k, :3] - state.films[k, 3:6], points.gap)
+                tell_land(films, k, step.film, state, step.q, record.lands[taken, k])
+                bend_faces(films, k, film_change(state, k, 1.0, -1.0), points.gap)
         least = 0.0
         answer = 0.0  # of the spring to the forces of the contact
         taken_up = 0.0  # by what yields, or by layers beyond the potential
@@ -783,8 +792,9 @@ def march(
                 books[ROUNDS] += rounds
                 taken_up = _take_up(points, points.limit, points.layer, state, step)
                 if films is not None:
+                    hold_films(films, step.film, step.lam)
                     for k in range(len(films.lowest)):
-                        taken_up += bulk_work(films, k, state, step.lam)
+                        taken_up += bulk_work(films, k, step.film, state)
                 least = _close(points, state, step)
                 answer += _hold(step, modes)
                 _add(step, modes, 1.0)
@@ -800,7 +810,7 @@ def march(
         _count(modes, outside, bore, state, step, axial)
         if films is not None:
             for k in range(len(films.lowest)):
-                count_squeeze(films, k, state, step.q, step.lam, modes.step)
+                count_squeeze(films, k, step.film, state, step.q, modes.step)
                 record.film[taken, k] = films.axial[k] * state.films[k, 0]
             if bore is not None:
                 for k in range(len(films.room)):
@@ -816,5 +826,5 @@ def march(
             return taken + 1, OPEN
     if films is not None:
         for k in range(len(films.lowest)):
-            bend_faces(films, k, -state.films[k, :3], points.gap)
+            bend_faces(films, k, film_change(state, k, -1.0, 0.0), points.gap)
     return steps, FINISHED

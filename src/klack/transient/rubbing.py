@@ -41,8 +41,7 @@ from klack.arrays import Ints, Matrix, Vector
 from klack.contact.face_friction import with_still_directions
 from klack.contact.friction import Friction
 from klack.errors import ConvergenceError, InputError
-from klack.machine.compiling.jit import inner, njit
-from klack.simulation.kernel import FAST
+from klack.machine.compiling.jit import FAST, inner, njit
 from klack.simulation.phase import phase
 from klack.transient.closed_points import (
     admit,

@@ -6,7 +6,10 @@ from typing import Any
 
 from klack.machine.compiling.marked import Marked
 
-__all__ = ["inner", "intrinsic", "njit"]
+__all__ = ["FAST", "inner", "intrinsic", "njit"]
+
+FAST = {"contract", "reassoc", "nsz", "arcp"}
+"""For sums and products over many numbers: they may use vector registers, in any order."""
 
 
 def njit(function: Callable[..., Any] | None = None, **options: Any) -> Any:
