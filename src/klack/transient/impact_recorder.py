@@ -8,22 +8,22 @@ taken out of the rows.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import block_diag, csr_array
 
 from klack.arrays import Cube, Matrix, Vector
 from klack.hydraulics.tilted_film import SectorFilm
-from klack.machine.compiling.jit import inner, njit
+from klack.machine.compiling.jit import inner, njit, of_one_kind
 from klack.simulation.network_arrays import Recording, Scratch
 from klack.simulation.network_compile import CompiledNetwork
 from klack.simulation.spatial_impact import FilmLand, FilmMoments, ModalMoments, SpatialImpact
 from klack.transient.interface_arrays import Films, Record
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.ring_arcs import ArcWatch
+from klack.transient.spatial_kernel import StopRows, StopState, tell_stops
 from klack.transient.tilting_films import TiltingFilm
 
 __all__ = [
@@ -364,17 +364,85 @@ def _every_second(rows: Matrix, count: int) -> int:
     return (count + 1) // 2
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Stop:
-    name: str
-    points: slice
-    shares: csr_array  # (S, n) axial force of a sector per force of a point
-    levers: Vector  # (n, 3) axial force times radius, its square, and height per force of a point
-    film: int  # its place among the films, -1 without
-    land: FilmLand | None
-    felt: float
-    pause: float
-    rest: float
+class Watched(NamedTuple):
+    """What stays the same of all stops; shares of sectors lie point after point."""
+
+    span: NDArray[np.int64]  # (c, 2) first point, and the one behind the last
+    start: NDArray[np.int64]  # (n + 1,) in ``sector`` and ``share``
+    sector: NDArray[np.int64]
+    share: Vector  # axial force of a sector per force of a point
+    levers: Matrix  # (n, 3) axial force times radius, its square, and height per force of a point
+    film: NDArray[np.int64]  # (c,) place among the films, -1 without one that tilts
+    felt: Vector  # (c,) [N]
+    pause: Vector  # (c,) [s]
+    rest: Vector  # (c,) [s]
+
+
+@njit
+def follow_stops(
+    rows: ImpactRows,
+    stops: Watched,
+    c: int,
+    first: int,
+    times: tuple[float, float],
+    record: Record,
+    before: Vector,
+) -> tuple[int, int]:
+    """Take in the steps of all stops from step ``first`` of stop ``c`` on.
+
+    Returns the stop and the step before which a recorded impact is over, as :func:`follow`; the
+    stop is -1 when all is done.
+
+    Parameters
+    ----------
+    times [s]
+        Start of step 0, and length of the steps.
+    before (M,)
+        Modes there.
+    """
+    t, h = times
+    steps, sectors = len(record.force), rows.load.shape[2]
+    force, levers = np.zeros((steps, sectors)), np.zeros((steps, 3))
+    film, lands = np.zeros(0), np.zeros((steps, 6))
+    for stop in range(c, len(stops.film)):
+        if stop > c:
+            first = 0
+        if first == 0 and rows.words[stop, PHASE] != PRESSED and rows.words[stop, PHASE] != RESTING:
+            _await_place(rows, stop, t, before)
+        force[:] = 0.0
+        levers[:] = 0.0
+        for i in range(len(record.points)):
+            for k in range(stops.span[stop, 0], stops.span[stop, 1]):
+                load = float(record.points[i, k])
+                if load != 0.0:
+                    for s in range(stops.start[k], stops.start[k + 1]):
+                        force[i, stops.sector[s]] += stops.share[s] * load
+                    for d in range(3):
+                        levers[i, d] += stops.levers[k, d] * load
+        place = stops.film[stop]
+        if place >= 0:
+            film = record.film[:, place].copy()
+            lands[:] = record.lands[:, place]
+        else:
+            film = film[:0]
+        first = follow(
+            rows,
+            stop,
+            first,
+            t,
+            h,
+            force,
+            levers,
+            film,
+            lands,
+            stops.felt[stop],
+            record.places,
+            stops.pause[stop],
+            stops.rest[stop],
+        )
+        if first >= 0:
+            return stop, first
+    return -1, 0
 
 
 class ImpactRecorder:
@@ -403,28 +471,26 @@ class ImpactRecorder:
         rest: Vector,
     ) -> None:
         self.model, self._marks = model, shape_marks
-        names = [name for name, _ in films]
-        self._stops = []
-        for c, name in enumerate(stops):
-            _, first, last = model.contacts[c]
-            at = slice(first, last)
-            axial = np.abs(model.axial[at])
-            radius = np.linalg.norm(model.points[at, :2], axis=1)
-            film = names.index(name) if name in names else -1
-            self._stops.append(
-                _Stop(
-                    name=name,
-                    points=at,
-                    shares=csr_array(sector_shares(model.points[at], model.area[at]) * axial),
-                    levers=axial[:, None]
-                    * np.column_stack([radius, radius**2, model.points[at, 2]]),
-                    film=film,
-                    land=films[film][1] if film >= 0 else None,
-                    felt=float(felt[c]),
-                    pause=float(pause[c]),
-                    rest=float(rest[c]),
-                )
-            )
+        named, own = dict(films), [name for name, _ in films]
+        self._lands = [(name, named.get(name)) for name in stops]
+        axial, points = np.abs(model.axial), model.points
+        spans = [contact[1:] for contact in model.contacts]
+        shares = block_diag(
+            [sector_shares(points[a:b], model.area[a:b]) * axial[a:b] for a, b in spans]
+        ).tocsc()
+        radius = np.linalg.norm(points[:, :2], axis=1)
+        self._watched = Watched(
+            span=np.array(spans, dtype=np.int64),
+            start=shares.indptr.astype(np.int64),
+            sector=shares.indices.astype(np.int64) % SECTORS,
+            share=shares.data,
+            levers=axial[:, None] * np.column_stack([radius, radius**2, points[:, -1]]),
+            film=np.array([own.index(n) if land is not None else -1 for n, land in self._lands]),
+            felt=np.array(felt),
+            pause=np.array(pause),
+            rest=np.array(rest),
+        )
+        self._follow = of_one_kind(follow_stops)
         self.rows = ImpactRows.empty(len(stops), SECTORS, model.mode_count, len(films))
         self._over: list[tuple[float, SpatialImpact]] = []
 
@@ -446,42 +512,17 @@ class ImpactRecorder:
         """
         while self._over and self._over[-1][0] > t + h * (len(record.force) - 0.5):
             self._over.pop()
-        for c in range(len(self._stops)):
-            self._tell(c, t, h, record, before)
-
-    def _tell(self, c: int, t: float, h: float, record: Record, before: Vector) -> None:
-        stop, rows, steps = self._stops[c], self.rows, len(record.force)
-        words = rows.words[c]
-        force, levers = np.zeros((steps, SECTORS)), np.zeros((steps, 3))
-        if len(record.points):
-            points = record.points[:, stop.points].astype(float)
-            if np.any(points):
-                force, levers = (
-                    np.ascontiguousarray((stop.shares @ points.T).T),
-                    points @ stop.levers,
-                )
-        film, lands = np.zeros(0), np.zeros((steps, 6))
-        if stop.land is not None:
-            film = np.ascontiguousarray(record.film[:, stop.film])
-            lands = np.ascontiguousarray(record.lands[:, stop.film])
-        if words[PHASE] not in (PRESSED, RESTING):
-            self._stand(c, t, before)
-        first = 0
+        rows, c, first = self.rows, 0, 0
         while True:
-            first = follow(
-                *(rows, c, first, t, h, force, levers, film, lands, stop.felt),
-                *(record.places, stop.pause, stop.rest),
-            )
-            if first < 0:
+            c, first = self._follow(rows, self._watched, c, first, (t, h), record, before)
+            if c < 0:
                 return
             self._take(c, t + first * h)
-            if words[PHASE] == PRESSED:
-                words[PHASE] = APART
-                self._stand(c, t + first * h, record.places[first - 1] if first else before)
-
-    def _stand(self, c: int, time: float, place: Vector) -> None:
-        rows = self.rows
-        rows.moments[c, 0], rows.places[c, 0], rows.words[c, MODE_ROWS] = time, place, 1
+            if rows.words[c, PHASE] == PRESSED:
+                rows.words[c, PHASE] = APART
+                place = record.places[first - 1] if first else before
+                rows.moments[c, 0], rows.places[c, 0] = t + first * h, place
+                rows.words[c, MODE_ROWS] = 1
 
     def _take(self, c: int, time: float) -> None:
         if self.rows.words[c, NUMBER] <= MOST:
@@ -496,7 +537,7 @@ class ImpactRecorder:
         return tuple(sorted(found, key=lambda impact: impact.number))
 
     def _impact(self, c: int) -> SpatialImpact:
-        stop, rows = self._stops[c], self.rows
+        rows, (name, land) = self.rows, self._lands[c]
         words, edges = rows.words[c], rows.edges[c]
         count = int(
             np.searchsorted(edges[: words[LOAD_ROWS] + 1], rows.times[c, STOP] * (1 - 1e-12))
@@ -505,10 +546,10 @@ class ImpactRecorder:
         edges = edges[: count + 1].copy()
         _, first, second, height = rows.sums[c] / rows.sums[c, 0]
         film, modes = None, None
-        if stop.land is not None:
+        if land is not None:
             samples = rows.film[c, : words[FILM_ROWS]].copy()
             film = FilmMoments(
-                land=stop.land,
+                land=land,
                 time=samples[:, 0],
                 step=samples[:, 1],
                 film_force=samples[:, 2],
@@ -528,7 +569,7 @@ class ImpactRecorder:
             )
         return SpatialImpact(
             number=int(words[NUMBER]),
-            stop=stop.name,
+            stop=name,
             edges=edges,
             sector_force=rows.load[c, :count] / np.diff(edges)[:, None],
             radius=float(first),
@@ -598,73 +639,51 @@ class StopRecord:
         arcs: ArcWatch | None,
         step: float,
     ) -> None:
-        self._network, self._model, self._ports = network, model, ports
-        self._rows, self._films, self._arcs, self._step = rows, films, arcs, step
+        self._network, self._arcs, self._step = network, arcs, step
         self.closed, self.force = np.full(len(rows), np.nan), np.zeros(len(rows))
+        self._last, self._tell = self.force.copy(), of_one_kind(tell_stops)
+        self._out: StopState | None = None
         axial = [model.axial[first:last] for _, first, last in model.contacts]
         self.side = np.array([np.sign(np.sum(part)) for part in axial])
-        # gap per gap along the axis, of cones
-        self._slope = np.array([np.mean(np.abs(part)) for part in axial])
+        faces = network.interfaces
+        self._rows = StopRows(
+            row=np.array(rows, dtype=np.int64),
+            span=np.array([contact[1:] for contact in model.contacts], dtype=np.int64),
+            film=np.array([films.get(row, -1) for row in rows], dtype=np.int64),
+            side=self.side,
+            slope=np.array([np.mean(np.abs(part)) for part in axial]),
+            felt=faces.film_felt[rows],
+            upper=faces.upper[rows].astype(np.int64),
+            lower=faces.lower[rows].astype(np.int64),
+            traces=model.traces,
+            ports=ports,
+        )
+
+    def begin(self, recording: Recording, scratch: Scratch) -> None:
+        """Write into these records from now on."""
+        gap0, gap = self._network.interfaces.gap0, self._network.interface_state.gap
+        self._out = StopState(
+            *(gap0, gap, scratch.sums, scratch.peaks, recording.fine, recording.filled),
+            *(self.closed, self.force, self._last),
+        )
 
     def tell(
         self,
-        c: int,
-        recording: Recording,
-        scratch: Scratch,
         record: Record,
         t: float,
         h: float,
-        q: Vector,
-        lam: Vector,
-        gap0: Vector,
+        ends: tuple[Vector, Vector, Vector],
         *,
         points: bool,
     ) -> None:
-        """Take in the steps of contact ``c`` in a record from ``t`` on, of length ``h`` [s].
+        """Take in the steps of a record from ``t`` on, of length ``h`` [s].
 
-        ``q``, ``lam``, ``gap0``: modes, forces and gaps of the points at its end; ``points``:
-        whether these are computed.
+        ``ends``: modes, forces and gaps of the points at its end; ``points``: whether points were
+        looked at.
         """
-        network, row = self._network, self._rows[c]
-        state, faces = network.interface_state, network.interfaces
-        first = int(network.elements.port0[network.elements.rows]) + network.branches.rows
-        here = slice(*self._model.contacts[c][1:])
-        y, lam = np.append(self._ports.T @ q, 0.0), lam[here]
-        state.gap[row] = faces.gap0[row] + y[faces.upper[row]] - y[faces.lower[row]]
-        film = self._films.get(row)
-        pressed = np.zeros(len(record.force)) if film is None else record.film[:, film]
-        scratch.sums[first + 2 * row + 1] += h * float(np.sum(pressed))
-        of_pressure = record.pressed if len(record.pressed) else record.force
-        force = np.where(self.side[c] * of_pressure > 0.0, self.side[c] * record.force, 0.0)
-        acted = np.append(force > 0.0, False)
-        told = acted.copy()
-        told[1:] |= acted[:-1]  # a step without force ends a contact
-        told[-1] &= not np.any(lam > 0.0)
-        told[:-1] |= np.abs(pressed) > faces.film_felt[row]
+        elements = self._network.elements
+        first = int(elements.port0[elements.rows]) + self._network.branches.rows
+        self._tell(self._rows, self._out, record, first, (t, h, self._step), *ends, points)
         if self._arcs is not None:
-            self._arcs.see(c, float(force[-1]), lam)
-        if points:
-            self.force[c] = force[-1]
-            if not np.any(lam > 0.0):
-                self.closed[c] = np.nan
-            elif np.isnan(self.closed[c]):
-                self.closed[c] = round(t / self._step)
-        rows = np.flatnonzero(told)
-        if not len(rows):
-            return
-        place = int(recording.filled[row])
-        end = min(place + len(rows), recording.fine.shape[1])
-        some, into = rows[: end - place], recording.fine[row, place:end]
-        gap0, traces = gap0[here], self._model.traces[here]
-        gaps = record.gap
-        if not points:
-            gaps = np.min(gap0 + record.places @ traces.T, axis=1)
-        smallest = float(np.min(gap0 + traces @ q))
-        into[:, 0], into[:, 1] = t + some * h, h
-        into[:, 2] = np.append(force, 0.0)[some]
-        into[:, 3] = np.append(pressed, 0.0)[some]
-        into[:, 4] = np.append(gaps, smallest)[some] / self._slope[c]
-        into[:, 5] = np.nan
-        recording.filled[row] = place + len(rows)
-        scratch.sums[first + 2 * row] += h * float(np.sum(force))
-        scratch.peaks[row] = max(float(scratch.peaks[row]), float(force.max()))
+            for c, (begin, end) in enumerate(self._rows.span):
+                self._arcs.see(c, float(self._last[c]), ends[1][begin:end])

@@ -17,16 +17,14 @@ from threadpoolctl import threadpool_limits
 from klack.arrays import Index, Vector
 from klack.contact.step_constants import NO_LAW
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
+from klack.machine.compiling.jit import of_one_kind
 from klack.simulation.modal_step import ROW, ROW_Q, ROW_V
 from klack.simulation.network_arrays import (
-    AHEAD,
     ANSWER,
-    BEGIN,
     COARSE,
     FINE,
     GUESS,
     LAST,
-    MISSED,
     NEAR,
     PORTS,
     SEEN,
@@ -86,6 +84,7 @@ from klack.transient.placed_bodies import (
 from klack.transient.placed_gaps import FRESH, GapCourse, PlacedGaps
 from klack.transient.ring_arcs import ArcWatch, RingArcs
 from klack.transient.side_forces import SideForces
+from klack.transient.spatial_kernel import film_changes, repair
 from klack.transient.spatial_rest import settle_at_rest
 from klack.transient.tilting_films import (
     LOST,
@@ -93,7 +92,6 @@ from klack.transient.tilting_films import (
     TiltingFilm,
     bend_faces,
     film_arrays,
-    film_state,
     film_strain,
 )
 from klack.units import format_si
@@ -108,10 +106,8 @@ _LONGEST = 16  # records of a flight at once
 _BALANCES = 6  # of elements and fluid with the points at the start
 _BALANCED = 1e-12  # [m]
 _FILM_SHARE = 0.01  # of the height of a film that a step without contact may change
-_LITTLE = 0.1  # of that counts where a film has no force yet
 _AT_THE_WALL = 8  # fine steps where a shaft with a film touches its guide
 _ROOM = 1.0  # of the clearance
-_BEARING = 0.25  # as much as this counts a change in the guide, whose film damps motion out
 _SLOW = 0.5  # of the difference before: it does not vanish
 _NOT_AT_REST = 2e-9  # [m]
 _STEADY = 0.04  # change of the force of a contact at rest in a step
@@ -278,6 +274,14 @@ class _Moving:
         self.impacts = _impact_recorder(self, network)
         self.stops = StopRecord(network, model, self.P, self.order, filmed, self.arcs, sizes.step)
         self.fresh = True
+        self.way = np.zeros(model.mode_count)
+        self.records: dict[tuple[int, bool], Record] = {}
+        self.begin_step, self.answer_step, self.end_step, self.safe_flight, self.part = (
+            of_one_kind(each)
+            for each in (begin_step, answer_step, end_step, safe_flight, film_changes)
+        )
+        self.repair = of_one_kind(repair)
+        self.march = of_one_kind(march), of_one_kind(march)  # without points and with them
 
     # ------------------------------------------------------------------ start
 
@@ -510,6 +514,7 @@ class _Moving:
     def _looks(self, run: _Run, looks: int) -> int:
         done, clock, recording = 0, run.clock, run.recording
         self.fresh = True
+        self.stops.begin(recording, run.scratch)
         span = run.look * run.block * self.sizes.step
         while done < looks:
             fly, points = self._outlook(span, looks - done)
@@ -636,7 +641,7 @@ class _Moving:
         h, steps, arrays = self.sizes.step, self.steps[level], self.arrays
         t, H = float(clock[0]) * h, steps * h
         last = self._length(int(clock[1]), steps)
-        begin_step(steps, steps / last, t, H, self.fresh, arrays, scratch)
+        self.begin_step(steps, steps / last, t, H, self.fresh, arrays, scratch)
         self.fresh = False
         rest = points and level == COARSE
         count, modes = (1, self.whole) if rest else self._parts(steps, H, points)
@@ -669,7 +674,7 @@ class _Moving:
             record_ = found
             at[Y1 : Y1 + here] = self.P.T @ self.q
             self.sides.place(0.5 * (begun + self.q))
-            status = answer_step(level, steps, attempt, t, H, arrays, scratch, report)
+            status = self.answer_step(level, steps, attempt, t, H, arrays, scratch, report)
             if status != STATUS_REPEAT:
                 break
         if status in (STATUS_REPEAT, STATUS_REFUSED):
@@ -682,9 +687,8 @@ class _Moving:
             return int(status)
         excess = self._repair(level)
         self.sides.move(self.q - begun)
-        told = (run.recording, run.scratch, record_, t, H / count)
-        for c in range(len(self.order)):
-            self.stops.tell(c, *told, self.q, self.state.lam, self.gap0, points=points)
+        ends = self.q, self.state.lam, self.gap0
+        self.stops.tell(record_, t, H / count, ends, points=points)
         self.impacts.tell(t, H / count, record_, begun)
         clock[0] += steps
         clock[1] = level
@@ -692,7 +696,7 @@ class _Moving:
         if level == NEAR:
             clock[5] += steps
             clock[6] += steps
-        end_step(steps, H, excess, record, record_time, arrays, run.recording, scratch)
+        self.end_step(steps, H, excess, record, record_time, arrays, run.recording, scratch)
         return STATUS_DONE
 
     def _parts(self, steps: int, H: float, points: bool) -> tuple[int, Modes]:
@@ -709,22 +713,12 @@ class _Moving:
         if films is None and self.sides.acts and not points and clear:
             longest = steps
         if not points and films is not None and (wet or clear):
-            changes = [0.0]  # of heights over the macro step, over what is left of them
-            for k in range(len(self.squeezed)):
-                lift = max(film_state(films, k, self.q)[0], 0.0) + films.lowest[k]
-                rise, *tilts = films.rows[k] @ self.v
-                way = abs(rise) + films.reach[k] * float(np.hypot(*tilts))
-                # work of the film over its height, of the kinetic energy: errors of the force,
-                # second order in the change of height, act on so much of the motion
-                work = 2.0 * abs(self.state.films[k, 0]) * lift * self.inertia[k]
-                felt = min(1.0, max(work / way**2, _LITTLE**2)) if way > 0.0 else 1.0
-                changes.append(np.sqrt(felt) * way * H / lift)
-            for k in range(len(films.room)):
-                place = self.bore.offset[k] + self.bore.traces[k] @ self.q
-                way = float(np.hypot(*(self.bore.traces[k] @ self.v)))
-                changes.append(_BEARING * way * H / (films.room[k] - float(np.hypot(*place))))
+            most = self.part(
+                *(films.rows, films.offset, films.lowest, films.reach, films.room, self.inertia),
+                *(self.state.films, self.bore.offset, self.bore.traces, self.q, self.v, H),
+            )
             longest = steps if clear else min(steps, _AT_THE_WALL)
-            while longest > 1 and max(changes) * longest > _FILM_SHARE * steps:
+            while longest > 1 and most * longest > _FILM_SHARE * steps:
                 longest //= 2
         return self._cut(steps, steps // longest)
 
@@ -754,43 +748,38 @@ class _Moving:
     def _march(self, modes: Modes, count: int, points: bool, rest: bool) -> Record | None:
         """Fine steps under the constant modal force ``modes.push``; None where they fail."""
         n, ways = (self.model.count, self.model.ways) if points else (0, 0)
-        record = Record.empty(
-            *(count, len(self.model.bodies), n, ways),
-            keep_points=n > 0,
-            films=len(self.squeezed),
-            modes=self.model.mode_count,
-        )
+        if (count, points) not in self.records:  # each step fills its rows anew
+            self.records[count, points] = Record.empty(
+                *(count, len(self.model.bodies), n, ways),
+                keep_points=n > 0,
+                films=len(self.squeezed),
+                modes=self.model.mode_count,
+            )
+        record = self.records[count, points]
         touching = self.nothing
         if points:
             touching = (self.resting if rest else self.points)._replace(gap=self.gap0)
         state = self.state if points else self.apart
         bore = self.bore if len(self.bore.clearance) else None
-        _, status = march(count, 0, modes, _NONE, touching, bore, self.films, state, record)
+        march_on = self.march[points]
+        _, status = march_on(count, 0, modes, _NONE, touching, bore, self.films, state, record)
         failed = status == FAILED or not np.all(np.isfinite(self.q))
         return None if failed else record
 
     def _repair(self, level: int) -> float:
-        """Let what was missed act; the energy that bodies got beyond their due [J]."""
-        at, here, omega2 = self.at, self.ports, self.model.omega**2
-        missed, d = at[MISSED : MISSED + here], at[AHEAD : AHEAD + here]
-        guess = at[GUESS : GUESS + here]
-        way = at[Y1 : Y1 + here] - at[BEGIN : BEGIN + here]
-        kick = self.P @ missed
-        dq, dv = self.kicks[level].B1 * kick, self.kicks[level].B2 * kick
-        energy = float(np.sum(omega2 * self.q * dq + self.v * dv + 0.5 * (omega2 * dq**2 + dv**2)))
-        contact, guided = 0.0, 0.0
-        if self.state.contact.counts[0]:
-            contact = float(self.state.lam @ (self.model.traces @ dq))
-            if self.model.ways:
-                contact += repair_offsets(self.model, self.state.rubbing, dq)
-        if np.any(self.state.guide_force):
-            guided = float(np.sum(self.state.guide_force * (self.bore.traces @ dq)))
-        self.q += dq
-        self.v += dv
-        self.books[DEBT] += 0.5 * contact
-        self.books[GUIDE] -= guided
-        pulled = float(self.sides.push @ dq)
-        return energy - contact - guided - pulled - float(missed @ (way + d) + guess @ d)
+        """Let what was missed act; the energy that bodies got beyond what was given to them [J]."""
+        kicks, state, model = self.kicks[level], self.state, self.model
+        closed = bool(state.contact.counts[0])
+        energy = self.repair(
+            *(model.omega, kicks.B1, kicks.B2, self.P, self.at, self.sides.push, self.q, self.v),
+            *(state.lam if closed else self.apart.lam, model.traces, state.guide_force),
+            *(self.bore.traces, self.books, self.way),
+        )
+        if closed and model.ways:
+            rubbed = repair_offsets(model, state.rubbing, self.way)
+            self.books[DEBT] += 0.5 * rubbed
+            energy -= rubbed
+        return float(energy)
 
     # ------------------------------------------------------------------ rest
 
@@ -881,7 +870,7 @@ class _Moving:
         model = self.model
         force = self.P @ self.at[LAST : LAST + self.ports] + self.sides.push
         args = (model.traces, model.omega, self.q, self.v, force, horizon)
-        return float(safe_flight(self.gap0 - stale, *args))
+        return float(self.safe_flight(self.gap0 - stale, *args))
 
     def _clear(self) -> bool:
         open_by = self.gap0 + self.model.traces @ self.q
