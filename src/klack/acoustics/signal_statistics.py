@@ -167,7 +167,7 @@ def kurtosis(series: TimeSeries) -> float:
     """
     x = series.values - series.values.mean()
     second = float(np.mean(x**2))
-    return float(np.mean((x / np.sqrt(second)) ** 4)) if second > 0.0 else 0.0
+    return float(np.mean((x**2 / second) ** 2)) if second > 0.0 else 0.0
 
 
 def crest_factor(series: TimeSeries) -> float:

@@ -8,6 +8,7 @@ The radiated power ``T(f) |F|^2`` is given to a monopole in a free field:
 and the travel time ``r/c`` are left out.
 """
 
+from functools import lru_cache
 from math import pi
 
 import numpy as np
@@ -147,13 +148,19 @@ def pressure_transfer(
         Interpolated as :func:`click_pressure`.
     rate [Hz]
     """
-    first = f[1]
-    level = _interpolated(np.maximum(f, first), frequency, squared)
-    double = 2.0 * np.sin(pi * np.maximum(f, first) / rate)
-    rest = np.sqrt(level) * audio_band(f, rate=rate) / double**2
+    level = _interpolated(np.maximum(f, f[1]), frequency, squared)
+    flat, high_pass = _band_limit(f.size, rate)
+    rest = np.sqrt(level) * flat
     rest[0] = rest[1]  # f^4 of the power below: flat
-    high_pass = (1.0 - np.exp(-2j * pi * f / rate)) ** 2
     return minimum_phase_filter(rest) * high_pass
+
+
+@lru_cache(maxsize=4)
+def _band_limit(count: int, rate: float) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
+    """The band without the double high pass, and that, at frequencies up to half the rate."""
+    f = np.linspace(0.0, 0.5 * rate, count)
+    double = 2.0 * np.sin(pi * np.maximum(f, f[1]) / rate)
+    return audio_band(f, rate=rate) / double**2, (1.0 - np.exp(-2j * pi * f / rate)) ** 2
 
 
 def audio_band(f: NDArray[np.float64], *, rate: float = 48_000.0) -> NDArray[np.float64]:

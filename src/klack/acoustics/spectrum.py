@@ -174,7 +174,7 @@ def _zoom(size: int, high: float, count: int, rate: float) -> _Zoom:
     return made(size, high, count, rate)
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=32)  # four decades of three forces, a sound of each, and as many of before
 def _kept_zoom(size: int, high: float, count: int, rate: float) -> _Zoom:
     return cast(_Zoom, scipy.signal.ZoomFFT(size, (0.0, high), count, fs=rate, endpoint=True))
 

@@ -49,7 +49,7 @@ from klack.assembling.valve import Valve, build_valve, filled_network
 from klack.bodies.elasticity.loads import NearLoads
 from klack.case.any_case import AnyCase, CaseTree, tree_of
 from klack.case.key_path import quantity_at, written_at
-from klack.case.points import case_at
+from klack.case.points import case_at, checked_parts
 from klack.case.rewriting import with_values
 from klack.case.schema import Case
 from klack.case.valve import ValveCase
@@ -361,6 +361,7 @@ class Explorer:
         self._case: AnyCase | None = None
         self._design: _Impacts | _Strokes | None = None
         self._sliders: dict[str, Slider] = {}
+        self._parts: tuple[set[Key], CaseTree] | None = None  # of the sliders that move
         self._pinned: TimeSeries | None = None
         self._last: tuple[dict[str, float], _Computed] | None = None
         self._pinned_loudness: Number | None = None
@@ -372,6 +373,7 @@ class Explorer:
             self._design.close()
             self._design = None
         self._text, self._tree = text, tree_of(text, Path(path))
+        self._parts = None
         with collected_warnings():  # the first position tells them again
             self._case = case = self._tree.any_case()
             found = sliders_of(case, self._tree)
@@ -481,7 +483,16 @@ class Explorer:
                 )
             changes[slider.place] = written(slider, value)
         kind: Any = type(self._case)
-        return case_at(kind, self._tree, self._tree, changes)
+        return case_at(kind, self._tree, self._parts_beside(set(changes)), changes)
+
+    def _parts_beside(self, moved: set[Key]) -> CaseTree:
+        """The case with what these sliders leave alone checked already."""
+        assert self._tree is not None
+        if not isinstance(self._case, ValveCase):
+            return self._tree
+        if self._parts is None or self._parts[0] != moved:
+            self._parts = moved, checked_parts(self._tree, self._case, moved)
+        return self._parts[1]
 
     def _hardest(self, sliders: Sequence[Slider]) -> Case | None:
         """Case with all motion sliders at their upper ends, if valid."""

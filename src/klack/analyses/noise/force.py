@@ -15,8 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.acoustics.spectrum import force_series
+from klack.arrays import Floats, Index
 from klack.contact.history import ImpactHistory
 from klack.errors import InputError
+from klack.machine.compiling.jit import njit
 from klack.machine.memory import in_words, require_memory
 from klack.signals.sampled import TimeSeries
 from klack.simulation.network_result import ChannelData, ImpactEvent, InterfaceRecord, NetworkResult
@@ -105,8 +107,6 @@ def _require_memory(steps: int) -> None:
     )
 
 
-Floats = NDArray[np.float64]
-
 _AT_REST = 0.05  # net force over the peak of the last impact
 _LONG = 5.0  # contact times of earlier impacts after which a contact is rest, though it rings
 
@@ -171,15 +171,23 @@ def stop_force(result: NetworkResult, stop: str) -> TimeSeries:
     length = np.maximum(1, np.round(record.step / step).astype(np.int64))
     # of a fine step that was cut, each part has its share
     force = (record.contact_force + record.film_force) * np.minimum(record.step / step, 1.0)
-    values, known = np.zeros(count), np.zeros(count, dtype=bool)
-    for offset in range(int(length.max(initial=1))):
-        seen = (length > offset) & (place + offset >= 0) & (place + offset < count)
-        np.add.at(values, place[seen] + offset, force[seen])
-        known[place[seen] + offset] = True
+    values, known = np.zeros(count), np.zeros(count, dtype=np.bool_)
+    _lay_on_steps(place, length, force, values, known)
     mean = _record_means(result, stop)
     if mean is not None:
         _share_out(values.reshape(-1, size), known.reshape(-1, size), mean)
     return TimeSeries(step=step, values=values, unit="N", start=start + 0.5 * step, name=stop)
+
+
+@njit
+def _lay_on_steps(
+    place: Index, length: Index, force: Floats, values: Floats, known: NDArray[np.bool_]
+) -> None:
+    """Add each force to the fine steps from its place on that it lasts."""
+    for i in range(place.size):
+        for k in range(max(place[i], 0), min(place[i] + length[i], values.size)):
+            values[k] += force[i]
+            known[k] = True
 
 
 def _record_means(result: NetworkResult, stop: str) -> Floats | None:
