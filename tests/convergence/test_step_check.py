@@ -14,6 +14,7 @@ import pytest
 from draws import program
 
 import klack
+from klack.analyses.stroke import run as stroke_run
 from klack.analyses.stroke.analysis import STROKE
 from klack.analyses.stroke.measures import steps_told
 from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
@@ -22,7 +23,8 @@ from klack.analyses.stroke.step_check import ImpactChange, checked_steps, impact
 from klack.case.any_case import load_valve_case, read_valve_case
 from klack.errors import InputError
 from klack.network.accuracy import PROMISED
-from klack.simulation.network_result import ImpactEvent
+from klack.simulation.network_result import ImpactEvent, NetworkResult
+from klack.simulation.network_run import Watch, simulate_network
 from klack.simulation.step_sizes import StepSizes, scaled
 
 ROOT = Path(__file__).parents[2]
@@ -211,6 +213,57 @@ def test_points_of_a_study_are_computed_in_steps_that_are_short_enough(truth):
     assert 0.0 < found["step_change"][0] <= 0.5
     assert plain["halvings"][0] == 0.0
     assert isnan(plain["step_change"][0])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("step", "measures", "shorter"),
+    [
+        ("20 ns", ("opening_time", "opening.1.peak_force"), True),  # all that counts is over soon
+        ("20 ns", ("energy_residual",), False),  # of the whole run
+        ("100 ns", ("energy_residual", "seat.3.peak_force"), True),  # one impact is off: halve
+    ],
+)
+def test_a_comparison_ends_where_no_more_of_it_is_needed(monkeypatch, step, measures, shorter):
+    """Truth: whole comparisons, which choose the same steps, so the same bits."""
+    case = klack.load_case(HOW_TO / "small_valve.yaml").with_value("run.step", step)
+    ends = []
+
+    def recorded(*given: Any, **named: Any) -> Any:
+        found = attempt(*given, **named)
+        ends.append(float(found.result.time[-1]))
+        return found
+
+    attempt = stroke_run._attempt
+    monkeypatch.setattr(stroke_run, "_attempt", recorded)
+    table = klack.run_many(case, [{}], measures, variant="dry", threads=1)
+    computed = ends.copy()
+    monkeypatch.setattr(stroke_run, "watched", lambda *given: None)
+    whole = klack.run_many(case, [{}], measures, variant="dry", threads=1)
+
+    assert (min(computed) < 0.8 * max(computed)) == shorter
+    assert len(computed) == len(ends) - len(computed)
+    for name in (*measures, "halvings", "step_change"):
+        assert table[name].tolist() == whole[name].tolist()
+
+
+def test_a_run_that_is_watched_is_the_begin_of_the_whole_one():
+    """To the last bit; it ends at the look behind the time at which enough is known."""
+    case = load_valve_case(HOW_TO / "small_valve.yaml")
+    rows = case.network.network().dry().rows()
+    times = (1e-4, 4e-4)
+
+    def stroke(watch: Watch | None) -> NetworkResult:
+        return simulate_network(rows, duration=6e-4, watch=watch)
+
+    whole = stroke(None)
+    part = stroke(Watch(times, lambda now, settled: now > 3e-4))
+
+    count = len(part.time)
+    assert times[1] <= part.time[-1] < times[1] + 2.0 * (part.time[1] - part.time[0])
+    assert list(part.time) == list(whole.time[:count])
+    for name, channel in part.channels.items():
+        np.testing.assert_array_equal(channel.values, whole.channels[name].values[:count])
 
 
 @pytest.mark.slow

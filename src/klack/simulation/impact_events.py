@@ -146,6 +146,11 @@ class ImpactFinder:
         found = sorted((*self._found, *open_ones), key=lambda event: event.time)
         return tuple(event for event in found if not event.peak_force <= least)
 
+    @property
+    def settled(self) -> tuple[ImpactEvent, ...]:
+        """Impacts since the last report that nothing can change any more: another one came."""
+        return tuple(self._found)
+
     def told(self) -> None:
         """Mark all impacts so far as reported; only those that change are reported again."""
         self._found.clear()

@@ -11,11 +11,12 @@ values of the start itself.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.arrays import Matrix, Vector
+from klack.arrays import Vector
 from klack.contact.step_constants import NO_LAW
 from klack.hydraulics.fluid import Fluid
 from klack.machine.memory import require_memory
@@ -133,8 +134,8 @@ class Recorder:
         self._means = np.zeros((len(self.means), records + 1))
         self._peaks = np.zeros((count, records + 1))
         self._points = np.zeros((len(self.points), records + 1))
-        self._fine: list[list[Matrix]] = [[] for _ in range(count)]
-        self._room = [_MOST_FINE] * count
+        self._fine = [np.empty((_KEPT, 0)) for _ in range(count)]  # a row for each number
+        self._kept = [0] * count  # steps in them; the rest is room
         self._complete = [True] * count
         self._begun = self._driving = False
         self.looked = 0
@@ -199,11 +200,15 @@ class Recorder:
         finder.feed(time, self._velocities(count), steps)
         self._thin(count)
         for c, rows in enumerate(steps):
-            kept = np.empty((_KEPT, min(len(rows), self._room[c])))
-            lay_across(rows[: kept.shape[1]], 0, 1, kept, 0)
-            self._fine[c].append(kept)
-            self._room[c] -= kept.shape[1]
-            self._complete[c] &= kept.shape[1] == len(rows)
+            begin = self._kept[c]
+            end = self._kept[c] = min(begin + len(rows), _MOST_FINE)
+            if end > self._fine[c].shape[1]:  # room for as many as this would make in the whole run
+                share = self.looked / (self.looks * (self._points.shape[1] - 1))
+                wider = np.empty((_KEPT, min(ceil(end / share), _MOST_FINE)))
+                wider[:, :begin] = self._fine[c][:, :begin]
+                self._fine[c] = wider
+            lay_across(rows[: end - begin], 0, 1, self._fine[c], begin)
+            self._complete[c] &= end - begin == len(rows)
 
     def channels(self, records: int) -> dict[str, ChannelData]:
         """All channels by name, with so many records."""
@@ -225,9 +230,7 @@ class Recorder:
         """Steps in which an interface carried force: see :class:`InterfaceRecord`."""
         result = {}
         for c, row in enumerate(self.network.rows.interfaces):
-            parts = self._fine[c] or [np.empty((_KEPT, 0))]
-            time, step, contact, film, gap = parts[0] if len(parts) == 1 else np.hstack(parts)
-            self._fine[c] = []
+            time, step, contact, film, gap = self._fine[c][:, : self._kept[c]]
             result[row.component] = InterfaceRecord(
                 time=time,
                 step=step,

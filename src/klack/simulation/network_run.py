@@ -4,6 +4,7 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from math import ceil
 from time import perf_counter
 from typing import Literal, Protocol
 
@@ -47,6 +48,7 @@ from klack.simulation.network_energy import balance_since, energy_stores, reset_
 from klack.simulation.network_kernel import CLOCK, run_network
 from klack.simulation.network_recorder import Recorder, values_now
 from klack.simulation.network_result import (
+    ImpactEvent,
     IncompleteRunError,
     NetworkResult,
     PressedFaces,
@@ -62,6 +64,7 @@ from klack.units import format_si
 __all__ = [
     "Grid",
     "SpatialMotion",
+    "Watch",
     "everything",
     "grid_of",
     "has_python_steps",
@@ -92,6 +95,22 @@ class SpatialMotion(Protocol):
         """Return them in a network."""
 
 
+@dataclass(frozen=True, slots=True)
+class Watch:
+    """Ends a run early.
+
+    Parameters
+    ----------
+    times [s]
+        At which it looks in, beside others.
+    enough
+        Whether the run may end at a time [s], given the impacts that are over for good.
+    """
+
+    times: Sequence[float]
+    enough: Callable[[float, Sequence[ImpactEvent]], bool]
+
+
 def simulate_network(
     rows: Rows,
     *,
@@ -104,6 +123,7 @@ def simulate_network(
     start: Literal["rest", "free"] = "rest",
     state: State | None = None,
     spatial: SpatialMotion | None = None,
+    watch: Watch | None = None,
     progress: Callable[[float], None] = lambda fraction: None,
 ) -> NetworkResult:
     """Compute a network over time.
@@ -136,6 +156,8 @@ def simulate_network(
     spatial
         Bodies that meet point by point; the interfaces of the network only give names to the
         record.
+    watch
+        May end the run early.
     progress
         Called with the fraction done.
 
@@ -161,7 +183,7 @@ def simulate_network(
             require_positive(f"simulate_network: {name}", value, "s")
     sizes = sizes or step_sizes(rows, accuracy, step=step, coarse=coarse)
     network = compile_network(rows, sizes)
-    grid = grid_of(duration, sizes, record)
+    grid = replace(grid_of(duration, sizes, record), watch=watch)
     if rows.controllers and grid.look > 1:  # instants may lie at any macro step
         grid = replace(grid, look=1, looks=grid.look * grid.looks)
     step = sizes.step
@@ -282,13 +304,14 @@ def simulate_network(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Grid:
-    """How fine steps make blocks, blocks looks, and looks records."""
+    """How fine steps make blocks, blocks looks, and looks records; and who looks in."""
 
     sizes: StepSizes
     block: int  # fine steps
     look: int  # blocks
     looks: int  # of a record
     records: int
+    watch: Watch | None = None
 
     @property
     def step(self) -> float:
@@ -305,6 +328,12 @@ class Grid:
         if chunk < self.looks:
             return chunk
         return self.looks * -(-self.records // max(1, round(self.records * self.looks / chunk)))
+
+    def to_pause(self, looked: int, times: Sequence[float]) -> int:
+        """Looks from here to the next of some times [s], or to the end."""
+        ends = [ceil(t / (self.look_steps * self.step)) for t in times]
+        ends.append(self.records * self.looks)
+        return min(end for end in ends if end > looked) - looked
 
 
 def grid_of(duration: float, sizes: StepSizes, record: float) -> Grid:
@@ -347,6 +376,8 @@ def _run(
         # a chunk ends with a record if it can, wherever the run began
         to_record = grid.looks - recorder.looked % grid.looks
         count = min(chunk, looks - recorder.looked if chunk >= grid.looks else to_record)
+        if grid.watch is not None:
+            count = min(count, grid.to_pause(recorder.looked, grid.watch.times))
         if control is not None:
             count = min(count, control.next(recorder.looked))
         kept = everything(network, clock)
@@ -364,7 +395,8 @@ def _run(
                 except ConvergenceError as error:  # of an FMU: what there is is kept
                     failure = error
         progress(recorder.looked / looks)
-        if failure is not None:
+        now = grid.look_steps * grid.step * recorder.looked
+        if failure is not None or (grid.watch and grid.watch.enough(now, finder.settled)):
             return failure
     return None
 

@@ -24,7 +24,7 @@ from klack.analyses.stroke.record import (
     StrokeStudy,
     StrokeVariant,
 )
-from klack.analyses.stroke.step_check import CheckedSteps, checked_steps, not_checked
+from klack.analyses.stroke.step_check import CheckedSteps, checked_steps, not_checked, watched
 from klack.analyses.stroke.times import all_lift_times
 from klack.assembling.body_summary import BodySummary, summarise_body
 from klack.assembling.valve import Valve, build_valve
@@ -45,7 +45,7 @@ from klack.network.ranges import Travel
 from klack.network.rows import Rows
 from klack.schematic.picture import schematic_svg
 from klack.simulation.network_result import IncompleteRunError, NetworkResult
-from klack.simulation.network_run import SpatialMotion, State, simulate_network
+from klack.simulation.network_run import SpatialMotion, State, Watch, simulate_network
 from klack.simulation.step_sizes import StepSizes, scaled
 from klack.units import format_si
 
@@ -230,6 +230,7 @@ def run_variant(
     state: State | None = None,
     spatial: SpatialMotion | None = None,
     sizes: StepSizes | None = None,
+    watch: Watch | None = None,
 ) -> NetworkResult:
     """Run rows for the duration and steps of the case, from rest or a state.
 
@@ -242,6 +243,7 @@ def run_variant(
         step=case.run.step,
         coarse=case.run.coarse,
         sizes=sizes,
+        watch=watch,
         record=case.run.record,
         state=state,
         spatial=spatial,
@@ -299,7 +301,7 @@ def one_variant(
     after: NetworkResult | None = None,
     sizes: StepSizes | None = None,
     check: bool = True,
-    until: Callable[[StrokeVariant], float] = lambda variant: inf,
+    until: Callable[[StrokeVariant], float] | None = None,
 ) -> VariantRun:
     """Compute one variant of a valve, from rest or from the end of a run.
 
@@ -331,7 +333,9 @@ def one_variant(
         steps = not_checked(run.result.events, reason)
     elif checked and run.failure is None:
 
-        def end(found: _Attempt) -> float:
+        def end(found: _Attempt) -> float | None:
+            if until is None:
+                return None
             return until(variant_of(valve, roles, name, found.rows, found.result))
 
         run, caught, steps = _in_checked_steps(valve, name, progress, run, caught, end)
@@ -359,6 +363,7 @@ def _attempt(
     *,
     after: NetworkResult | None = None,
     sizes: StepSizes | None = None,
+    watch: Watch | None = None,
 ) -> _Attempt:
     stage = f"run {name}" if sizes is None else f"check steps of {name}"
     rows = variant_network(valve, name).rows()
@@ -372,6 +377,7 @@ def _attempt(
             state=None if after is None else after.state,
             spatial=valve.spatial,
             sizes=sizes,
+            watch=watch,
         )
     except IncompleteRunError as error:
         return _Attempt(rows, error.result, error)
@@ -384,7 +390,7 @@ def _in_checked_steps(
     progress: Progress,
     run: _Attempt,
     caught: Warned,
-    until: Callable[[_Attempt], float],
+    until: Callable[[_Attempt], float | None],
 ) -> tuple[_Attempt, Warned, CheckedSteps]:
     """Halve all steps until impacts do not depend on them.
 
@@ -397,21 +403,27 @@ def _in_checked_steps(
     if valve.spatial is not None:
         most = _HALVINGS if valve.case.run.check_steps else 0
 
-    def again(factor: float) -> tuple[_Attempt | None, Warned, str]:
+    def again(factor: float, watch: Watch | None = None) -> tuple[_Attempt | None, Warned, str]:
         try:
             sizes = scaled(run.rows, run.result.sizes, factor)
             with trial() as kept:
-                found = _attempt(valve, name, progress, sizes=sizes)
+                found = _attempt(valve, name, progress, sizes=sizes, watch=watch)
         except (ConvergenceError, InputError) as error:
             return None, [], " ".join(str(error).split())
         reason = "" if found.failure is None else " ".join(str(found.failure).split())
         return (None if reason else found), kept, reason
 
-    longer, _, reason = again(2.0)
+    def compared(longer: _Attempt) -> CheckedSteps:
+        asked = inf if end is None else end
+        return checked_steps(run.result, longer.result, accuracy, halvings, asked)
+
+    end = until(run)
+    watch = watched(run.result, accuracy, end) if valve.spatial is None else None
+    longer, _, reason = again(2.0, watch)
     halvings, before = 0, inf
     while True:
         if longer is not None:
-            steps = checked_steps(run.result, longer.result, accuracy, halvings, until(run))
+            steps = compared(longer)
             largest = steps.largest(accuracy)
             is_short = run.result.steps.taken < (_FALLING_RUN if largest < before else _SHORT_RUN)
             if not steps.doubt or halvings >= (most if is_short else min(most, _HALVINGS)):
@@ -421,12 +433,16 @@ def _in_checked_steps(
         if shorter is not None and cut_records(shorter.result) and not cut_records(run.result):
             shorter, failed = None, "the record of the forces in fine steps is full."
         if shorter is None:
+            if halvings == 0 and longer is not None and watch is not None:
+                longer, _, reason = again(2.0)  # all of it
+                steps = steps if longer is None else compared(longer)
             if longer is None:
                 steps = not_checked(run.result.events, f"no run with longer steps. {reason}")
             if failed:
                 steps = steps._replace(doubt=f"{steps.doubt} With shorter steps: {failed}")
             return run, caught, steps
         run, longer, caught = shorter, run, kept
+        end = until(run)
         halvings += 1
 
 

@@ -16,6 +16,7 @@ from typing import NamedTuple
 from klack.analyses.measures import Column, Measure, described_in
 from klack.network.accuracy import PROMISED, Accuracy
 from klack.simulation.network_result import ImpactEvent, NetworkResult
+from klack.simulation.network_run import Watch
 
 __all__ = [
     "CHANGE_MEASURES",
@@ -27,6 +28,7 @@ __all__ = [
     "impact_changes",
     "not_checked",
     "told",
+    "watched",
 ]
 
 NOTICED = 0.02
@@ -37,6 +39,7 @@ SHARE = 0.5
 
 _PROMISED = 3  # impacts on each stop
 _TOLD = 3  # impacts in a sentence
+_PARTS = 4  # of a run that may end early after each but the last two: a look takes 0.3 ms
 _LATE = 0.75  # of a contact that is not over: a peak after that may still grow
 _SLOW = "slower than 2 % of the fastest impact on this stop"
 _AFTER = "after all that was asked for"
@@ -181,6 +184,36 @@ def checked_steps(
     )
     doubt = told(run.events, changes, accuracy, longer.events, end)
     return CheckedSteps(changes, doubt, halvings)
+
+
+def watched(run: NetworkResult, accuracy: Accuracy, until: float | None) -> Watch:
+    """End a run in longer steps where nothing of it can change what is to be done.
+
+    That is so as soon as an impact that is over changes too much: steps are halved then.  With
+    ``until`` [s], where changes of later impacts are not asked for, also where those that count are
+    over.
+    """
+    end = inf if until is None else until
+
+    def enough(now: float, settled: Sequence[ImpactEvent]) -> bool:
+        is_over = until is not None
+        stops = _by_stop(run.events, settled)
+        for stop in run.interfaces:
+            counted, others = stops.get(stop, ([], []))
+            both = min(len(counted), len(others), _PROMISED)
+            asked = [event for event in counted[:_PROMISED] if event.time <= end]
+            changes = list(_pairs(counted[:both], others[:both]))
+            if any(change.doubtful(accuracy) for change in changes[: len(asked)]):
+                return True
+            is_over &= both >= len(asked) and (both == _PROMISED or now > end)
+        return is_over
+
+    first = [runs[0][: _PROMISED + 1] for runs in _by_stop(run.events).values()]
+    times = [event.time + 2.0 * event.contact_time for event in chain(*first)]
+    times += [] if end == inf else [(1.0 + NOTICED) * end]
+    part = float(run.time[-1] - run.time[0]) / _PARTS
+    pauses = {int(t / part): t for t in sorted(times) if t < (_PARTS - 1) * part}
+    return Watch(tuple(pauses.values()), enough)
 
 
 def not_checked(events: Sequence[ImpactEvent], reason: str) -> CheckedSteps:
