@@ -1,5 +1,6 @@
 """A source on a receiver: against tables, against bodies assembled directly, and by definition."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -86,6 +87,25 @@ def test_reception_plates_with_point_contacts_leave_rotations_free() -> None:
     assert single_equivalents(tilted).force == pytest.approx(plain.force, rel=1e-9, abs=0.0)
     wide = single_equivalents(tilted, radius=5e-3).force
     assert (np.abs(wide / plain.force - 1.0) > 1e-4).all()
+
+
+def test_reception_plates_below_a_source_that_is_drawn_in_another_frame() -> None:
+    """The beam drawn along y, pushing along -x: the same numbers once its axes are given."""
+    f = np.array([500.0, 4000.0])
+    plain = beam_source(f)
+    drawn = replace(
+        plain,
+        points=tuple(
+            InterfacePoint(name=point.name, position=np.array([0.0, point.position[0], 0.3]))
+            for point in plain.points
+        ),
+        freedoms=tuple(Freedom(freedom.point, -1) for freedom in plain.freedoms),
+    )
+    axes = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])  # x, y, z of the drawing
+    found = single_equivalents(drawn, axes=axes)
+    assert found.force == pytest.approx(single_equivalents(plain).force, rel=1e-9, abs=0.0)
+    with pytest.raises(InputError, match="one plane"):
+        single_equivalents(drawn, axes=axes[[1, 0, 2]] * [[1], [-1], [1]])
 
 
 def test_velocity_of_a_joint_over_time() -> None:
