@@ -48,6 +48,7 @@ napoleon_use_param = False  # one list: name, shape and unit, meaning
 napoleon_use_rtype = False
 autodoc_default_options = {"exclude-members": "model_config, model_post_init"}  # of pydantic
 autodoc_typehints = "signature"  # shapes and units stand in the text
+suppress_warnings = ["ref.python"]  # `type` and `set` of annotations are names in klack, too
 toc_object_entries = False  # thousands of names in every sidebar are no map
 maximum_signature_line_length = 88
 autosummary_generate = False  # tables only

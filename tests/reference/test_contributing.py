@@ -357,6 +357,7 @@ def test_files_that_the_pages_name_are_there():
     assert len(named) > 15
     # the recipes make them
     assert missing == {
+        "magnetics/two_voltages.py",
         "mechanics/dashpot.py",
         "mesh/files/medit/reader.py",
         "flight/analysis.py",
