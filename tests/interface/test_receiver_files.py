@@ -368,6 +368,19 @@ def test_doubts_are_told(model) -> None:
         measured_receiver(responses(model, change=noisy), BOTH)
 
 
+def test_an_accelerance_that_is_nearly_a_mass_is_doubted() -> None:
+    """One weak resonance in the band: below a fifth of the lines tell it."""
+    Y = 1.0 / (2.0 * S) + S / (2.0 * (S**2 + 60.0 * S + 3000.0**2))
+    pair = channel_of("a.z"), channel_of("a.z")
+    for factor, match in ((S, "or an accelerance read as"), (1.0, None)):
+        found = gathered("file", [response("file", pair, "velocity", F, Y * factor)])
+        if match is None:
+            measured_receiver(found, {"a": "a"})
+        else:
+            with pytest.warns(AccuracyWarning, match=match):
+                measured_receiver(found, {"a": "a"})
+
+
 def test_coarse_lines_are_told(model) -> None:
     """Resonances of 5 Hz half width with lines 50 Hz apart."""
     found = responses(model)

@@ -52,8 +52,8 @@ def check_taken_power(
             "a receptance": own * 1j * omega,
             "a mobility of reversed sign": -own,
         }
+        like = [what for what, values in others.items() if _below(values) < min(_RIGHT, share / 4)]
         if share > _WRONG:
-            like = [what for what, values in others.items() if _below(values) < _RIGHT]
             raise InputError(
                 f"{name}: {freedom} / {freedom}",
                 got=f"a real part below 0 at {100 * share:.0f} % of the lines"
@@ -66,8 +66,9 @@ def check_taken_power(
         if share > _DOUBTFUL:
             warnings.warn(
                 f"{name}: the real part of {freedom} / {freedom} is below 0 at "
-                f"{100 * share:.0f} % of the lines: noise, or sensor and hammer apart. There the "
-                "receiver would give power.",
+                f"{100 * share:.0f} % of the lines: noise, sensor and hammer apart"
+                + (f", or {like[0]} read as a mobility" if like else "")
+                + ". There the receiver would give power.",
                 AccuracyWarning,
                 stacklevel=3,
             )
