@@ -38,6 +38,7 @@ __all__ = [
 ]
 
 Complexes = NDArray[np.complex128]
+"""Complex numbers."""
 
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 """Names of the directions 1 to 6: along the axes of a point, and about them."""
