@@ -32,6 +32,8 @@ __all__ = [
     "Layer",
     "Limit",
     "Modes",
+    "Near",
+    "Others",
     "Outside",
     "Pressed",
     "Record",
@@ -107,6 +109,21 @@ class Grip(NamedTuple):
     fade: Vector  # (n,) [m] slip within a step over which the first fades to the second
 
 
+class Others(NamedTuple):
+    """Points that are left out of some steps, because no gap of theirs can close in these.
+
+    Their gaps are at least ``room``, less what bodies move otherwise than at their first speed.
+    """
+
+    room: float  # [m]
+    place: Vector  # (M,) modes at the start
+    speed: Vector  # (M,)
+    rigid: int  # modes of the needle that are rigid, the first ones
+    reach: Vector  # (3,) largest motion of a gap per rigid and per elastic motion, and per force
+    bend: Matrix  # (f, 3) force and moments of the films at the start
+    arm: float  # [m] farthest point from the axis
+
+
 class ContactPoints(NamedTuple):
     """Points that may close.
 
@@ -121,6 +138,7 @@ class ContactPoints(NamedTuple):
     grip: Grip | None = None  # of points that rub
     limit: Limit | None = None  # of points that yield; then A is changed in place
     layer: Layer | None = None  # of rough points
+    others: Others | None = None  # beside these
 
     def away(self) -> Self:
         """No points, as in flight."""
@@ -378,6 +396,20 @@ class Step(NamedTuple):
     bent: Vector  # (ways n,) [m] the other part, at the end
     mu: Vector  # (n,) [-]
     film: FilmWork | None  # with films only
+
+
+class Near(NamedTuple):
+    """Memory for the points that may close within a few steps."""
+
+    block: Vector  # (n n,) their part of A
+    rows: Vector  # (n M,) of the traces
+    index: NDArray[np.int64]  # (n,)
+    place: NDArray[np.int64]  # (n,) of a point among them, -1: left out
+    known: Vector  # (2,) how many, and by which first entry their A is known
+    low: Vector  # (n,) [m] least gap of each point at its speed
+    reach: Vector  # (3,) as of ``Others``
+    rigid: int
+    arm: float
 
 
 class Record(NamedTuple):

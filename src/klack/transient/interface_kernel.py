@@ -45,7 +45,7 @@ step.  For one point on a rigid body this is the mean pressure of the layer betw
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.arrays import Matrix, Vector
+from klack.arrays import Index, Matrix, Vector
 from klack.machine.compiling.jit import inner, njit
 from klack.simulation.phase import sums
 from klack.transient.active_set import solve_active
@@ -62,6 +62,7 @@ from klack.transient.interface_arrays import (
     PLASTIC,
     ROUNDS,
     WORK,
+    ActiveSet,
     ContactPoints,
     Films,
     Grip,
@@ -69,6 +70,8 @@ from klack.transient.interface_arrays import (
     Layer,
     Limit,
     Modes,
+    Near,
+    Others,
     Outside,
     Record,
     State,
@@ -101,15 +104,17 @@ from klack.transient.yielding_points import let_yield, solve_yielding
 __all__ = [
     "FAILED",
     "FINISHED",
+    "LEFT_OUT",
     "OPEN",
     "TURNED",
     "contact_compliance",
     "march",
+    "march_near",
     "safe_flight",
 ]
 
 
-FINISHED, OPEN, FAILED, TURNED = 0, 1, 2, 3
+FINISHED, OPEN, FAILED, TURNED, LEFT_OUT = 0, 1, 2, 3, 4
 """Why :func:`march` returned.
 
 All steps done; open for long enough; no active set found; a contact of the other stop would begin,
@@ -706,6 +711,40 @@ def _finish(
         record.drift[taken, b] = s
 
 
+@sums
+def _apart(
+    others: Others | None,
+    films: Films | None,
+    state: State,
+    step: Step,
+    time: float,
+    least: float,
+) -> bool:
+    """Whether points that are left out have larger gaps than the others, and no contact."""
+    if others is None:
+        return True
+    rigid, elastic, pressed = 0.0, 0.0, 0.0
+    for i in range(len(step.q)):
+        other = step.q[i] - others.place[i] - time * others.speed[i]
+        if i < others.rigid:
+            rigid += other * other
+        else:
+            elastic += other * other
+    for k in range(len(step.lam)):
+        pressed += step.lam[k]
+    room = others.room - others.reach[0] * np.sqrt(rigid) - others.reach[1] * np.sqrt(elastic)
+    room -= others.reach[2] * pressed
+    if films is not None:
+        for k in range(len(films.lowest)):
+            D, bent = films.compliance[k], others.bend[k]
+            for c in range(3):
+                bend = 0.0
+                for d in range(3):
+                    bend += D[c, d] * (state.films[k, d] - bent[d])
+                room -= abs(bend) * (1.0 if c == 0 else others.arm)
+    return room > max(least, 0.0)
+
+
 @njit
 def march(
     steps: int,
@@ -775,12 +814,13 @@ def march(
             for k in range(len(films.lowest)):
                 tell_land(films, k, step.film, state, step.q, record.lands[taken, k])
                 bend_faces(films, k, film_change(state, k, 1.0, -1.0), points.gap)
-        least = 0.0
+        least, lowest = 0.0, 0.0
         answer = 0.0  # of the spring to the forces of the contact
         taken_up = 0.0  # by what yields, or by layers beyond the potential
         if n:
             np.dot(points.traces, step.q, step.open_gap)
             least, widest = _look(points, step)
+            lowest = least
             if least < 0.0 or state.contact.counts[0] > 0:
                 rounds = _touch(
                     points, points.grip, points.limit, points.layer, state, step, widest
@@ -807,6 +847,8 @@ def march(
                 modes, points, points.layer, state, step, potential, answer, taken_up
             )
             _tell_forces(points, state, step, pay, record, taken)
+            if not _apart(points.others, films, state, step, (taken + 1) * modes.step, lowest):
+                return taken, LEFT_OUT
         _count(modes, outside, bore, state, step, axial)
         if films is not None:
             for k in range(len(films.lowest)):
@@ -828,3 +870,179 @@ def march(
         for k in range(len(films.lowest)):
             bend_faces(films, k, film_change(state, k, -1.0, 0.0), points.gap)
     return steps, FINISHED
+
+
+@sums
+def _low_gaps(
+    points: ContactPoints, near: Near, films: Films | None, state: State, time: float
+) -> float:
+    """Least gap of each point within a time at its speed, and the least of all [m]."""
+    least = 1e300
+    for k in range(len(points.gap)):
+        row, gap, speed = points.traces[k], points.gap[k], 0.0
+        for i in range(len(state.q)):
+            gap += row[i] * state.q[i]
+            speed += row[i] * state.v[i]
+        near.low[k] = gap + min(speed * time, 0.0)
+    if films is not None:
+        for f in range(len(films.lowest)):
+            D = films.compliance[f]
+            for k in range(films.span[f, 0], films.span[f, 1]):
+                for c in range(3):
+                    for d in range(3):
+                        near.low[k] += films.arms[f, k, c] * D[c, d] * state.films[f, d]
+    for k in range(len(points.gap)):
+        least = min(least, near.low[k])
+    return least
+
+
+@sums
+def _choose(
+    points: ContactPoints, near: Near, films: Films | None, state: State, time: float, margin: float
+) -> tuple[int, float]:
+    """Points that may close within a time, and the least gap of all others [m].
+
+    Those of the last time where they are enough.
+    """
+    n, M, known = len(points.gap), len(state.q), near.known
+    cut, room = max(_low_gaps(points, near, films, state, time), 0.0), 1e300
+    enough = known[0] > 0.0 and known[1] == points.A[0, 0]
+    for k in range(n):
+        if near.place[k] < 0:
+            room = min(room, near.low[k])
+            enough = enough and not (state.lam[k] > 0.0 or state.contact.active[k])
+    if enough and room > cut + 0.5 * margin:
+        return int(known[0]), room
+    m, room = 0, 1e300
+    for k in range(n):
+        near.place[k] = -1
+        if near.low[k] < cut + margin or state.lam[k] > 0.0 or state.contact.active[k]:
+            near.index[m] = k
+            near.place[k] = m
+            m += 1
+        else:
+            room = min(room, near.low[k])
+    for s in range(m):
+        row, trace = points.A[near.index[s]], points.traces[near.index[s]]
+        for j in range(m):
+            near.block[s * m + j] = row[near.index[j]]
+        for i in range(M):
+            near.rows[s * M + i] = trace[i]
+    known[0], known[1] = float(m), points.A[0, 0]
+    return m, room
+
+
+@inner
+def _films_at(films: Films | None, points: Index) -> Films | None:
+    """The same films at some of the contact points."""
+    if films is None:
+        return None
+    span = np.zeros_like(films.span)
+    span[:, 1] = len(points)
+    return Films(
+        films.rows,
+        films.offset,
+        films.lowest,
+        films.reach,
+        films.viscosity,
+        films.tension,
+        films.shear,
+        films.axial,
+        films.arms[:, points],
+        span,
+        films.compliance,
+        films.bearing,
+        films.room,
+        films.sizes,
+        films.ways,
+        films.worked,
+        films.between,
+        films.along,
+        films.around,
+        films.load,
+        films.area,
+    )
+
+
+@njit
+def march_near(
+    steps: int,
+    margin: float,
+    modes: Modes,
+    outside: Outside,
+    points: ContactPoints,
+    near: Near,
+    bore: Guide | None,
+    films: Films | None,
+    state: State,
+    record: Record,
+) -> int:
+    """:func:`march` of all steps with those elastic points that may close in them; a status.
+
+    :data:`LEFT_OUT` where one that was left out may have closed: then with more ``margin`` [m].
+    """
+    M, contact = len(state.q), state.contact
+    m, room = _choose(points, near, films, state, steps * modes.step, margin)
+    index, carrying = near.index[:m], contact.counts[0]
+    lam, carried, active = state.lam[index], state.carried[index], contact.active[index]
+    order = near.place[contact.points[: max(carrying, 1)]]
+    own = np.zeros(m, dtype=np.int64)
+    own[:carrying] = order[:carrying]
+    told = np.zeros((len(record.points), m), dtype=np.float32)
+    some = ContactPoints(
+        near.block[: m * m].reshape((m, m)),
+        near.rows[: m * M].reshape((m, M)),
+        points.gap[index],
+        points.axial[index],
+        None,
+        None,
+        None,
+        Others(
+            room,
+            state.q.copy(),
+            state.v.copy(),
+            near.rigid,
+            near.reach,
+            state.films[:, :3].copy(),
+            near.arm,
+        ),
+    )
+    here = State(
+        state.q,
+        state.v,
+        lam,
+        ActiveSet(active, own, contact.inverse, contact.counts),
+        state.rubbing,
+        state.worn,
+        state.pressed,
+        carried,
+        state.guide_force,
+        state.films,
+        state.bearing,
+        state.books,
+    )
+    into = Record(
+        record.force,
+        record.gap,
+        record.drift,
+        record.outside,
+        told,
+        record.pressed,
+        record.across,
+        record.doing,
+        record.film,
+        record.lands,
+        record.places,
+    )
+    _, status = march(steps, 0, modes, outside, some, bore, _films_at(films, index), here, into)
+    state.lam[:] = 0.0
+    contact.active[:] = False
+    record.points[:] = 0.0
+    for s in range(m):
+        k = index[s]
+        state.lam[k], state.carried[k], contact.active[k] = lam[s], carried[s], active[s]
+        for i in range(len(told)):
+            record.points[i, k] = told[i, s]
+    for s in range(contact.counts[0]):
+        contact.points[s] = index[own[s]]
+    return status

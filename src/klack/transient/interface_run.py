@@ -40,6 +40,7 @@ from klack.transient.interface_arrays import (
     Layer,
     Limit,
     Modes,
+    Near,
     Outside,
     Pressed,
     Record,
@@ -71,7 +72,7 @@ from klack.transient.placed_bodies import (
 )
 from klack.transient.rough_points import layer_energy, solve_rough
 
-__all__ = ["Gaps", "contact_points", "modes_of_step", "simulate_interface"]
+__all__ = ["Gaps", "contact_points", "modes_of_step", "near_points", "simulate_interface"]
 
 Gaps = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 """Exact gaps (nc,) [m] at a rigid placement of the moving body (6,) [m], [rad]."""
@@ -215,6 +216,25 @@ def contact_points(
             np.ascontiguousarray(kinetic),
             np.ascontiguousarray(fade),
         ),
+    )
+
+
+def near_points(model: InterfaceModel, rigid: int) -> Near:
+    """Memory for those points that may close within a few steps.
+
+    Parameters
+    ----------
+    rigid
+        Rigid modes of the needle, the first ones.
+    """
+    n, M = model.traces.shape
+    parts = model.traces[:, :rigid], model.traces[:, rigid:]
+    motion = [np.linalg.norm(part, axis=1).max(initial=0.0) for part in parts]
+    pulled = max(-float(np.min(model.compliance, initial=0.0)), 0.0)
+    return Near(
+        *(np.zeros(n * n), np.zeros(n * M), np.zeros(n, np.int64), np.zeros(n, np.int64)),
+        *(np.zeros(2), np.zeros(n), np.array([*motion, pulled]), rigid),
+        float(np.max(np.abs(model.points[:, :2]), initial=0.0)),
     )
 
 

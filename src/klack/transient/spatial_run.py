@@ -72,9 +72,9 @@ from klack.transient.interface_friction import (
     repair_offsets,
     rubbing_arrays,
 )
-from klack.transient.interface_kernel import FAILED, march, safe_flight
+from klack.transient.interface_kernel import FAILED, LEFT_OUT, march, march_near, safe_flight
 from klack.transient.interface_model import InterfaceModel
-from klack.transient.interface_run import Gaps, contact_points, modes_of_step
+from klack.transient.interface_run import Gaps, contact_points, modes_of_step, near_points
 from klack.transient.placed_bodies import (
     modal_energy,
     rigid_coordinates,
@@ -114,6 +114,7 @@ _STEADY = 0.04  # change of the force of a contact at rest in a step
 _AT_REST = 0  # 1: steps are long, and so is the inverse over the points that carry
 _LOST = 1  # energy that damping took in flights [J]
 _STEADILY = 2  # 1: forces changed little in the last record
+_MARGIN, _MORE = 0.5e-6, 3.0  # [m] gaps of points that are looked at, and after one was missed
 _HALF_BOUNCES = 8.0  # in the time to rest of rigid bodies
 _NONE = Outside(1.0, 0.0)  # the force of the network comes as the modal force of one newton
 
@@ -282,6 +283,9 @@ class _Moving:
         )
         self.repair = of_one_kind(repair)
         self.march = of_one_kind(march), of_one_kind(march)  # without points and with them
+        self.march_near, self.margin = of_one_kind(march_near), _MARGIN
+        if not model.ways:
+            self.near = near_points(model, self.rigid_count)
 
     # ------------------------------------------------------------------ start
 
@@ -761,8 +765,19 @@ class _Moving:
             touching = (self.resting if rest else self.points)._replace(gap=self.gap0)
         state = self.state if points else self.apart
         bore = self.bore if len(self.bore.clearance) else None
-        march_on = self.march[points]
-        _, status = march_on(count, 0, modes, _NONE, touching, bore, self.films, state, record)
+        if points and not self.model.ways:
+            status, kept = LEFT_OUT, self._keep()
+            while status == LEFT_OUT:
+                status = self.march_near(
+                    *(count, float(self.margin), modes, _NONE, touching, self.near),
+                    *(bore, self.films, state, record),
+                )
+                if status == LEFT_OUT:
+                    self._put_back(kept)
+                    self.margin *= _MORE
+        else:
+            march_on = self.march[points]
+            _, status = march_on(count, 0, modes, _NONE, touching, bore, self.films, state, record)
         failed = status == FAILED or not np.all(np.isfinite(self.q))
         return None if failed else record
 
