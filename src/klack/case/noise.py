@@ -93,10 +93,11 @@ class CaseNoise(Section):
     plate: NoisePlate | None = Field(
         default=None, description="Plate below the mount that radiates as well."
     )
-    radiation: Literal["piston", "unity"] = Field(
+    radiation: Literal["piston", "unity", "elements"] = Field(
         default="piston",
-        description="Radiation efficiency: of a piston of the same area, or 1 (equivalent radiated "
-        "power, an upper bound).",
+        description="How the bodies radiate: estimated with the efficiency of a piston of the same "
+        "area, or 1 (equivalent radiated power), or by boundary elements on the outside of all "
+        "held bodies together.",
     )
     distance: Length = Field(default=1.0, gt=0, description="From the valve to the listener.")
     air_density: Density = Field(default=1.204, gt=0, description="Of air at 20 degC.")

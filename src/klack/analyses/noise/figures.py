@@ -364,7 +364,7 @@ def blocked_charts(study: NoiseStudy) -> tuple[Chart, ...]:
 
 
 def radiation_chart(study: NoiseStudy) -> Chart | None:
-    """Sound energy per band, its upper bound, and the difference of designs."""
+    """Sound energy per band, that at efficiency 1, and the difference of designs."""
     with_bodies = [(i, design) for i, design in _designs(study) if design.bodies]
     if not with_bodies:
         return None
@@ -387,8 +387,8 @@ def radiation_chart(study: NoiseStudy) -> Chart | None:
         x=_FREQUENCY_AXIS,
         panels=_compared("energy", "dB re 1 pJ", levels, 80.0, differences, _trusted(study)),
         note=(
-            "Thick: estimate, with the radiation efficiency of the case. Thin dotted lines: upper "
-            f"bound, radiation efficiency 1 in every band. {_trusted_words(study)}"
+            "Thick: as the case says. Thin dotted lines: radiation efficiency 1 in every band, "
+            f"which is no bound. {_trusted_words(study)}"
         ),
     )
 

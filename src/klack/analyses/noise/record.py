@@ -115,8 +115,9 @@ class BodyNoise:
         Nan for the plate.
     radiated (g, b) [J]
         Estimated sound energy, on the mount and with the plate of the case.
-    upper_bound (g, b) [J]
-        Equivalent radiated energy ``rho c int v_n^2 dA dt``: radiation efficiency 1.
+    upper_bound (h, b) [J]
+        Equivalent radiated energy ``rho c int v_n^2 dA dt`` of named surfaces and plate: radiation
+        efficiency 1. Its name is that of former versions: it is no bound.
     support_energy [J]
         Through the held surfaces into mount and plate; nan in results of former versions.
     """
@@ -181,7 +182,9 @@ class NoiseSettings:
     mount, plate
         In words; empty without.
     radiation
-        ``"piston"`` or ``"unity"``.
+        ``"piston"``, ``"unity"`` or ``"elements"``.
+    outside
+        Closed surface of boundary elements, in words; empty without.
     distance [m]
     air_density [kg/m^3]
     sound_speed [m/s]
@@ -205,6 +208,7 @@ class NoiseSettings:
     duration: float
     given: bool
     background: float | None = None
+    outside: str = ""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -296,7 +300,7 @@ class NoiseDesign:
         return np.asarray(np.sum([body.radiated.sum(axis=0) for body in self.bodies], axis=0))
 
     @property
-    def upper_bound(self) -> float:
+    def equivalent_energy(self) -> float:
         """Equivalent radiated energy, radiation efficiency 1 [J]; nan without bodies."""
         return self._over_bodies(lambda body: body.upper_bound.sum())
 
