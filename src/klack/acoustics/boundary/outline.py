@@ -23,7 +23,7 @@ __all__ = ["REST", "Outline", "revolved_outline"]
 REST = "rest of the outside"
 """Name of what is no named surface of a body: covers, and other bodies that it takes along."""
 
-_ACROSS = 8  # elements over the radius of an end
+_ACROSS = 12  # elements over the radius of an end
 _MOST = 160  # elements
 _STRAIGHT = 0.1  # rad within an element
 _SAME = 1e-6  # of the extent
