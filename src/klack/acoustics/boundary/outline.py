@@ -206,7 +206,8 @@ def _elements(way: _Pieces, group: Ints, size: float) -> tuple[Floats, list[Ints
             runs.append([i])
         else:
             runs[-1].append(i)
-    ends, parts = [], []
+    ends: list[Matrix] = []
+    parts: list[Ints] = []
     for run in runs:
         # as even as the pieces allow
         whole = np.cumsum(length[run])
@@ -256,7 +257,7 @@ def _motion(own: Structure, s: int, way: _Pieces, parts: Sequence[Ints], mesh: M
             mean[n, :-1] = own.face_area[faces] @ fields[faces] / own.face_area[faces].sum()
     covers = np.array([way.structure[part[0]] == -1 for part in parts])
     nz = mesh.normals[:, 1]
-    for n in np.flatnonzero(covers & (np.abs(nz) > _FLAT)):
+    for n in np.flatnonzero(covers & (np.abs(nz) > _FLAT)).tolist():
         for step in (-1, 1):  # the next element on this body, if it faces the same way
             m = n
             while 0 <= m < len(parts) and covers[m]:

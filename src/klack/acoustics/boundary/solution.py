@@ -110,7 +110,7 @@ def radiation(mesh: BoundaryMesh, wave_number: float, velocity: Motions) -> Radi
     velocity (n, b) [m/s]
         Normal, into the air.
     """
-    v = np.asarray(velocity)
+    v = velocity
     G, H = mesh.kernels(mesh.centres, wave_number)
     on_surface = _rows(G, 0.5 * np.eye(len(v)) - H, wave_number, v)
     draws = []
