@@ -36,8 +36,11 @@ from klack.network.checks import LooseBodyWarning
 from klack.network.component import Component
 from klack.network.network import Network
 from klack.network.rows import Ambient
+from klack.simulation.network_compile import compile_network
 from klack.simulation.network_result import NetworkResult, StaticStart
 from klack.simulation.network_run import simulate_network
+from klack.simulation.static_start import RestState, begin_at_rest
+from klack.simulation.step_sizes import step_sizes
 
 AMBIENT = Ambient()
 MU0 = 4e-7 * pi
@@ -392,6 +395,47 @@ def test_an_armature_rests_before_its_pole_and_not_beyond():
     assert found.displacement["armature.at"] == pytest.approx(
         brentq(left, 60e-6, 65e-6, xtol=1e-15), rel=1e-7
     )
+
+
+def test_of_two_rest_states_the_one_nearby_is_kept():
+    """32 N pull at the seat, 197 N at the stop, against 50 N: it stays where it was."""
+
+    def rests(preload: float, near: RestState | None = None) -> tuple[float, RestState]:
+        stiff = {"kind": "linear", "stiffness": 1e8}
+        parts = {
+            "armature": RigidMass(mass=5e-3, points=("at",)),
+            "spring": Spring(stiffness=1e3, preload=preload),
+            "seat": EndStop(gap=0.0, law=stiff),
+            "stop": EndStop(gap=60e-6, law=stiff),
+            "coil": Solenoid(
+                turns=100,
+                resistance=1.0,
+                gap=60e-6,
+                residual_gap=40e-6,
+                poles=[{"outer_radius": 4e-3, "fringing": "none"}],
+                start_current=1.0,
+            ),
+            "supply": VoltageTable(time=[0.0], voltage=[1.0]),
+        }
+        joints = [
+            ["armature.at", "spring.end", "seat.upper", "stop.lower", "coil.armature"],
+            ["ground", "seat.lower"],
+            ["ground", "stop.upper"],
+            ["coil.terminals", "supply.terminals"],
+        ]
+        rows = Network(parts, joints).rows()
+        sizes = step_sizes(rows, "normal", step=None, coarse=None)
+        begun, found = begin_at_rest(compile_network(rows, sizes), sizes.step, near)
+        return begun.displacement["armature.at"], found
+
+    def left(y: float) -> float:
+        pull = MU0 * pi * 4e-3**2 * 100.0**2 / (2.0 * (100e-6 - y) ** 2)
+        return pull - 50.0 - 1e3 * y - 1e8 * (min(y, 0.0) + max(y - 60e-6, 0.0))
+
+    (_, down), (_, up) = rests(51.0), rests(20.0)
+
+    for near, low, high in ((None, -1e-6, 0.0), (down, -1e-6, 0.0), (up, 60e-6, 65e-6)):
+        assert rests(50.0, near)[0] == pytest.approx(brentq(left, low, high, xtol=1e-15), rel=1e-7)
 
 
 @pytest.mark.slow
