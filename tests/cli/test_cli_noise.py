@@ -16,6 +16,9 @@ import pytest
 from klack.analyses.impact.analysis import IMPACT
 from klack.analyses.noise.analysis import NOISE
 from klack.analyses.noise.content import noise_content
+from klack.analyses.noise.record import NoiseDesign
+from klack.analyses.noise.run import noise_design
+from klack.analyses.noise.source import load_sources
 from klack.cli.main import main
 
 ROOT = Path(__file__).parents[2]
@@ -146,7 +149,7 @@ def test_the_report_holds_players_and_says_what_it_is(heard):
     page = (heard / "report.html").read_text(encoding="utf-8")
 
     assert page.count("<audio controls") == 2
-    for words in ("media-src data:", "upper bound", "estimate"):
+    for words in ("media-src data:", "is no bound", "estimate"):
         assert words in page
     assert (heard / "report.pdf").read_bytes().startswith(b"%PDF")
 
@@ -269,6 +272,57 @@ def test_what_cannot_be_used_is_said(impact, heard, tmp_path, capsys, words, tol
     err = capsys.readouterr().err
     assert all(text in err for text in told)
     assert not Path("klack-results").exists()
+
+
+def sounding(impact: Path, **noise: object) -> NoiseDesign:
+    """Of the stored impact, with other keys of its section."""
+    (source,) = load_sources(impact)
+    return noise_design(replace(source, noise=source.noise.model_copy(update=noise)))
+
+
+def own_bands(design: NoiseDesign) -> np.ndarray:
+    """Radiated by the body itself, without the plate."""
+    (body,) = design.bodies
+    return body.radiated[[name != "plate" for name in body.groups]].sum(axis=0)
+
+
+def test_boundary_elements_take_off_what_a_small_valve_cannot_radiate(impact):
+    """Shaking as a whole: f^4 against the f^2 of the piston; plane waves at the top."""
+    piston, found = (sounding(impact, radiation=word) for word in ("piston", "elements"))
+    apart = 10.0 * np.log10(own_bands(piston) / own_bands(found))
+    middle = found.band_middle
+    assert found.settings.radiation == "elements"
+    assert "over openings" in found.settings.outside
+    low = (middle > 90.0) & (middle < 900.0)
+    slope = np.polyfit(np.log2(middle[low]), apart[low], 1)[0]
+    assert slope == pytest.approx(-20.0 * np.log10(2.0), abs=0.3)  # dB per octave
+    assert apart[np.isclose(middle, 1e3)] > 20.0
+    assert np.abs(apart[(middle > 35e3) & (middle < 60e3)]).max() < 1.0
+    (body,) = found.bodies
+    assert body.groups == ("outside", "bottom", "rest of the outside", "plate")
+    assert np.all(own_bands(found) > 0.0)
+    plate = [b.radiated[-1] for d in (piston, found) for b in d.bodies]
+    assert plate[0] == pytest.approx(plate[1], rel=1e-12)
+
+
+def test_surfaces_that_enclose_nothing_radiate_as_pistons_and_say_so(impact):
+    (source,) = load_sources(impact)
+    (own,) = source.structures
+    flat = np.abs(own.axial_normals) > 0.9  # the bottom alone
+    bottom = replace(
+        own,
+        faces=own.faces[flat],
+        face_group=own.face_group[flat],
+        face_area=own.face_area[flat],
+        face_shapes=own.face_shapes[flat],
+        face_residual=own.face_residual[flat],
+        axial_normals=own.axial_normals[flat],
+    )
+    noise = source.noise.model_copy(update={"radiation": "elements"})
+    design = noise_design(replace(source, noise=noise, structures=(bottom,)))
+    (note,) = [note for note in design.notes if "pistons" in note]
+    assert "enclose nothing" in note
+    assert design.settings.radiation == "piston"
 
 
 def test_the_page_of_the_how_to_prints_the_right_numbers(numbers):

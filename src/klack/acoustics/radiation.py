@@ -1,13 +1,15 @@
-r"""Radiated power of a vibrating surface, an upper bound (ERP).
+r"""Radiated power of a vibrating surface: by boundary elements, or estimated.
 
 .. math:: T(f) = \rho c\, \sigma \int_A |Y_n|^2\,\mathrm dA \quad [\mathrm{W/N^2}]
 
 is the power that a surface radiates per 1 N (rms) at a port, with the normal velocity per force
 :math:`Y_n`. A transient radiates the energy :math:`T\,2|\hat F|^2` per hertz, f > 0.
 
-Every element radiates as if the surface moved in phase over many wavelengths; parts that cancel
-below coincidence are added: hence the bound. The efficiency of a baffled piston as large as the
-body takes off what a body smaller than the wavelength cannot radiate.
+With an efficiency :math:`\sigma` this is an estimate: each element radiates by itself, and parts
+that move against each other are added. With 1 it is the equivalent radiated power, usually too
+loud below coincidence and too soft by up to 1 dB near it; that of a baffled piston as large as the
+body takes off what a body smaller than the wavelength cannot radiate. Boundary elements
+(:mod:`klack.acoustics.boundary`) have the pressures of all parts on all others.
 """
 
 from dataclasses import dataclass
@@ -17,6 +19,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from klack.acoustics.boundary.over_frequency import SurfaceRadiation
 from klack.acoustics.harmonic import HarmonicResponse, harmonic_response
 from klack.acoustics.mount import Mount
 from klack.acoustics.plate import Air, Plate
@@ -32,7 +35,7 @@ __all__ = [
     "surface_efficiency",
 ]
 
-Efficiency = Literal["piston", "unity"]
+Efficiency = Literal["piston", "unity"] | SurfaceRadiation
 
 PLATE = "plate"
 """Name of the plate among the groups."""
@@ -60,7 +63,7 @@ class PowerTransfer:
     @property
     def total(self) -> NDArray[np.float64]:
         """Of all groups together [W/N^2], shape (k,)."""
-        return np.asarray(self.values.sum(axis=0))
+        return np.asarray(np.maximum(self.values.sum(axis=0), 0.0))
 
     def group(self, name: str) -> NDArray[np.float64]:
         """Of one group [W/N^2], shape (k,)."""
@@ -88,13 +91,17 @@ def power_transfer(
     mount, plate
         Below the held surfaces.
     efficiency
-        Of the body; the plate has its own.
+        Of the body, or its radiation by boundary elements; the plate has its own.
     """
     air = air or Air()
     answer = harmonic_response(structure, frequency, port, mount=mount, plate=plate)
-    sigma = surface_efficiency(structure, answer.frequency, efficiency, air)
-    values = air.impedance * sigma * mean_squares(structure, answer)
-    names = structure.group_names
+    if isinstance(efficiency, SurfaceRadiation):
+        names = efficiency.names
+        values = air.impedance * efficiency.power(answer.frequency, answer.fields)
+    else:
+        names = structure.group_names
+        sigma = surface_efficiency(structure, answer.frequency, efficiency, air)
+        values = air.impedance * sigma * mean_squares(structure, answer)
     if plate is not None:
         bending = plate.mobility * np.abs(answer.support_force) ** 2
         radiated = bending * plate.radiated_share(answer.frequency, air)
@@ -114,7 +121,10 @@ def mean_squares(structure: Structure, answer: HarmonicResponse) -> NDArray[np.f
 
 
 def surface_efficiency(
-    structure: Structure, frequency: NDArray[np.float64], efficiency: Efficiency, air: Air
+    structure: Structure,
+    frequency: NDArray[np.float64],
+    efficiency: Literal["piston", "unity"],
+    air: Air,
 ) -> NDArray[np.float64]:
     """Radiation efficiency [-] of the surface of a body, shape (k,)."""
     if efficiency == "unity":

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.acoustics.boundary.over_frequency import SurfaceRadiation
 from klack.acoustics.force_response import aligned_forces
 from klack.acoustics.harmonic import harmonic_response
 from klack.acoustics.mount import Mount, support_mobility
@@ -106,20 +107,31 @@ class SurfaceSpectra:
     ) -> RadiatedBands:
         """Energy radiated in every band; see :func:`radiated_bands`."""
         own, air = self.structure, air or Air()
-        names = own.group_names if self.plate is None else (*own.group_names, PLATE)
-        columns = []
-        for part in self.parts:
-            sigma = surface_efficiency(own, part.frequency, efficiency, air)
-            for weights in part.weights:
-                C = air.impedance * _products(part.fields, weights * sigma)
-                column = np.einsum("gij,ij->g", own.group_gram, C).tolist()
-                if self.plate is not None:
-                    bending = self.plate.mobility * 2.0 * np.abs(part.support_force) ** 2
-                    share = self.plate.radiated_share(part.frequency, air)
-                    column.append(float(weights @ (bending * share)))
-                columns.append(column)
-        energy = np.array(columns).reshape(len(columns), len(names)).T
+        names = efficiency.names if isinstance(efficiency, SurfaceRadiation) else own.group_names
+        parts = [air.impedance * self._by_group(part, efficiency, air) for part in self.parts]
+        energy = np.hstack([np.empty((len(names), 0)), *parts])
+        if self.plate is not None:
+            flowing = [self._by_plate(self.plate, part, air) for part in self.parts]
+            names, energy = (*names, PLATE), np.vstack([energy, np.concatenate(flowing)])
         return RadiatedBands(names=names, bands=self.bands, energy=energy)
+
+    def _by_group(self, part: _Decade, efficiency: Efficiency, air: Air) -> Floats:
+        """Of each group in each band (g, n) [J], per density and speed of sound."""
+        if isinstance(efficiency, SurfaceRadiation):
+            return efficiency.energy(part.frequency, part.fields, part.weights)
+        sigma = surface_efficiency(self.structure, part.frequency, efficiency, air)
+        columns = [
+            np.einsum("gij,ij->g", self.structure.group_gram, _products(part.fields, weights))
+            for weights in part.weights * sigma
+        ]
+        return np.asarray(np.array(columns).T)
+
+    @staticmethod
+    def _by_plate(plate: Plate, part: _Decade, air: Air) -> Floats:
+        """In each band (n,) [J]."""
+        bending = plate.mobility * 2.0 * np.abs(part.support_force) ** 2
+        share = plate.radiated_share(part.frequency, air)
+        return np.asarray([float(weights @ (bending * share)) for weights in part.weights])
 
     def support_energy(self) -> Floats:
         r"""Energy through the held surfaces into mount and plate, in every band [J].

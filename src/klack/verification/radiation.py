@@ -1,4 +1,4 @@
-"""Sound of closed surfaces by boundary elements: spheres, cylinders, small bodies."""
+"""Sound of closed surfaces by boundary elements: spheres, cylinders, small bodies, triangles."""
 
 from collections.abc import Iterator
 from functools import cache, partial
@@ -9,11 +9,12 @@ import scipy
 
 from klack.acoustics.boundary.revolved import Meridian
 from klack.acoustics.boundary.solution import Radiation, radiation
+from klack.acoustics.boundary.triangles import Triangles
 from klack.arrays import Vector
 from klack.verification.check import Check
 from klack.verification.check import check as plain_check
 
-__all__ = ["checks", "sphere_efficiency", "sphere_meridian", "sphere_pressure"]
+__all__ = ["checks", "sphere_efficiency", "sphere_meridian", "sphere_pressure", "sphere_triangles"]
 
 _SERIES = "sphere in P_n: spherical Hankel functions (Morse & Ingard 1968, ch. 7.2)"
 _CAP = "piston in a sphere: its series in P_n, 0 to 39"
@@ -46,7 +47,7 @@ _CYLINDER = (  # radius 1, length 3: k, motion, efficiency
 
 def checks() -> list[Check]:
     """All checks of the group."""
-    return [*_spheres(), *_caps(), *_cylinders(), *_small()]
+    return [*_spheres(), *_caps(), *_cylinders(), *_small(), *_triangles()]
 
 
 def sphere_pressure(n: int, ka: float, kr: float | None = None) -> complex:
@@ -145,6 +146,45 @@ def _cylinders() -> Iterator[Check]:
     for k, motion, known in _CYLINDER:
         level = _decibels(_cylinder_efficiencies(k)[motion], known)
         yield check(f"cylinder, {motion}, kR {k:g}: power [dB]", 0.0, level, 0.1, _TABLE)
+
+
+def sphere_triangles(level: int) -> Triangles:
+    """Icosahedron divided over and over, with the area of a sphere of radius 1 m."""
+    hull = scipy.spatial.ConvexHull(_icosahedron())
+    points = hull.points
+    for _ in range(level):
+        a, b = points[hull.simplices], points[np.roll(hull.simplices, 1, axis=1)]
+        middles = np.unique(np.round((a + b).reshape(-1, 3), 9), axis=0)
+        points = np.vstack([points, middles / np.linalg.norm(middles, axis=1)[:, None]])
+        hull = scipy.spatial.ConvexHull(points)
+    a, b, c = np.moveaxis(points[hull.simplices], 1, 0)
+    inwards = (np.cross(b - a, c - a) * a).sum(axis=1) < 0.0
+    corners = np.where(inwards[:, None], hull.simplices[:, ::-1], hull.simplices)
+    mesh = Triangles(points=points, corners=corners)
+    return Triangles(points=points * np.sqrt(4.0 * pi / mesh.areas.sum()), corners=corners)
+
+
+def _icosahedron() -> np.ndarray:
+    golden = (1.0 + 5.0**0.5) / 2.0
+    flat = [(0.0, a, b * golden) for a in (-1.0, 1.0) for b in (-1.0, 1.0)]
+    points = np.array([np.roll(point, turn) for point in flat for turn in range(3)])
+    return np.asarray(points / np.linalg.norm(points, axis=1)[:, None])
+
+
+def _triangles() -> Iterator[Check]:
+    mesh = sphere_triangles(2)
+    cosine = mesh.centres[:, 2] / np.linalg.norm(mesh.centres, axis=1)
+    modes = np.column_stack([scipy.special.eval_legendre(n, cosine) for n in range(4)])
+    for words, ka in (("0.3", 0.3), ("1", 1.0), ("pi", pi), ("5", 5.0)):
+        found = radiation(mesh, ka, modes)
+        for n in range(4):
+            known = 4.0 * pi / (2 * n + 1) * sphere_efficiency(n, ka)
+            level = _decibels(float(found.matrix[n, n]), known)
+            name = f"sphere of 320 triangles in P_{n}, ka {words}: power [dB]"
+            yield check(name, 0.0, level, 0.1, _SERIES)
+            error = _distance(found, n, sphere_pressure(n, ka) * modes[:, n])
+            name = f"sphere of 320 triangles in P_{n}, ka {words}: pressure [-]"
+            yield check(name, 0.0, error, 0.025, _SERIES)
 
 
 def _small() -> Iterator[Check]:

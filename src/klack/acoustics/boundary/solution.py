@@ -66,7 +66,7 @@ class Radiation:
     pressure (n, b) [m/s]
         Over density and speed of sound.
     residual [-]
-        Largest pressure that is left at points inside, of the largest one on the surface.
+        Pressure that is left at points inside (rms), of the largest one on the surface.
     """
 
     mesh: BoundaryMesh
@@ -110,7 +110,7 @@ def radiation(mesh: BoundaryMesh, wave_number: float, velocity: Motions) -> Radi
     velocity (n, b) [m/s]
         Normal, into the air.
     """
-    v = np.asarray(velocity)
+    v = velocity
     G, H = mesh.kernels(mesh.centres, wave_number)
     on_surface = _rows(G, 0.5 * np.eye(len(v)) - H, wave_number, v)
     draws = []
@@ -120,7 +120,7 @@ def radiation(mesh: BoundaryMesh, wave_number: float, velocity: Motions) -> Radi
     for silent, judge in (draws, draws[::-1]):
         left, right = (np.concatenate(both) for both in zip(on_surface, silent, strict=True))
         p = _least_squares(left, right)
-        rest = np.abs(judge[0] @ p - judge[1]).max(axis=0)
+        rest = np.sqrt((np.abs(judge[0] @ p - judge[1]) ** 2).mean(axis=0))
         residual = float((rest / np.maximum(np.abs(p).max(axis=0), 1e-300)).max(initial=0.0))
         if residual <= LARGEST_RESIDUAL:
             return Radiation(

@@ -15,12 +15,14 @@ no noise.  The share of the energy that is left per band,
 is taken on all ways from the force to the ear.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.acoustics.boundary.over_frequency import SurfaceRadiation
 from klack.acoustics.force_bands import force_bands
 from klack.acoustics.force_response import modal_response, port_forces
 from klack.acoustics.injected import injected_density, injected_energy
@@ -36,6 +38,7 @@ from klack.signals.sampled import TimeSeries
 
 __all__ = [
     "ASSUMED_DAMPING",
+    "Elements",
     "Surroundings",
     "Transfers",
     "body_noise",
@@ -87,6 +90,9 @@ def _at_rest_outside(net: TimeSeries) -> TimeSeries:
     )
 
 
+Elements = tuple[Mapping[str, SurfaceRadiation], str]
+"""Radiation of each body by boundary elements, or why there is none."""
+
 ASSUMED_DAMPING = 0.005
 """Damping ratio of radiating modes where the case gives none."""
 _LOWEST, _HIGHEST = 20.0, 400e3  # [Hz] of mobilities
@@ -100,16 +106,22 @@ _LONGEST = 4_000_000  # values of a spectrum that resolves every resonance
 class Surroundings:
     """What is below a held body, and the air.
 
-    ``period`` [s] is from click to click, ``share`` (b,) [-] that of :func:`net_share`.
+    ``period`` [s] is from click to click, ``share`` (b,) [-] that of :func:`net_share`; bodies in
+    ``elements`` radiate by those.
     """
 
     mount: Mount | None
     plate: Plate | None
     air: Air
-    efficiency: Efficiency
+    efficiency: Literal["piston", "unity"]
     period: float
     share: Floats
     octaves: ThirdOctaves
+    elements: Mapping[str, SurfaceRadiation] = field(default_factory=dict)
+
+    def radiation_of(self, structure: Structure) -> Efficiency:
+        """By boundary elements where there are any."""
+        return self.elements.get(structure.name, self.efficiency)
 
 
 def body_noise(
@@ -129,8 +141,8 @@ def body_noise(
     bands = np.column_stack([around.octaves.low, around.octaves.high])
     frequency = frequency_lines(structure, None, _LOWEST, _HIGHEST)
     spectra = surface_spectra(sounding, forces, bands, mount=around.mount, plate=around.plate)
-    estimate = spectra.radiated(efficiency=around.efficiency, air=around.air)
-    bound = spectra.radiated(efficiency="unity", air=around.air)
+    estimate = spectra.radiated(efficiency=around.radiation_of(structure), air=around.air)
+    equivalent = spectra.radiated(efficiency="unity", air=around.air)
     velocity = spectra.face_velocity(period=around.period)
     area = list(structure.group_area) + [np.nan] * (len(estimate.names) - len(structure.group_area))
     ports = tuple(forces)
@@ -159,7 +171,7 @@ def body_noise(
         groups=estimate.names,
         area=np.array(area),
         radiated=estimate.energy * around.share,
-        upper_bound=bound.energy * around.share,
+        upper_bound=equivalent.energy * around.share,
         support_energy=float(spectra.support_energy() @ around.share),
         surface=Surface(
             points=structure.points,
@@ -175,10 +187,23 @@ class Transfers:
 
     def __init__(self) -> None:
         self._found: dict[tuple[object, ...], tuple[Floats, Floats]] = {}
+        self._elements: dict[tuple[object, ...], Elements] = {}
+
+    def elements(
+        self, structures: tuple[Structure, ...], sound_speed: float, compute: Callable[[], Elements]
+    ) -> Elements:
+        """Boundary elements of bodies in air, computed once."""
+        key = (*structures, sound_speed)
+        if key not in self._elements:
+            if len(self._elements) >= _MOST_TRANSFERS:
+                self._elements.clear()
+            self._elements[key] = compute()
+        return self._elements[key]
 
     def of(self, structure: Structure, port: str, around: Surroundings) -> tuple[Floats, Floats]:
         """Audible frequencies [Hz] and radiated power [W/N^2] of a port."""
-        key = (structure, port, around.mount, around.plate, around.air, around.efficiency)
+        radiation = around.radiation_of(structure)
+        key = (structure, port, around.mount, around.plate, around.air, radiation)
         found = self._found.get(key)
         if found is None:
             sounding = damped(structure)
@@ -189,7 +214,7 @@ class Transfers:
                 port,
                 mount=around.mount,
                 plate=around.plate,
-                efficiency=around.efficiency,
+                efficiency=radiation,
                 air=around.air,
             )
             found = frequency, transfer.total

@@ -1,11 +1,12 @@
 """``klack noise``: from stop forces to sound."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from time import perf_counter
 
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.acoustics.boundary.over_frequency import SurfaceRadiation, surface_radiation
 from klack.acoustics.drive_pattern import drive_pattern
 from klack.acoustics.force_bands import force_bands
 from klack.acoustics.impulsive import impulsive_prominence
@@ -21,13 +22,13 @@ from klack.acoustics.spectrum import force_spectrum, impulse_level
 from klack.acoustics.third_octave import ThirdOctaves
 from klack.analyses.noise.body import (
     ASSUMED_DAMPING,
+    Elements,
     Surroundings,
     Transfers,
     body_noise,
     net_share,
     port_transfers,
 )
-from klack.analyses.noise.mount_source import mount_source
 from klack.analyses.noise.record import (
     BodyNoise,
     ClickSound,
@@ -38,8 +39,9 @@ from klack.analyses.noise.record import (
 )
 from klack.analyses.noise.source import NoiseSource, SourceStop
 from klack.analyses.record import run_fields
-from klack.errors import InputError
+from klack.errors import ConvergenceError, InputError
 from klack.input.problem import one_of
+from klack.machine.cache.result_cache import result_cache
 from klack.machine.progress import Progress, silent
 from klack.machine.stages import StageClock, collected_warnings
 from klack.materials.material import Material
@@ -91,7 +93,9 @@ def click_sound(
     """
     if bands is None:
         bands = [force_bands(stop.force) for stop in source.stops]
-    around = _surroundings(source, net_share(source.net, bands), bands[0])
+    around = _surroundings(
+        source, net_share(source.net, bands), bands[0], _boundary_elements(source, transfers)
+    )
     return _pressure(source, around, transfers)
 
 
@@ -128,14 +132,15 @@ def _design(source: NoiseSource, name: str, *, several: bool, clock: StageClock)
     clock("force spectra", 0.0)
     stops = tuple(_stop_force(stop) for stop in source.stops)
     share = net_share(source.net, [stop.bands for stop in stops])
-    around = _surroundings(source, share, stops[0].bands)
+    transfers = Transfers()
+    elements = _boundary_elements(source, transfers)
+    around = _surroundings(source, share, stops[0].bands, elements)
     forces = {stop.name: stop.force for stop in source.stops}
     clock("vibration and radiation", 0.0)
     found = [body_noise(structure, forces, around) for structure in source.structures]
     bodies = tuple(body for body in found if body is not None)
     clock("sound", 0.0)
-    at_mounts = None if source.held is None else mount_source(source.structures, source.held)
-    pressure = _pressure(source, around, Transfers())
+    pressure = _pressure(source, around, transfers)
     sound = _heard(pressure, source, clock) if pressure is not None else None
     return NoiseDesign(
         name=name,
@@ -151,10 +156,9 @@ def _design(source: NoiseSource, name: str, *, several: bool, clock: StageClock)
         net_share=share,
         bodies=bodies,
         sound=sound,
-        settings=_settings(source),
-        notes=(*source.notes, *_design_notes(source, bodies, sound)),
+        settings=_settings(source, elements[0]),
+        notes=(*source.notes, *_design_notes(source, bodies, sound, elements)),
         own_components=source.own_components,
-        at_mounts=at_mounts,
     )
 
 
@@ -199,7 +203,7 @@ def _level_at(force: TimeSeries, frequency: np.ndarray) -> np.ndarray:
 
 
 def _surroundings(
-    source: NoiseSource, share: NDArray[np.float64], octaves: ThirdOctaves
+    source: NoiseSource, share: NDArray[np.float64], octaves: ThirdOctaves, elements: Elements
 ) -> Surroundings:
     noise = source.noise
     mount, plate = noise.mount, noise.plate
@@ -221,10 +225,37 @@ def _surroundings(
             loss_factor=plate.loss_factor,
         ),
         air=Air(density=noise.air_density, sound_speed=noise.sound_speed),
-        efficiency=noise.radiation,
+        efficiency="piston" if noise.radiation == "elements" else noise.radiation,
+        elements=elements[0],
         period=1.0 / noise.drive.rate,
         share=share,
         octaves=octaves,
+    )
+
+
+def _boundary_elements(source: NoiseSource, transfers: Transfers) -> Elements:
+    structures, sound_speed = source.structures, source.noise.sound_speed
+
+    def compute() -> Elements:
+        try:
+            found = surface_radiation(structures, sound_speed, result_cache())
+        except (InputError, ConvergenceError) as error:
+            why = " ".join(str(error).split())
+            return {}, f"The bodies radiate as pistons, which is an estimate: {why}"
+        return {own.name: way for own, way in zip(structures, found, strict=True)}, ""
+
+    if source.noise.radiation != "elements" or not structures:
+        return {}, ""
+    return transfers.elements(structures, sound_speed, compute)
+
+
+def _outside(elements: Mapping[str, SurfaceRadiation]) -> str:
+    found = next(iter(elements.values()), None)
+    if found is None:
+        return ""
+    return (
+        f" ({found.elements} on the outside of all bodies, {100 * found.covered:.2g} % of it over "
+        "openings, mounting faces and what has no name)"
     )
 
 
@@ -240,10 +271,10 @@ def _material(source: NoiseSource, name: str) -> Material:
     return Material(name=name, young=given.young, poisson=given.poisson, density=given.density)
 
 
-def _settings(source: NoiseSource) -> NoiseSettings:
+def _settings(source: NoiseSource, elements: Mapping[str, SurfaceRadiation]) -> NoiseSettings:
     noise = source.noise
     mount, plate = noise.mount, noise.plate
-    below, carried = "", ""
+    below, carried, outside = "", "", _outside(elements)
     if mount is not None:
         mass = f", {format_si(1e3 * mount.mass, 'g')} on it" if mount.mass is not None else ""
         below = (
@@ -258,7 +289,8 @@ def _settings(source: NoiseSource) -> NoiseSettings:
     return NoiseSettings(
         mount=below,
         plate=carried,
-        radiation=noise.radiation,
+        radiation="piston" if noise.radiation == "elements" and not outside else noise.radiation,
+        outside=outside,
         distance=noise.distance,
         air_density=noise.air_density,
         sound_speed=noise.sound_speed,
@@ -319,11 +351,23 @@ def _heard(pressure: TimeSeries, source: NoiseSource, clock: StageClock) -> Clic
 
 
 def _design_notes(
-    source: NoiseSource, bodies: Sequence[BodyNoise], sound: ClickSound | None
+    source: NoiseSource,
+    bodies: Sequence[BodyNoise],
+    sound: ClickSound | None,
+    elements: Elements,
 ) -> tuple[str, ...]:
     found = []
     if not bodies:
         found.append("There is no elastic held body: only the spectra of the force are known.")
+    ways, why_none = elements
+    if why_none:
+        found.append(why_none)
+    for way in list(ways.values())[:1]:
+        if way.holds_up_to < _HEARING:
+            found.append(
+                f"The boundary elements hold up to {format_si(way.holds_up_to, 'Hz')}, where the "
+                "largest is a sixth of the wavelength; above, the radiated sound is an estimate."
+            )
     if bodies and not source.given:
         found.append(
             f"Case {source.case} has no section 'noise': rigid hold, no plate. A small body that "
@@ -364,7 +408,7 @@ def _settings_differ(designs: Sequence[NoiseDesign]) -> list[str]:
         "distance": "the distance",
         "mount": "the mount",
         "plate": "the plate",
-        "radiation": "the radiation efficiency",
+        "radiation": "how the surface radiates",
         "rate": "the rate of the drive pattern",
     }
     found = [

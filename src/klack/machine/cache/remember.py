@@ -28,7 +28,7 @@ _DISTRIBUTIONS = (
 )
 _SOURCES = (
     *("machine/cache", "mesh", "bodies/elasticity", "contact", "bodies/reduction"),
-    "materials/material.py",
+    *("acoustics/boundary", "materials/material.py"),
 )
 _THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_CBWR")
 

@@ -1,0 +1,166 @@
+"""Outside of held bodies and its radiation over frequency: sphere, cups, what is open."""
+
+from itertools import pairwise
+from math import pi
+
+import numpy as np
+import pytest
+from scipy.special import eval_legendre
+
+from klack.acoustics.boundary.outline import REST, revolved_outline
+from klack.acoustics.boundary.over_frequency import SurfaceRadiation, surface_radiation
+from klack.bodies.reduction.structure import Structure
+from klack.errors import InputError
+from klack.verification.radiation import sphere_efficiency
+
+C = 343.2
+SIZE = C / 20e3 / 6.0
+
+
+def structure(name: str, ways: dict[str, np.ndarray], shapes=lambda r, z: np.ones((len(r), 1))):
+    """Body of revolution by its named surfaces (k, 2) and normal fields on its faces."""
+    a = np.concatenate([way[:-1] for way in ways.values()])
+    b = np.concatenate([way[1:] for way in ways.values()])
+    d, middle = b - a, (a + b) / 2.0
+    length = np.hypot(*d.T)
+    fields = shapes(*middle.T)
+    m, count = fields.shape[1], len(a)
+    groups = np.repeat(np.arange(len(ways)), [len(way) - 1 for way in ways.values()])
+    area = 2.0 * pi * middle[:, 0] * length
+    nothing = np.zeros
+    return Structure(
+        name=name, mass=0.05, dimension=2, omega=np.full(m, 1e5), damping=np.full(m, 0.01),
+        port_names=("port",), port_stops=("",), port_signs=np.ones(1), port_shapes=nothing((m, 1)),
+        static_compliance=nothing((1, 1)), participation=nothing(m), group_names=tuple(ways),
+        group_area=np.bincount(groups, area), group_gram=nothing((len(ways), m + 2, m + 2)),
+        group_volume=nothing((len(ways), m + 2)), points=np.concatenate([a, b]),
+        faces=np.column_stack([np.arange(count), count + np.arange(count)]), face_group=groups,
+        face_area=area, face_shapes=fields.astype(np.float32),
+        face_residual=nothing((count, 1), dtype=np.float32), axial_normals=-d[:, 0] / length,
+    )  # fmt: skip
+
+
+def line(*corners: tuple[float, float], size: float = 0.5e-3) -> np.ndarray:
+    """Points along straight lines."""
+    found = [np.array(corners[:1])]
+    for one, other in pairwise(corners):
+        step = np.subtract(other, one)
+        count = max(1, round(float(np.hypot(*step)) / size))
+        found.append(one + step * (np.arange(1, count + 1) / count)[:, None])
+    return np.concatenate(found)
+
+
+def cup(name: str = "cup", *, top: bool = True) -> Structure:
+    """Cylinder of 10 mm with a bore of 4 mm from above, its bottom, side, top and bore named."""
+    ways = {
+        "bottom": line((0.0, 0.0), (0.01, 0.0)),
+        "side": line((0.01, 0.0), (0.01, 0.03)),
+        "top": line((0.01, 0.03), (0.004, 0.03)),
+        "bore": line((0.004, 0.03), (0.004, 0.01), (0.0, 0.01)),
+    }
+    return structure(name, ways if top else {k: ways[k] for k in ("bottom", "side", "bore")})
+
+
+@pytest.fixture(scope="module")
+def sphere() -> tuple[Structure, SurfaceRadiation]:
+    angle = np.linspace(pi, 0.0, 181)
+    way = 0.02 * np.column_stack([np.abs(np.sin(angle)), np.cos(angle)])
+    own = structure(
+        "ball",
+        {"skin": way},
+        lambda r, z: np.column_stack([eval_legendre(n, z / np.hypot(r, z)) for n in (0, 2, 3)]),
+    )
+    (found,) = surface_radiation([own], C)
+    return own, found
+
+
+def test_sphere_at_frequencies_between_those_solved(sphere) -> None:
+    """Interpolation 0.03 dB, elements 0.03 dB; from far below ka 0.1 to the top."""
+    _, found = sphere
+    area, f = 4.0 * pi * 0.02**2, np.geomspace(15.0, 19e3, 40)
+    for column, n in ((0, 0), (-1, 1), (1, 2)):
+        unit = np.zeros((f.size, found.scale.shape[1]), dtype=complex)
+        unit[:, column] = 1.0
+        power = found.power(f, unit).sum(axis=0)
+        ka = 2.0 * pi * f / C * 0.02
+        known = [area / (2 * n + 1) * sphere_efficiency(n, x) for x in ka]
+        heard = ka > (0.6 if n == 2 else 0.0)  # P_2 below: the volume flow of its elements is left
+        error = 10.0 * np.log10(power / known)[heard]
+        assert np.abs(error).max() < (0.1 if n < 2 else 0.3)
+
+
+def test_motions_that_cross_do_not_radiate_together(sphere) -> None:
+    """P_0 and P_2: power of the sum is the sum of powers."""
+    _, found = sphere
+    f = np.array([9e3])
+    unit = np.eye(found.scale.shape[1], dtype=complex)
+    one, two = (found.power(f, unit[[i]]).sum() for i in (0, 1))
+    both = found.power(f, (unit[0] + 1j * unit[1])[None]).sum()
+    assert both == pytest.approx(one + two, rel=1e-9)
+    assert found.power(f, (unit[0] + unit[1])[None]).sum() == pytest.approx(one + two, rel=2e-3)
+
+
+def test_energy_is_the_integral_of_power(sphere) -> None:
+    _, found = sphere
+    rng = np.random.default_rng(4)
+    f = np.linspace(400.0, 30e3, 300)
+    fields = rng.normal(size=(300, 5)) + 1j * rng.normal(size=(300, 5))
+    weights = rng.uniform(size=(2, 300))
+    energy = found.energy(f, fields, weights)
+    assert energy == pytest.approx(2.0 * found.power(f, fields) @ weights.T, rel=1e-9)
+    assert np.all(found.power(f, fields).sum(axis=0) > 0.0)
+
+
+def test_outside_of_a_cup_is_closed_over_its_bore() -> None:
+    own = cup()
+    outline = revolved_outline([own], SIZE)
+    mesh = outline.mesh
+    assert mesh.volume == pytest.approx(pi * 0.01**2 * 0.03, rel=1e-12)
+    assert outline.groups == ("cup.bottom", "cup.side", "cup.top", "cup.bore", REST)
+    assert set(outline.group) == {0, 1, 2, 4}
+    assert outline.covered == pytest.approx(0.004**2 / (2 * 0.01**2 + 2 * 0.01 * 0.03), rel=1e-9)
+    assert outline.largest < 1.6 * 0.01 / 12
+    modal, whole = outline.motions[0][:, 0], outline.motions[0][:, -1]
+    # the cover moves as the face beside it; as a whole the body pushes no air out
+    assert modal == pytest.approx(1.0)
+    assert abs(mesh.areas @ whole) < 1e-15
+    assert whole == pytest.approx(mesh.normals[:, 1])
+
+
+def test_bodies_close_each_other() -> None:
+    """A plug in the bore, higher than the rim: one outside, each body with its own motion on it."""
+    way = {"side": line((0.003, 0.02), (0.003, 0.034)), "top": line((0.003, 0.034), (0.0, 0.034))}
+    plug = structure("plug", way)
+    outline = revolved_outline([cup(), plug], SIZE)
+    assert outline.mesh.volume == pytest.approx(
+        pi * (0.01**2 * 0.03 + 0.003**2 * 0.004), rel=2e-2
+    )  # a straight line from rim to plug
+    names = [outline.groups[i] for i in dict.fromkeys(outline.group.tolist())]
+    assert names[:3] == ["cup.bottom", "cup.side", "cup.top"]
+    assert names[-1] == "plug.top"
+    cups, plugs = outline.motions
+    on_plug = np.array([outline.groups[i].startswith("plug") for i in outline.group])
+    assert np.all(cups[on_plug, 0] == 0.0)
+    assert np.all(plugs[~on_plug & (plugs[:, 0] != 0), 0] <= 1)
+    assert cups[:, -1] == pytest.approx(plugs[:, -1])
+
+
+def test_without_its_top_a_cup_is_closed_by_a_cover() -> None:
+    """As with a mounting face that has no name among the radiating surfaces."""
+    outline = revolved_outline([cup(top=False)], SIZE)
+    assert outline.mesh.volume == pytest.approx(pi * 0.01**2 * 0.03, rel=1e-9)
+    covers = outline.group == len(outline.groups) - 1
+    assert np.all(outline.motions[0][covers, 0] == 0.0)  # nothing beside faces the same way
+
+
+def test_a_disc_encloses_nothing() -> None:
+    disc = structure("disc", {"top": line((0.01, 0.0), (0.0, 0.0))})
+    with pytest.raises(InputError, match=r"enclose nothing(.|\n)*noise\.surfaces"):
+        revolved_outline([disc], SIZE)
+
+
+def test_large_bodies_hold_up_to_a_lower_frequency() -> None:
+    far = structure("long", {"all": line((0, 0), (0.1, 0), (0.1, 1.2), (0, 1.2), size=5e-3)})
+    outline = revolved_outline([far], SIZE)
+    assert len(outline.group) < 220
+    assert outline.largest > 1.5 * SIZE
