@@ -3,7 +3,8 @@
 Truth: rational arithmetic.  Volumes that hold next to nothing are joined by wide channels: their
 storage is below the round-off of what the channels let through.
 
-Truth: a dense solution by NumPy, and by SciPy for one step of a network; conservation of mass.
+Truth: a dense solution by NumPy, also of masses and energies of gas, and by SciPy for one step of
+a network; conservation of mass.
 """
 
 from fractions import Fraction
@@ -16,9 +17,10 @@ from numba import njit
 from scipy.optimize import root
 
 from klack.hydraulics.fluid_table import fluid_at, fluid_table
+from klack.hydraulics.gas.gas_step import HEAD, _solve
+from klack.hydraulics.mass_balance import find_links, solve_mass_balance
 from klack.network.network import Network
 from klack.network.step_function import evaluate, first, pointers
-from klack.simulation.mass_balance import find_links, solve_mass_balance
 from klack.simulation.network_run import simulate_network
 from klack.verification.benches import AMBIENT, HEPTANE, component
 
@@ -122,6 +124,43 @@ def test_answers_are_those_of_a_dense_solution(structure, n):
     A = np.array(dense(storage, channels[:-1]))
     size = np.abs(np.linalg.solve(A, np.abs(r))).max()  # its inverse has no number below zero
     np.testing.assert_allclose(x, np.linalg.solve(A, r), rtol=0.0, atol=1e-12 * size)
+
+
+@njit
+def eliminate_gas(par, A, r):
+    return _solve(first(par), first(A), r)
+
+
+@each("n", [1, 2, 3, 8, 40])
+@each("structure", STRUCTURES)
+def test_blocks_of_gas_are_solved_as_a_dense_matrix(structure, n):
+    """Two equations a chamber; those of energy are a thousand times as large."""
+    rng = np.random.default_rng(n)
+    pairs = structures(n, rng)[structure] if n > 1 else []
+    _, *arrays = links = find_links(n, tuple(pairs))
+    starts = HEAD + np.cumsum([0, *map(len, arrays)])
+    par = np.concatenate([np.zeros(HEAD), *arrays])
+    par[0], par[14:HEAD] = n, starts[:-1]
+    dense = np.zeros((n, n, 2, 2))
+    for a, b in {frozenset(pair) for pair in pairs}:
+        dense[a, b], dense[b, a] = rng.standard_normal((2, 2, 2))
+    for k in range(n):
+        dense[k, k] = rng.standard_normal((2, 2)) + 6.0 * n * np.eye(2)[:: rng.choice([1, -1])]
+    dense[:, :, 1] *= 1e3
+    right = rng.standard_normal((n, 2))
+    blocks = np.zeros((n + 2 * len(links.later), 2, 2))
+    blocks[:n] = dense[range(n), range(n)]
+    for (a, b), into_a, into_b in zip(pairs, links.place[::2], links.place[1::2], strict=True):
+        blocks[n + into_a], blocks[n + into_b] = dense[a, b], dense[b, a]
+    A = np.concatenate([blocks.ravel(), right.ravel()])
+
+    assert eliminate_gas(par, A, blocks.size)
+
+    matrix = dense.transpose(0, 2, 1, 3).reshape(2 * n, 2 * n)
+    expected = np.linalg.solve(matrix, right.ravel())
+    np.testing.assert_allclose(
+        A[blocks.size :], expected, rtol=0.0, atol=1e-12 * np.abs(expected).max()
+    )
 
 
 @each("n", [3, 10, 200])

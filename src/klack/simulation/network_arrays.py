@@ -185,7 +185,7 @@ class Nodes(NamedTuple):
     slow_gas: int  # 1 where gas leaves and enters the liquid with time constants
     settled: Vector  # table of the fluid at equilibrium: that of ``fluid`` without time constants
     gas: Vector  # numbers of the release
-    order: Index  # of :class:`klack.simulation.mass_balance.Links`, as the following
+    order: Index  # of :class:`klack.hydraulics.mass_balance.Links`, as the following
     first_link: Index
     later: Index
     filled: Index

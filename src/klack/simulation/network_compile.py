@@ -14,11 +14,11 @@ from klack.errors import InputError
 from klack.hydraulics.fluid import Fluid
 from klack.hydraulics.fluid_table import fluid_at, fluid_table
 from klack.hydraulics.gas_release import NO_RELEASE, release_numbers
+from klack.hydraulics.mass_balance import find_links
 from klack.network.rows import GROUND, BodyRow, BranchRow, ElementRow, Rows
 from klack.network.step_function import address_of
 from klack.simulation.delay_line import Lines, LineState, compile_lines, start_lines
 from klack.simulation.lasting_laws import settle
-from klack.simulation.mass_balance import find_links
 from klack.simulation.modal_step import (
     FIXED_ROWS,
     ROW,

@@ -23,8 +23,8 @@ from klack.hydraulics.gas_release import (
     settled_share,
     share_moved,
 )
+from klack.hydraulics.mass_balance import clear_links, solve_mass_balance
 from klack.network.rows import Rows
-from klack.simulation.mass_balance import clear_links, solve_mass_balance
 from klack.simulation.network_arrays import Nodes, NodeState
 from klack.simulation.phase import compiled
 

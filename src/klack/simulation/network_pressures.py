@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 
 from klack.hydraulics.fluid_table import fluid_at, pressure_at
+from klack.hydraulics.mass_balance import clear_links, solve_mass_balance
 from klack.machine.compiling.jit import inner, njit
 from klack.network.step_function import shift
-from klack.simulation.mass_balance import clear_links, solve_mass_balance
 from klack.simulation.network_arrays import ANSWER, AT_ONCE, FINE, SEEN, STORE, Y1, Step
 from klack.simulation.network_gas import (
     begin_gas,

@@ -20,6 +20,7 @@ from klack.hydraulics.gas.gas_step import (
     WORK_OF_CHAMBER,
     gas_step,
 )
+from klack.hydraulics.mass_balance import find_links
 from klack.network.gas_rows import GasChamberRow, GasRows, GasSourceRow
 from klack.network.rows import Ambient, Book, Channel, ElementRow, LimitRow, Rows, StateInput
 from klack.network.step_function import evaluate
@@ -68,7 +69,7 @@ class GasNetwork:
         n, s, b, w = len(chambers), len(sources), len(rows.branches), len(rows.walls)
         starts = np.cumsum([HEAD, CHAMBER * n, SOURCE * s, BRANCH * b, WALL * w])
         head = [n, s, b, w, len(self.ports), gas.gas_constant, gas.cv, gas.cp]
-        head += [self.ambient.pressure, self.ambient.temperature, *starts[:4]]
+        head += [self.ambient.pressure, self.ambient.temperature, *starts[:4], *[0.0] * 5]
         numbers: list[float] = list(head)
         for row in chambers.values():
             heat = STEADY if steady is not None else row.heat
@@ -85,14 +86,18 @@ class GasNetwork:
             tables += branch.table.ravel().tolist()
         for place, wall in enumerate(rows.walls):
             numbers += [node_of[wall.node], place, wall.area]
-        return np.array([*numbers, *tables], dtype=float)
+        pairs = tuple((node_of[branch.a], node_of[branch.b]) for branch in rows.branches)
+        _, *links = find_links(n, pairs)
+        ends = np.cumsum([starts[4] + len(tables), *map(len, links)])
+        numbers[14:HEAD] = ends[:-1].tolist()
+        return np.concatenate([numbers, tables, *links])
 
-    def states(self, chambers: int | None = None, sources: int | None = None) -> int:
+    def states(self, parameters: Vector | None = None) -> int:
         """Length of the state, with the working memory of a step."""
-        n = len(self.rows.chambers) if chambers is None else chambers
-        s = len(self.rows.sources) if sources is None else sources
-        work = WORK_OF_CHAMBER * n + 4 * n * n + 2 * n
-        return OF_CHAMBER * n + s + len(self.rows.branches) + work
+        par = self.parameters() if parameters is None else parameters
+        n, s, b = (int(count) for count in par[:3])
+        links = int(par[int(par[15]) + n])
+        return OF_CHAMBER * n + s + b + (WORK_OF_CHAMBER + 6) * n + 8 * links
 
     def volumes(self, y: Vector) -> dict[int, float]:
         """Volume of each chamber [m^3] with the ports at ``y``."""
@@ -121,7 +126,7 @@ class GasNetwork:
     def _steady(self, free: Mapping[int, GasChamberRow], y: Vector) -> dict[int, float]:
         """Pressures of steady flow, by growing implicit steps of gas as warm as its walls."""
         par, gas, n = self.parameters(free), self.gas, len(free)
-        states = self.states(n, len(self.rows.sources) + len(self.rows.chambers) - n)
+        states = self.states(par)
         state, volumes = np.zeros(states), self.volumes(y)
         for i, (handle, row) in enumerate(free.items()):
             p = row.pressure or self.ambient.pressure

@@ -42,15 +42,16 @@ ISOTHERMAL, STEADY = -1.0, -2.0
 the mass of its pressure, since the sum over so long a step has lost all digits.
 """
 
-HEAD = 14
+HEAD = 19
 """Numbers before the rows: chambers, sources, branches, walls, ports, R, cv, cp, ambient pressure
-and temperature, and where chambers, sources, branches and walls begin."""
+and temperature, and where chambers, sources, branches, walls, and the five arrays of
+:class:`~klack.hydraulics.mass_balance.Links` begin."""
 CHAMBER = 3  # volume, heat conductance (or ``ISOTHERMAL``, ``STEADY``), temperature of the wall
 SOURCE = 3  # temperature, where its table begins, points: times, then pressures
 BRANCH = 12  # nodes a and b; 6 of the law; ports of the lift (-1: none); table and its points
 WALL = 3  # node, port, area
 OF_CHAMBER = 5  # states: mass, energy, pressure, temperature, rate at which flows balance it
-WORK_OF_CHAMBER = 12  # numbers; behind them the equations, 4 n^2 + 2 n of n chambers
+WORK_OF_CHAMBER = 12  # numbers; behind them the equations
 
 _LEAST_THETA = 0.51
 _SWINGS = 1.2  # rate times what of the step is explicit: more would let a pressure swing
@@ -100,41 +101,93 @@ def _opening(par: Any, at: int, inp: Any, share: float) -> float:
 
 
 @inner(error_model="numpy")
-def _solve(A: Any, r: int, n: int) -> bool:
-    """Gauss with pivoting of ``n`` scaled rows ``A``, the right side at r."""
-    for i in range(n):
-        largest = 0.0
-        for j in range(n):
-            size = abs(A[i * n + j])
-            if size > largest:
-                largest = size
-        if not largest > 0.0:
-            return False
-        for j in range(n):
-            A[i * n + j] /= largest
-        A[r + i] /= largest
-    for k in range(n):
-        pivot = k
-        for i in range(k + 1, n):
-            if abs(A[i * n + k]) > abs(A[pivot * n + k]):
-                pivot = i
-        if not abs(A[pivot * n + k]) > 0.0:
-            return False
-        if pivot != k:
-            for j in range(k, n):
-                A[k * n + j], A[pivot * n + j] = A[pivot * n + j], A[k * n + j]
-            A[r + k], A[r + pivot] = A[r + pivot], A[r + k]
-        for i in range(k + 1, n):
-            c = A[i * n + k] / A[k * n + k]
-            if c != 0.0:
-                for j in range(k + 1, n):
-                    A[i * n + j] -= c * A[k * n + j]
-                A[r + i] -= c * A[r + k]
-    for k in range(n - 1, -1, -1):
-        for j in range(k + 1, n):
-            A[r + k] -= A[k * n + j] * A[r + j]
-        A[r + k] /= A[k * n + k]
+def _equations(par: Any, work: Any) -> tuple[Any, int]:
+    """Blocks of two rows, of each chamber, then both ways of each link; place of the right side."""
+    chambers = int(par[0])
+    links = int(par[int(par[15]) + chambers])
+    return shift(work, WORK_OF_CHAMBER * chambers), 4 * (chambers + 2 * links)
+
+
+@inner(error_model="numpy")
+def _invert(A: Any, at: int) -> bool:
+    """Invert a block in place, with scaled rows; False if it has no inverse."""
+    first, second = max(abs(A[at]), abs(A[at + 1])), max(abs(A[at + 2]), abs(A[at + 3]))
+    if not (first > 0.0 and second > 0.0):
+        return False
+    a, b, c, d = A[at] / first, A[at + 1] / first, A[at + 2] / second, A[at + 3] / second
+    swap = abs(c) > abs(a)
+    if swap:
+        a, b, c, d = c, d, a, b
+    share = c / a
+    rest = d - share * b
+    if not abs(rest) > 0.0:
+        return False
+    lower = -share / rest
+    upper = 1.0 / rest
+    top, right = (1.0 - b * lower) / a, -b / (a * rest)
+    if swap:
+        top, right, lower, upper = right, top, upper, lower
+    A[at], A[at + 1], A[at + 2], A[at + 3] = (
+        top / first,
+        right / second,
+        lower / first,
+        upper / second,
+    )
     return True
+
+
+@inner(error_model="numpy")
+def _less_product(A: Any, at: int, left: int, right: int) -> None:
+    """Subtract the product of two blocks from a third one."""
+    for i in range(0, 4, 2):
+        for j in range(2):
+            A[at + i + j] -= A[left + i] * A[right + j] + A[left + i + 1] * A[right + 2 + j]
+
+
+@inner(error_model="numpy")
+def _solve(par: Any, A: Any, r: int) -> bool:
+    """Eliminate chamber by chamber along the links, as in a balance of masses alone."""
+    chambers, fill = int(par[0]), int(par[17])
+    for s in range(chambers):
+        k, begin, end = _turn(par, s)
+        if not _invert(A, 4 * k):
+            return False
+        for e in range(begin, end):
+            i, own = int(par[int(par[16]) + e]), 4 * (chambers + 2 * e)
+            back, a, b = own + 4, A[own + 4], A[own + 6]
+            x, y = A[own + 5], A[own + 7]
+            A[back] = a * A[4 * k] + x * A[4 * k + 2]
+            A[back + 1] = a * A[4 * k + 1] + x * A[4 * k + 3]
+            A[back + 2] = b * A[4 * k] + y * A[4 * k + 2]
+            A[back + 3] = b * A[4 * k + 1] + y * A[4 * k + 3]
+            _less_product(A, 4 * i, back, own)
+            for row in range(2):
+                at = back + 2 * row
+                A[r + 2 * i + row] -= A[at] * A[r + 2 * k] + A[at + 1] * A[r + 2 * k + 1]
+        for e in range(begin, end):
+            own = 4 * (chambers + 2 * e)
+            for f in range(e + 1, end):
+                other, at = 4 * (chambers + 2 * f), 4 * (chambers + int(par[fill]))
+                _less_product(A, at, own + 4, other)
+                _less_product(A, at + 4, other + 4, own)
+                fill += 1
+    for s in range(chambers - 1, -1, -1):
+        k, begin, end = _turn(par, s)
+        x, y = A[r + 2 * k], A[r + 2 * k + 1]
+        for e in range(begin, end):
+            i, own = r + 2 * int(par[int(par[16]) + e]), 4 * (chambers + 2 * e)
+            x -= A[own] * A[i] + A[own + 1] * A[i + 1]
+            y -= A[own + 2] * A[i] + A[own + 3] * A[i + 1]
+        A[r + 2 * k] = A[4 * k] * x + A[4 * k + 1] * y
+        A[r + 2 * k + 1] = A[4 * k + 2] * x + A[4 * k + 3] * y
+    return True
+
+
+@inner(error_model="numpy")
+def _turn(par: Any, s: int) -> tuple[int, int, int]:
+    """Chamber that is eliminated then, and its links to later ones."""
+    at = int(par[15]) + s
+    return int(par[int(par[14]) + s]), int(par[at]), int(par[at + 1])
 
 
 @inner(error_model="numpy")
@@ -166,30 +219,27 @@ def _between(work: Any, i: int) -> None:
 @inner(error_model="numpy")
 def _set_up(par: Any, now: Any, work: Any, inp: Any, middle: float, share: float, h: float) -> None:
     chambers, R, cv, cp = int(par[0]), par[5], par[6], par[7]
-    size = 2 * chambers
-    A = shift(work, WORK_OF_CHAMBER * chambers)
-    for j in range(size * size + size):
+    A, r = _equations(par, work)
+    for j in range(r + 2 * chambers):
         A[j] = 0.0
-    r = size * size
     for i in range(chambers):
         _between(work, i)
-        c, row = WORK_OF_CHAMBER * i, 2 * i
+        c, row, block = WORK_OF_CHAMBER * i, 2 * i, 4 * i
         p1, T1, theta = work[c + 3], work[c + 4], work[c + 2]
         V1, swept = work[c + 6], work[c + 6] - work[c + 5]
         heat, wall = par[int(par[10]) + CHAMBER * i + 1], par[int(par[10]) + CHAMBER * i + 2]
         mass = p1 * V1 / (R * T1)
         A[r + row] = now[OF_CHAMBER * i] - mass
-        A[row * size + row] = V1 / (R * T1)
-        A[row * size + row + 1] = -mass / T1
-        below = (row + 1) * size
+        A[block] = V1 / (R * T1)
+        A[block + 1] = -mass / T1
         work[c + 11] = 0.0
         if heat < 0.0:
-            A[r + row + 1], A[below + row + 1] = wall - T1, 1.0
+            A[r + row + 1], A[block + 3] = wall - T1, 1.0
             continue
         warmed = h * heat * (wall - work[c + 1])
         A[r + row + 1] = now[OF_CHAMBER * i + 1] - work[c] * swept + warmed - p1 * V1 * cv / R
-        A[below + row] = theta * swept + V1 * cv / R
-        A[below + row + 1] = h * heat * theta
+        A[block + 2] = theta * swept + V1 * cv / R
+        A[block + 3] = h * heat * theta
         work[c + 11] = heat / (mass * cv)
     for k in range(int(par[2])):
         at = int(par[12]) + BRANCH * k
@@ -218,16 +268,17 @@ def _set_up(par: Any, now: Any, work: Any, inp: Any, middle: float, share: float
                 other = a if side == 0 else b
                 if other >= chambers:
                     continue
-                theta, column = work[WORK_OF_CHAMBER * other + 2], 2 * other
+                theta, block = work[WORK_OF_CHAMBER * other + 2], 4 * node
+                if other != node:
+                    block = 4 * (chambers + int(par[int(par[18]) + 2 * k + end]))
                 by_p = by_a if side == 0 else by_b
                 by_T = by_Ta if side == 0 else by_Tb
                 own = own_a if side == 0 else own_b
-                A[row * size + column] += sign * theta * by_p
-                A[row * size + column + 1] += sign * theta * by_T
+                A[block] += sign * theta * by_p
+                A[block + 1] += sign * theta * by_T
                 if not closed:
-                    below = (row + 1) * size
-                    A[below + column] += sign * theta * cp * T_up * by_p
-                    A[below + column + 1] += sign * theta * cp * (T_up * by_T + own)
+                    A[block + 2] += sign * theta * cp * T_up * by_p
+                    A[block + 3] += sign * theta * cp * (T_up * by_T + own)
 
 
 @inner(error_model="numpy")
@@ -244,11 +295,10 @@ def _limited(value: float, change: float) -> float:
 def _newton(par: Any, now: Any, work: Any, inp: Any, middle: float, share: float, h: float) -> bool:
     """Pressures and temperatures at the end of the step; False without convergence."""
     chambers, settled = int(par[0]), False
-    size = 2 * chambers
-    A = shift(work, WORK_OF_CHAMBER * chambers)
+    A, r = _equations(par, work)
     for iteration in range(_MOST_NEWTON):
         _set_up(par, now, work, inp, middle, share, h)
-        if not _solve(A, size * size, size):
+        if not _solve(par, A, r):
             return False
         worst = 0.0
         part = 1.0 if iteration < _MOST_NEWTON // 2 else 0.5
@@ -256,7 +306,7 @@ def _newton(par: Any, now: Any, work: Any, inp: Any, middle: float, share: float
             for place in range(2):
                 c = WORK_OF_CHAMBER * i + 3 + place
                 before = work[c]
-                after = _limited(before, part * A[size * size + 2 * i + place])
+                after = _limited(before, part * A[r + 2 * i + place])
                 if not after > 0.0:
                     return False
                 work[c] = after
@@ -377,7 +427,8 @@ def gas_step(par: Any, state: Any, inp: Any, out: Any) -> int:
     numbers = OF_CHAMBER * chambers + sources + int(par[2])
     now = shift(out, ports)
     work = shift(now, numbers)
-    books = shift(work, WORK_OF_CHAMBER * chambers + 4 * chambers * chambers + 2 * chambers)
+    A, r = _equations(par, work)
+    books = shift(A, r + 2 * chambers)
     supply, warmth = 0.0 * par[8], 0.0 * par[8]
     if not _place_walls(par, work, inp, 0.0, 5) or not _place_walls(par, work, inp, 1.0, 6):
         return 2

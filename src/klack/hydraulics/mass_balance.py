@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from klack.arrays import Index
-from klack.simulation.phase import phase
+from klack.machine.compiling.jit import inner
 
 __all__ = ["Links", "clear_links", "find_links", "solve_mass_balance"]
 
@@ -92,14 +92,14 @@ def find_links(volumes: int, pairs: tuple[tuple[int, int], ...]) -> Links:
     )
 
 
-@phase
+@inner(_nrt=False, error_model="numpy", forceinline=True)
 def clear_links(nodes: Any, into: Any) -> None:
     """Begin with no flow over any link."""
     for at in range(2 * nodes.first_link[nodes.volumes]):
         into[at] = 0.0
 
 
-@phase
+@inner(_nrt=False, error_model="numpy", forceinline=True)
 def solve_mass_balance(nodes: Any, into: Any, own: Any, r: Any) -> None:
     """Solve in place for the right-hand side ``r``.
 
