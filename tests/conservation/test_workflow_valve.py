@@ -57,7 +57,7 @@ def fly(valve: Valve, speed: float, gaps: dict[str, float], duration: float) -> 
     needle = parts["needle"]
     assert isinstance(needle, FlexibleBody)
     moving = needle.model_copy(update={"speed": speed})
-    moving._reduced, moving._columns = needle._reduced, needle._columns
+    moving._reduced = needle._reduced
     kept = {"needle": moving, "housing": parts["housing"], "pole": parts["pole"]}
     for name, gap in gaps.items():
         stop = parts[name]

@@ -250,7 +250,7 @@ class Recorder:
             (self.means, recording.means),
             (self.peaks, recording.peaks),
         ):
-            if not np.isfinite(extremes(values[:count])[0]).all():
+            if count and not np.isfinite(extremes(values[:count])[0]).all():
                 look, column = np.argwhere(~np.isfinite(values[:count]))[0]
                 if found is None or look < found[0]:
                     found = int(look), columns[column].name
