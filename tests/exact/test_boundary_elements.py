@@ -5,11 +5,11 @@ from math import pi
 
 import numpy as np
 import pytest
+from boundary_box import box
 from scipy.special import eval_legendre
 
 from klack.acoustics.boundary.revolved import Meridian
 from klack.acoustics.boundary.solution import LARGEST_RESIDUAL, radiation
-from klack.acoustics.boundary.triangles import Triangles
 from klack.errors import ConvergenceError, InputError
 from klack.verification import run_checks
 from klack.verification.radiation import sphere_efficiency, sphere_meridian, sphere_pressure
@@ -136,32 +136,6 @@ def test_elements_too_large_for_the_wave_are_refused() -> None:
 def test_what_is_no_closed_surface(change, words: str) -> None:
     with pytest.raises(InputError, match=words):
         Meridian(nodes=change(sphere_meridian(20).nodes))
-
-
-def box(size: float) -> Triangles:
-    """1 m by 1 m by 1.5 m, its faces in squares of two triangles."""
-    sides = np.array([1.0, 1.0, 1.5])
-    points, corners, first = [], [], 0
-    for axis in range(3):
-        for end in (0.0, 1.0):
-            u, v = [(axis + 1) % 3, (axis + 2) % 3][:: 1 if end else -1]
-            nu, nv = (max(1, round(sides[i] / size)) for i in (u, v))
-            grid = np.zeros((nu + 1, nv + 1, 3))
-            grid[..., axis] = end * sides[axis]
-            grid[..., u] = np.linspace(0.0, sides[u], nu + 1)[:, None]
-            grid[..., v] = np.linspace(0.0, sides[v], nv + 1)
-            number = first + np.arange((nu + 1) * (nv + 1)).reshape(nu + 1, nv + 1)
-            a, b, c, d = (
-                number[i : nu + i, j : nv + j] for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))
-            )
-            corners += [np.stack(t, axis=-1).reshape(-1, 3) for t in ((a, b, c), (a, c, d))]
-            points.append(grid.reshape(-1, 3) - sides / 2.0)
-            first += grid.shape[0] * grid.shape[1]
-    all_points, of = np.concatenate(points), np.concatenate(corners)
-    _, there, number = np.unique(
-        np.round(all_points, 9), axis=0, return_index=True, return_inverse=True
-    )
-    return Triangles(points=all_points[there], corners=number.ravel()[of])
 
 
 @pytest.mark.parametrize(("k", "along", "rocking"), [(0.3, 5.08e-4, 3.4e-7), (1.0, 0.0544, None)])

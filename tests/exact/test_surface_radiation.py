@@ -1,14 +1,18 @@
 """Outside of held bodies and its radiation over frequency: sphere, cups, what is open."""
 
+from dataclasses import replace
 from itertools import pairwise
 from math import pi
 
 import numpy as np
 import pytest
+from boundary_box import box
 from scipy.special import eval_legendre
 
 from klack.acoustics.boundary.outline import REST, revolved_outline
 from klack.acoustics.boundary.over_frequency import SurfaceRadiation, surface_radiation
+from klack.acoustics.boundary.solid_outline import solid_outline
+from klack.acoustics.boundary.solution import radiation
 from klack.bodies.reduction.structure import Structure
 from klack.errors import InputError
 from klack.verification.radiation import sphere_efficiency
@@ -164,3 +168,70 @@ def test_large_bodies_hold_up_to_a_lower_frequency() -> None:
     outline = revolved_outline([far], SIZE)
     assert len(outline.group) < 220
     assert outline.largest > 1.5 * SIZE
+
+
+def block(size: float, *, top: bool = True) -> Structure:
+    """Box of 10 x 10 x 15 mm in triangles, with one field that is 1 on its bottom."""
+    mesh = box(size)
+    upwards = mesh.normals[:, 2]
+    kept = np.flatnonzero((upwards < 0.5) | top)
+    group = np.where(upwards[kept] < -0.5, 0, 1)
+    points, faces = 0.01 * mesh.points, mesh.corners[kept]
+    flat = structure("block", {"bottom": line((0.0, 0.0), (1.0, 0.0), size=1.0)})
+    nothing = np.zeros((2, 3, 3))
+    return replace(
+        flat, dimension=3, points=points, faces=faces, face_group=group,
+        face_area=1e-4 * mesh.areas[kept], axial_normals=upwards[kept],
+        face_shapes=(group == 0)[:, None].astype(np.float32), group_names=("bottom", "sides"),
+        face_residual=np.zeros((len(kept), 1), dtype=np.float32), group_gram=nothing,
+        group_area=1e-4 * np.bincount(group, mesh.areas[kept]), group_volume=nothing[0],
+    )  # fmt: skip
+
+
+def test_a_solid_without_its_top_is_covered() -> None:
+    whole, cut = (solid_outline([block(0.25, top=top)]) for top in (True, False))
+    assert whole.covered == 0.0
+    assert cut.mesh.volume == pytest.approx(1.5e-6, rel=1e-9)
+    assert cut.covered == pytest.approx(1.0 / (2.0 + 4.0 * 1.5), rel=1e-9)
+    for outline in (whole, cut):
+        motion = outline.motions[0]
+        assert abs(outline.mesh.areas @ motion[:, -1]) < 1e-15
+        # divided into four, each with the field of its face
+        assert outline.mesh.areas @ motion[:, 0] == pytest.approx(1e-4, rel=1e-6)
+    k = 100.0
+    one, other = (radiation(o.mesh, k, o.motions[0][:, [0, -1]]).matrix for o in (whole, cut))
+    assert np.diag(other) == pytest.approx(np.diag(one), rel=0.02)
+
+
+def test_a_cover_moves_as_the_faces_around_it_of_its_direction() -> None:
+    """A hole in the middle of the bottom: two triangles left out."""
+    own = block(0.2)
+    middle = own.points[own.faces].mean(axis=1)
+    hole = np.flatnonzero((middle[:, 2] < -0.0074) & (np.abs(middle[:, :2]).max(axis=1) < 1.1e-3))
+    assert hole.size == 2
+    kept = np.setdiff1d(np.arange(len(own.faces)), hole)
+    names = ("faces", "face_group", "face_area", "axial_normals", "face_shapes", "face_residual")
+    outline = solid_outline([replace(own, **{name: getattr(own, name)[kept] for name in names})])
+    assert outline.covered == pytest.approx(0.04 / 8.0, rel=1e-9)
+    rest = outline.group == len(outline.groups) - 1
+    assert outline.motions[0][rest, 0] == pytest.approx(1.0)
+    assert outline.mesh.areas @ outline.motions[0][:, 0] == pytest.approx(1e-4, rel=1e-6)
+
+
+def test_a_solid_over_frequency() -> None:
+    """Between the frequencies that were solved, 0.1 dB."""
+    own = block(0.5)
+    (found,) = surface_radiation([own], C)
+    outline = solid_outline([own])
+    for f in (700.0, 3300.0, 12e3):
+        exact = radiation(outline.mesh, 2.0 * pi * f / C, outline.motions[0][:, [0, -1]]).matrix
+        unit = np.eye(3, dtype=complex)[[0, 2]]
+        power = [found.power(np.array([f]), row[None]).sum() for row in unit]
+        assert 10.0 * np.log10(power / np.diag(exact)) == pytest.approx(0.0, abs=0.1)
+
+
+def test_solids_that_cannot_be_used() -> None:
+    with pytest.raises(InputError, match="bodies of revolution beside solids"):
+        surface_radiation([block(0.5), cup()], C)
+    with pytest.raises(InputError, match=r"faces on the outside(.|\n)*more coarsely"):
+        solid_outline([block(0.06)])

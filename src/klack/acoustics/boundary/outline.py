@@ -14,11 +14,12 @@ from math import ceil
 import numpy as np
 
 from klack.acoustics.boundary.revolved import Meridian
+from klack.acoustics.boundary.triangles import Triangles
 from klack.arrays import Floats, Ints, Matrix, Vector
 from klack.bodies.reduction.structure import Structure
 from klack.errors import InputError
 
-__all__ = ["REST", "Outline", "revolved_outline"]
+__all__ = ["REST", "Outline", "not_closed", "revolved_outline"]
 
 REST = "rest of the outside"
 """Name of what is no named surface of a body: covers, and other bodies that it takes along."""
@@ -46,7 +47,7 @@ class Outline:
         Size of the largest element.
     """
 
-    mesh: Meridian
+    mesh: Meridian | Triangles
     motions: tuple[Matrix, ...]
     groups: tuple[str, ...]
     group: Ints
@@ -88,7 +89,7 @@ def revolved_outline(structures: Sequence[Structure], size: float) -> Outline:
     """
     pieces = _seen_from_beside(_pieces(structures))
     if not len(pieces.face):
-        raise _not_closed("no face that can be seen from beside")
+        raise not_closed("no face that can be seen from beside")
     way = _closed(_in_order(pieces))
     radius = float(way.ends[..., 0].max())
     length = float(np.hypot(*(way.ends[:, 1] - way.ends[:, 0]).T).sum())
@@ -179,7 +180,7 @@ def _outline(structures: Sequence[Structure], way: _Pieces, size: float) -> Outl
     try:
         mesh = Meridian(nodes=nodes)
     except InputError:
-        raise _not_closed("pieces that enclose nothing") from None
+        raise not_closed("pieces that enclose nothing") from None
     motions = tuple(_motion(own, s, way, parts, mesh) for s, own in enumerate(structures))
     return Outline(
         mesh=mesh,
@@ -244,7 +245,7 @@ def _check_simple(nodes: Matrix) -> None:
     one = side(a[:, None], b[:, None], a[None]) * side(a[:, None], b[:, None], b[None])
     other = one.T
     if np.any((one < 0.0) & (other < 0.0)):
-        raise _not_closed("pieces that joined by straight lines cross each other")
+        raise not_closed("pieces that joined by straight lines cross each other")
 
 
 def _motion(own: Structure, s: int, way: _Pieces, parts: Sequence[Ints], mesh: Meridian) -> Matrix:
@@ -268,10 +269,11 @@ def _motion(own: Structure, s: int, way: _Pieces, parts: Sequence[Ints], mesh: M
     return mean
 
 
-def _not_closed(got: str) -> InputError:
+def not_closed(got: str) -> InputError:
+    """What is said of surfaces that enclose nothing."""
     return InputError(
         "noise.radiation: elements",
         got=got,
-        expected="named surfaces of the held bodies that, seen from beside, enclose the valve",
+        expected="named surfaces of the held bodies that enclose the valve, but for openings",
         hint="name its whole outside in noise.surfaces, or take radiation: piston.",
     )

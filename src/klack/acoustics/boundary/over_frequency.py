@@ -25,7 +25,8 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.acoustics.boundary.outline import Outline, revolved_outline
+from klack.acoustics.boundary.outline import Outline, not_closed, revolved_outline
+from klack.acoustics.boundary.solid_outline import solid_outline
 from klack.acoustics.boundary.solution import radiation
 from klack.arrays import Cube, Matrix, Vector
 from klack.bodies.reduction.structure import Structure
@@ -134,12 +135,18 @@ def surface_radiation(
     ----------
     sound_speed [m/s]
     """
-    outline = revolved_outline(structures, sound_speed / TOP / _PER_WAVE)
+    dimensions = {own.dimension for own in structures}
+    if len(dimensions) > 1:
+        raise not_closed("bodies of revolution beside solids")
+    if dimensions == {3}:
+        outline = solid_outline(structures)
+    else:
+        outline = revolved_outline(structures, sound_speed / TOP / _PER_WAVE)
     found = []
     solved = remembered(
         cache,
         "surface radiation",
-        (outline.mesh.nodes, outline.motions, outline.group, sound_speed, TOP),
+        (outline.mesh, outline.motions, outline.group, sound_speed, TOP),
         lambda: _solved(outline, sound_speed),
         pack=lambda arrays: Entry(arrays=arrays),
         unpack=lambda entry: dict(entry.arrays),
