@@ -198,14 +198,34 @@ def test_a_log_keeps_every_bit(tmp_path, alone):
     assert strokes_mark(changed, 1, None) != mark
 
 
+class Told:
+    """Keeps the lines of a progress report."""
+
+    def __init__(self):
+        self.lines = []
+
+    def __call__(self, stage, fraction):
+        assert stage == "strokes"
+        assert 0.0 <= fraction <= 1.0
+
+    def remark(self, line):
+        self.lines.append(line)
+
+
 def test_a_row_starts_where_it_has_ended(setup, starts):
     """Truth: the end of each stroke, and the draw that independent ones would have."""
     case = valve_case("shots: {count: 3, carry: true}")
     valve = replace(setup.valve, case=case)
-    log = STROKE_LOG.open(None, "")
+    log, told = STROKE_LOG.open(None, ""), Told()
     compute_strokes(
-        replace(setup, valve=valve), replace(starts, case=case), ("dry",), 3, 1, log, silent
+        replace(setup, valve=valve), replace(starts, case=case), ("dry",), 3, 1, log, told
     )
+    assert [line.partition(",")[0] for line in told.lines] == [
+        "centred stroke (dry): 1 of 4",
+        *(f"stroke {k} (dry): {k + 2} of 4" for k in range(3)),
+    ]
+    assert all(" s each" in line for line in told.lines)
+    assert [line.endswith(" left") for line in told.lines] == [True, True, True, False]
     for index in (1, 2):
         end, row = log.done["dry", index - 1].end, log.done["dry", index].stroke
         lean = np.array([end[4], -end[3]])

@@ -18,8 +18,9 @@ from hypothesis import strategies as st
 from klack.analyses.study import live
 from klack.analyses.study.asked_points import PointRow
 from klack.analyses.study.evaluation import row_warnings
-from klack.analyses.study.live import Pace, duration_text
+from klack.analyses.study.live import Pace
 from klack.errors import InputError
+from klack.machine.progress import duration_text
 from klack.studies.fronts import compromise, find_front, spread_over
 from klack.studies.samples import (
     count_exceedance,

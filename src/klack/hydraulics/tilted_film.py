@@ -335,6 +335,7 @@ def solved_film(
     room.rows[at.mobility : at.change, :S], room.rows[at.change : at.all, :S] = mobility.T, change.T
     room.rows[at.mobility : at.change, S] = mobility[0]
     room.rows[at.closing : at.moves, :S] = closing.T
+    room.rows[at.moves : at.mobility] = 1.0
     room.head[:], room.still[:] = edges
     held, slopes = np.zeros(S), np.zeros((w, w))
     film_forces(land, room, tension, held, rate, slopes)
@@ -375,9 +376,9 @@ class Land(NamedTuple):
 def land_of(film: SectorFilm, ways: Array) -> Land:
     """Return the arrays of a film, for slopes along some ways of its heights, shape (S N, w)."""
     apart = ways.T.reshape(ways.shape[1], film.sectors, film.circles).transpose(0, 2, 1)
-    load = film.between.T @ film.load
+    load, (G, Q) = film.between.T @ film.load, film.load.shape
     return Land(
-        *(film.sectors, film.circles, *film.load.shape, film.shared),
+        *(film.sectors, film.circles, G, Q, film.shared),
         np.ascontiguousarray(apart),
         np.ascontiguousarray(np.einsum("ja,wjk->wak", load, apart)),
         *(np.ascontiguousarray(part) for part in (film.between, film.along, film.around)),
@@ -448,7 +449,7 @@ def film_room(S: int, N: int, G: int, Q: int, shared: int, w: int) -> FilmRoom:
     """Room for films of so many sectors, circles, points, functions and ways."""
     o = Q - shared
     return FilmRoom(
-        np.ones((film_rows(N, G, Q, w).all, _STRIDE)),
+        np.empty((film_rows(N, G, Q, w).all, _STRIDE)),
         np.zeros((G, Q)),
         np.zeros(N),
         np.zeros(ring_of(S, o, shared, 1 + w).all),

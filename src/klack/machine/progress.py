@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-__all__ = ["PointCount", "Progress", "counted", "remark", "silent"]
+__all__ = ["PointCount", "Progress", "counted", "duration_text", "remark", "silent"]
 
 Progress = Callable[[str, float], None]
 """Called with stage and fraction, 0 to 1."""
@@ -43,3 +43,11 @@ def counted(progress: Progress, count: PointCount) -> None:
 
 def silent(stage: str, fraction: float) -> None:
     """No progress report."""
+
+
+def duration_text(seconds: float) -> str:
+    """``1 h 40 min``, ``5 min``, ``40 s``: to two digits or so."""
+    if seconds < 100.0:
+        return f"{seconds:.0f} s"
+    minutes = round(seconds / 60.0)
+    return f"{minutes} min" if minutes < 100 else f"{minutes // 60} h {minutes % 60} min"

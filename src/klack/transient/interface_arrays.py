@@ -403,7 +403,7 @@ class Near(NamedTuple):
 
     block: Vector  # (n n,) their part of A
     rows: Vector  # (n M,) of the traces
-    index: NDArray[np.int64]  # (n,)
+    chosen: NDArray[np.int64]  # (n,)
     place: NDArray[np.int64]  # (n,) of a point among them, -1: left out
     known: Vector  # (2,) how many, and by which first entry their A is known
     low: Vector  # (n,) [m] least gap of each point at its speed

@@ -46,10 +46,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.arrays import Index, Matrix, Vector
-from klack.machine.compiling.jit import inner, njit
+from klack.machine.compiling.jit import FAST, inner, njit
 from klack.simulation.phase import sums
 from klack.transient.active_set import solve_active
-from klack.transient.guide_step import begin_rub, count_bearing, no_rub, rub_guide, squeeze_guide
+from klack.transient.guide_step import (
+    GuideRub,
+    begin_rub,
+    count_bearing,
+    no_rub,
+    rub_guide,
+    squeeze_guide,
+)
 from klack.transient.interface_arrays import (
     CONTACT_STEPS,
     DAMPING,
@@ -424,9 +431,12 @@ def _look(points: ContactPoints, step: Step) -> tuple[float, float]:
     """Gaps without new contact forces: the smallest, and the largest magnitude [m]."""
     least, widest = 1e300, 0.0
     for k in range(len(points.gap)):
-        step.open_gap[k] += points.gap[k]
-        least = min(least, step.open_gap[k])
-        widest = max(widest, abs(step.open_gap[k]))
+        row, gap = points.traces[k], points.gap[k]
+        for i in range(len(step.q)):
+            gap += row[i] * step.q[i]
+        step.open_gap[k] = gap
+        least = min(least, gap)
+        widest = max(widest, abs(gap))
         step.lam[k] = 0.0
     return least, widest
 
@@ -768,11 +778,30 @@ def march(
     record
         Out, for at least ``steps`` steps.
     """
-    n, books = len(points.gap), state.books
-    step = _start(modes, outside, bore, films, n, len(state.rubbing.across))
-    rubs_guide = False
+    step = _start(modes, outside, bore, films, len(points.gap), len(state.rubbing.across))
+    heights = 0
     if bore is not None:
-        guide = no_rub(len(bore.clearance), len(modes.push))
+        heights = len(bore.clearance)
+    guide = no_rub(heights, len(modes.push))
+    return _advance(steps, wait, modes, outside, points, bore, films, state, record, step, guide)
+
+
+@inner(_nrt=False, error_model="numpy", fastmath=FAST)
+def _advance(
+    steps: int,
+    wait: int,
+    modes: Modes,
+    outside: Outside,
+    points: ContactPoints,
+    bore: Guide | None,
+    films: Films | None,
+    state: State,
+    record: Record,
+    step: Step,
+    guide: GuideRub,
+) -> tuple[int, int]:
+    """As :func:`march`, without counted references."""
+    n, books, rubs_guide = len(points.gap), state.books, False
     if films is not None:
         for k in range(len(films.lowest)):
             bend_faces(films, k, film_change(state, k, 1.0, 0.0), points.gap)
@@ -818,7 +847,6 @@ def march(
         answer = 0.0  # of the spring to the forces of the contact
         taken_up = 0.0  # by what yields, or by layers beyond the potential
         if n:
-            np.dot(points.traces, step.q, step.open_gap)
             least, widest = _look(points, step)
             lowest = least
             if least < 0.0 or state.contact.counts[0] > 0:
@@ -905,6 +933,8 @@ def _choose(
     Those of the last time where they are enough.
     """
     n, M, known = len(points.gap), len(state.q), near.known
+    if n == 0:
+        return 0, 1e300
     cut, room = max(_low_gaps(points, near, films, state, time), 0.0), 1e300
     enough = known[0] > 0.0 and known[1] == points.A[0, 0]
     for k in range(n):
@@ -917,15 +947,15 @@ def _choose(
     for k in range(n):
         near.place[k] = -1
         if near.low[k] < cut + margin or state.lam[k] > 0.0 or state.contact.active[k]:
-            near.index[m] = k
+            near.chosen[m] = k
             near.place[k] = m
             m += 1
         else:
             room = min(room, near.low[k])
     for s in range(m):
-        row, trace = points.A[near.index[s]], points.traces[near.index[s]]
+        row, trace = points.A[near.chosen[s]], points.traces[near.chosen[s]]
         for j in range(m):
-            near.block[s * m + j] = row[near.index[j]]
+            near.block[s * m + j] = row[near.chosen[j]]
         for i in range(M):
             near.rows[s * M + i] = trace[i]
     known[0], known[1] = float(m), points.A[0, 0]
@@ -983,7 +1013,7 @@ def march_near(
     """
     M, contact = len(state.q), state.contact
     m, room = _choose(points, near, films, state, steps * modes.step, margin)
-    index, carrying = near.index[:m], contact.counts[0]
+    index, carrying = near.chosen[:m], contact.counts[0]
     lam, carried, active = state.lam[index], state.carried[index], contact.active[index]
     order = near.place[contact.points[: max(carrying, 1)]]
     own = np.zeros(m, dtype=np.int64)

@@ -115,6 +115,7 @@ _AT_REST = 0  # 1: steps are long, and so is the inverse over the points that ca
 _LOST = 1  # energy that damping took in flights [J]
 _STEADILY = 2  # 1: forces changed little in the last record
 _MARGIN, _MORE = 0.5e-6, 3.0  # [m] gaps of points that are looked at, and after one was missed
+_EVERY = 1.0  # [m] with all of them
 _HALF_BOUNCES = 8.0  # in the time to rest of rigid bodies
 _NONE = Outside(1.0, 0.0)  # the force of the network comes as the modal force of one newton
 
@@ -661,11 +662,11 @@ class _Moving:
                 at[GUESS + here] = 0.0
                 clock[7] += 1
             push = self.P @ at[GUESS : GUESS + here] + self.sides.push
-            found = self._march(modes._replace(push=push), count, points, rest)
+            found = self._march(modes._replace(push=push), count, points, rest, kept)
             while not rest and self._too_long(found, steps, count):
                 self._put_back(kept)
                 count, modes = self._cut(steps, 2 * count)
-                found = self._march(modes._replace(push=push), count, points, rest)
+                found = self._march(modes._replace(push=push), count, points, rest, kept)
             if found is None and not rest:
                 raise ConvergenceError(
                     f"needle: no contact forces found at {1e6 * t:.4g} us.\n"
@@ -749,7 +750,9 @@ class _Moving:
     def _length(self, level: int, default: int) -> int:
         return self.steps.get(level, default) if level >= 0 else default
 
-    def _march(self, modes: Modes, count: int, points: bool, rest: bool) -> Record | None:
+    def _march(
+        self, modes: Modes, count: int, points: bool, rest: bool, kept: _Kept
+    ) -> Record | None:
         """Fine steps under the constant modal force ``modes.push``; None where they fail."""
         n, ways = (self.model.count, self.model.ways) if points else (0, 0)
         if (count, points) not in self.records:  # each step fills its rows anew
@@ -765,8 +768,11 @@ class _Moving:
             touching = (self.resting if rest else self.points)._replace(gap=self.gap0)
         state = self.state if points else self.apart
         bore = self.bore if len(self.bore.clearance) else None
-        if points and not self.model.ways:
-            status, kept = LEFT_OUT, self._keep()
+        if self.model.ways:
+            march_on = self.march[points]
+            _, status = march_on(count, 0, modes, _NONE, touching, bore, self.films, state, record)
+        else:
+            status = LEFT_OUT
             while status == LEFT_OUT:
                 status = self.march_near(
                     *(count, float(self.margin), modes, _NONE, touching, self.near),
@@ -775,9 +781,8 @@ class _Moving:
                 if status == LEFT_OUT:
                     self._put_back(kept)
                     self.margin *= _MORE
-        else:
-            march_on = self.march[points]
-            _, status = march_on(count, 0, modes, _NONE, touching, bore, self.films, state, record)
+                    if self.margin > _EVERY:  # no number is compared with them
+                        status, self.margin = FAILED, _MARGIN
         failed = status == FAILED or not np.all(np.isfinite(self.q))
         return None if failed else record
 

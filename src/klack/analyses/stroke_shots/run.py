@@ -39,7 +39,14 @@ from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles, find_roles
 from klack.errors import ConvergenceError, InputError
 from klack.machine.cache.result_cache import result_cache
-from klack.machine.progress import Progress, silent
+from klack.machine.progress import (
+    PointCount,
+    Progress,
+    counted,
+    duration_text,
+    remark,
+    silent,
+)
 from klack.machine.stages import StageClock, collected_warnings
 from klack.schematic.picture import schematic_svg
 from klack.transient.spatial_run import SpatialValve
@@ -185,14 +192,15 @@ def compute_strokes(
     carry = shots_of_valve(starts.case).carry
     total = len(variants) * (count + 1)
     progress("strokes", 0.0)
+    pace = _Pace(progress, total, len(log.done))
     first = [starts.centred()] + ([] if carry else [starts.drawn(i) for i in range(count)])
     with LoggedWork(
         run_one_stroke, setup, workers, log, lambda key: f"stroke {key[1]} ({key[0]})"
     ) as work:
-        _complete(work, dict.fromkeys(variants, first), total, progress)
+        _complete(work, dict.fromkeys(variants, first), pace)
         for index in range(count if carry else 0):
             following = {name: [_next(starts, name, index, log)] for name in variants}
-            _complete(work, following, total, progress)
+            _complete(work, following, pace)
 
 
 def _next(starts: Starts, variant: Variant, index: int, log: StrokeLog) -> StrokeStart:
@@ -211,16 +219,36 @@ def _next(starts: Starts, variant: Variant, index: int, log: StrokeLog) -> Strok
 def _complete(
     work: LoggedWork[StrokeKey, StrokeOutcome],
     starts: Mapping[Variant, Sequence[StrokeStart]],
-    total: int,
-    progress: Progress,
+    pace: "_Pace",
 ) -> None:
     tasks: dict[StrokeKey, StrokeTask] = {
         (name, start.index): StrokeTask(variant=name, start=start)
         for name, items in starts.items()
         for start in items
     }
-    for _ in work.completed(tasks):
-        progress("strokes", min(len(work.log.done) / total, 1.0))
+    for key in work.completed(tasks):
+        pace.tell(key, len(work.log.done))
+
+
+class _Pace:
+    """Says of each stroke that it is done, how long one takes, and how long all others will."""
+
+    def __init__(self, progress: Progress, total: int, before: int) -> None:
+        self._progress, self._total, self._before = progress, total, before
+        self._begin = perf_counter()
+
+    def tell(self, key: StrokeKey, done: int) -> None:
+        """A line for a stroke, one of so many that are done."""
+        variant, index = key
+        each = (perf_counter() - self._begin) / max(done - self._before, 1)
+        left = max(self._total - done, 0)
+        which = "centred stroke" if index == CENTRED else f"stroke {index}"
+        text = f"{which} ({variant}): {done} of {self._total}, {each:.2g} s each"
+        if left:
+            text += f", {duration_text(each * left)} left"
+        counted(self._progress, PointCount(done=done, most=self._total, left=each * left))
+        remark(self._progress, text)
+        self._progress("strokes", min(done / self._total, 1.0))
 
 
 def _variant(setup: StrokeSetup, name: Variant, count: int, log: StrokeLog) -> VariantShots:

@@ -8,9 +8,9 @@ from time import perf_counter
 
 from klack.analyses.study.analysis import STUDY
 from klack.analyses.study.record import StudyRecord
-from klack.machine.progress import PointCount, Progress, counted, remark
+from klack.machine.progress import PointCount, Progress, counted, duration_text, remark
 
-__all__ = ["LIVE", "LiveRecord", "Pace", "ProgressPage", "Seen", "duration_text"]
+__all__ = ["LIVE", "LiveRecord", "Pace", "ProgressPage", "Seen"]
 
 
 _FIRST, _LONGEST = 5.0, 60.0  # [s] until the first line, and between later ones
@@ -42,14 +42,6 @@ class Pace:
             text += f", {duration_text(left)} left"
         remark(self._progress, f"{text}; {best}" if best else text)
         return True
-
-
-def duration_text(seconds: float) -> str:
-    """``1 h 40 min``, ``5 min``, ``40 s``: to two digits or so."""
-    if seconds < 100.0:
-        return f"{seconds:.0f} s"
-    minutes = round(seconds / 60.0)
-    return f"{minutes} min" if minutes < 100 else f"{minutes // 60} h {minutes % 60} min"
 
 
 LIVE = "live"
