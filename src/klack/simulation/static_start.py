@@ -58,13 +58,12 @@ from klack.simulation.static_rows import (
     EMPTY,
     FOUND,
     MORE,
+    NONE,
     Balance,
     Begin,
     Couplings,
     Parts,
     State,
-    at_rest,
-    balance_at,
     fluids_at,
     newton_steps,
 )
@@ -592,9 +591,12 @@ class _Balance:
 
     def evaluate(self, state: State) -> bool:
         """Forces and flows with their slopes, contacts included; False if a part fails."""
-        return self._prepare(state) and bool(
-            balance_at(self.parts, self.couplings, self.now, state.y, state.p)
-        )
+        return self._prepare(state) and self._balances(state)
+
+    def _balances(self, state: State) -> bool:
+        begin = Begin(state.z, state.z, state.z, 0.0)  # of no step
+        given = self.parts, self.couplings, self.now, begin, state, np.zeros(2), 0
+        return bool(newton_steps(*given) != NONE)
 
     def _prepare(self, state: State) -> bool:
         """What elements and lines of cells say outside of compiled code; False if one fails."""
@@ -603,10 +605,8 @@ class _Balance:
             moved = state.copy()
             moved.y[port] += self.move
             found[:] = np.nan
-            if self._keep_states(moved.y) and at_rest(
-                self.parts, at, moved.y, moved.p, now.force, now.inflow, now.size, now.report
-            ):
-                found[:first], found[first:] = now.force, now.inflow
+            if self._keep_states(moved.y) and self._balances(moved):
+                found[:first], found[first:] = now.acting, now.inflow
         for place, k in enumerate(self.column_wave, self.drop.size - len(self.column_wave)):
             at_a, flow = float(state.p[self.ends[place, 0]]), float(state.m[place])
             self.drop[place], self.friction[place] = self.network.rows.waves[k].drop(at_a, flow)
