@@ -10,7 +10,7 @@ A peak force is the largest mean of a step.  Two things make it too low:
 
 Where the needle swings on its stop until a load is taken away, the first impact depends on the
 phase of that swing.  Steps of length ``h`` make each period ``T`` late by ``(2 pi h / T)^2 / 12``
-of it.
+of it, and steps in which the force rises and falls by ``(2 pi h / T)^4 / 720``.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -43,11 +43,19 @@ def impact_doubts(
     events: Sequence[ImpactEvent],
     interfaces: Mapping[str, InterfaceRecord],
     step: float,
+    longest: float,
 ) -> Iterator[str]:
     """Sentences on the first complete impact on each stop that the steps do not resolve.
 
     That is, the peak misses 0.05 % or more, or the impact starts 0.05 us or more off, because the
     stop swung before.
+
+    Parameters
+    ----------
+    step [s]
+        Fine step.
+    longest [s]
+        In longer steps the force of a closed contact rises and falls.
     """
     seen = set[str]()
     for event in events:
@@ -55,7 +63,8 @@ def impact_doubts(
             continue
         seen.add(event.stop)
         record = interfaces[event.stop]
-        late, times, period = late_by_swinging(record, event.time, _last(events, event.time))
+        since = _last(events, event.time)
+        late, times, period = late_by_swinging(record, event.time, since, longest=longest)
         if late > _LATE:
             shorter = min(_rounded_down(step * sqrt(_AIM * _LATE / late)), step)
             yield (
@@ -155,11 +164,16 @@ def missing_peak(
 
 
 def late_by_swinging(
-    record: InterfaceRecord, time: float, since: float = 0.0
+    record: InterfaceRecord, time: float, since: float = 0.0, *, longest: float = np.inf
 ) -> tuple[float, int, float]:
     """Delay [s] of the last contact before ``time``, a first touch, by its swings.
 
     None where that contact had ended before ``since`` [s], when a stop was touched.
+
+    Parameters
+    ----------
+    longest [s]
+        In longer steps the force rises and falls.
 
     Returns
     -------
@@ -184,7 +198,10 @@ def late_by_swinging(
     share = np.abs(np.diff(force[ends])) / (force[ends[1:]] + force[ends[:-1]])
     share = np.minimum(share, np.append(0.0, share[:-1]))  # rest before it is no swing
     periods = 2.0 * np.diff(middle[ends])
-    each = 0.5 * share * periods * (pi / np.diff(ends)) ** 2 / 12.0  # in steps per half a swing
+    step = record.step[part][ends[0] : ends[-1]]
+    angle = 2.0 * pi * step / np.repeat(periods, np.diff(ends))
+    shift = np.where(step > longest, angle**4 / 720.0, angle**2 / 12.0)
+    each = share * np.add.reduceat(shift * step, ends[:-1] - ends[0])
     if not share.any():
         return 0.0, 0, 0.0
     swings = round(0.5 * float(np.sum(share > 0.5 * share.max())))

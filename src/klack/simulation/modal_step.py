@@ -35,6 +35,7 @@ __all__ = [
     "ROW_V",
     "advance",
     "apply_forces",
+    "average",
     "copy_state",
     "kick",
     "watch",
@@ -141,6 +142,19 @@ def watch(W: Any, n: int, of: int, row: int) -> float:
     y = 0.0
     for i in range(n):
         y += W[of * _N + i] * W[row * _N + i]
+    return y
+
+
+@njit(fastmath=FAST, _nrt=False, error_model="numpy", forceinline=True)
+def average(W: Any, n: int, rate: float, row: int) -> float:
+    """Sum of the mean displacements over a step without forces times row ``row``.
+
+    ``rate`` is one over the length of the step; the forces of the last one are in the state.
+    """
+    y = 0.0
+    for i in range(n):
+        own = 1.0 - W[11 * _N + i] * (W[12 * _N + i] + 0.5 * W[8 * _N + i])
+        y += W[row * _N + i] * (own * W[i] + rate * W[8 * _N + i] * W[_N + i])
     return y
 
 

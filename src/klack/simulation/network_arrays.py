@@ -12,6 +12,7 @@ __all__ = [
     "AHEAD",
     "ANSWER",
     "AT_ONCE",
+    "AVERAGE",
     "BEFORE",
     "BEFORE_2",
     "BEFORE_3",
@@ -41,6 +42,7 @@ __all__ = [
     "SEEN",
     "STORE",
     "SUPPLY",
+    "TURN",
     "WITHIN",
     "WITHIN_BEGIN",
     "WORK",
@@ -111,7 +113,9 @@ LAST = 18 * PORTS  # forces of elements and fluid in the last macro step
 RISE = 19 * PORTS  # change of the guessed forces over the macro step
 RISE_MISSED = 20 * PORTS  # what is missing of it
 MEAN = 21 * PORTS  # LAST, with what acts at once since then
-ROWS_AT = 22
+TURN = 22 * PORTS  # change of all forces over a sub-step with a swinging contact
+AVERAGE = 23 * PORTS  # mean displacements over it without its forces
+ROWS_AT = 24
 
 
 class Bodies(NamedTuple):
@@ -133,6 +137,7 @@ class Bodies(NamedTuple):
     course: Vector
     G: Vector  # (SIZES, PORTS, PORTS) displacement at the end of a step per unit force during it
     Gr: Vector  # the same per force that rises evenly by one during it and has no mean
+    Gm: Vector  # mean displacement over the step per such a force
     at: Vector  # (ROWS_AT, PORTS) what the ports do, row by row: see ``Y0`` and the following names
 
 
@@ -239,13 +244,16 @@ class InterfaceState(NamedTuple):
     rate: Vector
     force: Vector
     chi: Vector
-    deepest: Vector  # indentation since a damped contact was touched
+    deepest: Vector  # indentation since the contact was touched
     since: Vector  # closed since; infinity while open
     film_before: Vector  # film force of the last step if the contact closed in it, else 0
     pulled: Vector  # 1 of a film that pulls as much as it can
     force_before: Vector  # force at the end of the macro step before the last
     far: Vector  # 1 of an interface whose film acts among elements
     calm: Vector  # time since when its force has changed little
+    bend: Vector  # second derivative of the force in the last step, over 12; infinity: not known
+    jerk: Vector  # its largest change per time in the last macro step
+    rough: Vector  # time before which no longer steps are tried while the contact is closed
 
 
 class Sliders(NamedTuple):
@@ -361,11 +369,14 @@ class InterfaceTrial(NamedTuple):
     most: Vector
     chi: Vector  # dissipation factor at the start of the step
     opening: Vector  # speed at which the centres of mass part then, where it was asked
-    first: Vector  # force in the first sub-step
+    first: Vector  # force in the first sub-step, or at its start
+    stiffness: Vector  # slope of a force that rises or falls within the step; 0: of its mean alone
+    rise: Vector  # change of the force over the step
+    bow: Vector  # middle of the gaps at both ends less the mean gap
     kept: Vector  # state at the start of the macro step
 
 
-KEPT = 16
+KEPT = 18
 """Numbers of an interface that a repeated macro step starts from."""
 
 

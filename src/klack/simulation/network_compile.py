@@ -235,11 +235,12 @@ class _Answers(NamedTuple):
     moved: Cube  # displacement at the end per unit force
     moved_by_rise: Cube  # ... per force that rises evenly by one and has no mean
     speed: Cube  # speed at the end per unit force
+    mean_by_rise: Cube  # mean displacement per force that rises evenly by one and has no mean
 
     @classmethod
     def of(cls, rows: Sequence[BodyRow], propagators: Sequence[Sequence[Propagator]]) -> Self:
         """Responses of all bodies; one that follows a course is not moved."""
-        found = np.zeros((3, len(propagators[0]), PORTS, PORTS))
+        found = np.zeros((4, len(propagators[0]), PORTS, PORTS))
         first = 0
         for row, of_body in zip(rows, propagators, strict=True):
             here = slice(first, first + len(row.ports))
@@ -248,6 +249,7 @@ class _Answers(NamedTuple):
                 if row.course is None:
                     found[0, level, here, here] = (shapes * P.B1) @ shapes.T
                     found[1, level, here, here] = (shapes * P.R1) @ shapes.T
+                    found[3, level, here, here] = (shapes * P.Rm) @ shapes.T
                 found[2, level, here, here] = (shapes * P.B2) @ shapes.T
             first = here.stop
         return cls(*found)
@@ -327,6 +329,7 @@ def _compile_bodies(
         course=np.concatenate([*course, np.zeros(1)]),
         G=answers.moved.ravel(),
         Gr=answers.moved_by_rise.ravel(),
+        Gm=answers.mean_by_rise.ravel(),
         at=np.zeros(ROWS_AT * PORTS),
     )
     return bodies, np.array(blocks, dtype=np.int64)
@@ -550,6 +553,9 @@ def _interfaces(
         force_before=np.zeros(count),
         calm=np.full(count, -np.inf),
         far=np.zeros(count),
+        bend=np.full(count, np.inf),
+        jerk=np.full(count, np.inf),
+        rough=np.full(count, -np.inf),
     )
     return interfaces, state
 

@@ -10,8 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from klack.contact.step_constants import LAW_RUBBING, LAW_YIELDING, SEPARATED, SLOWEST
+from klack.contact.step_constants import (
+    LAW_RUBBING,
+    LAW_YIELDING,
+    NO_LAW,
+    SEPARATED,
+    SLOWEST,
+)
 from klack.network.step_function import shift
+from klack.simulation.contact_step import mean_force
 from klack.simulation.interface_step import open_film, solve_interface
 from klack.simulation.lasting_laws import (
     keep_faces,
@@ -35,12 +42,20 @@ from klack.simulation.network_arrays import (
     KEPT,
     LAST,
     MEAN,
+    PORTS,
     RISE,
+    TURN,
+    Y0,
     Y1,
     Recording,
     Step,
 )
-from klack.simulation.network_ports import move_body, port_speed
+from klack.simulation.network_ports import (
+    mean_displacement,
+    move_body,
+    port_speed,
+    watch_average,
+)
 from klack.simulation.network_sliders import push_by_last_friction, slip, slip_seen_late
 from klack.simulation.phase import phase
 
@@ -49,23 +64,30 @@ __all__ = [
     "begin_cut_contacts",
     "begin_interfaces",
     "begin_macro_interfaces",
+    "begin_swings",
     "coarse_step_holds",
     "contacts_hold",
     "cost_of_catching_up",
     "end_far_films",
     "end_interfaces",
     "end_macro_interfaces",
+    "end_swings",
     "far_ones_stay",
     "forget_interfaces",
+    "forget_swings",
     "keep_dissipation",
     "mark_far_ones",
     "mark_none_far",
     "may_fly",
+    "may_swing",
     "may_touch",
     "push_by_far_films",
     "push_by_guess",
+    "push_by_rise",
     "smooth_films",
     "solve_interfaces",
+    "swings_follow",
+    "swings_hold",
     "take_back_interfaces",
 ]
 
@@ -79,7 +101,15 @@ _MOST_SWEEPS = 200
 _FALLS = 1.5  # times the force now: a contact that had so much a macro step ago releases soon
 HELD = 0.5  # of the suction: a film that pulls more may begin to cavitate
 _SHAKEN = 0.04  # of the force of a contact at rest: its change in a macro step
+_ROUGH = 0.1  # of the time after which a closed contact rests: until swings are followed again
+_STILL = 0.1  # of that: at rest of an elastic contact, which is followed while it swings
 _SMOOTH = 0.06  # of a gap and its cut-off: way in a middle step that the film follows
+_AS_HARD = 1.0002  # times the deepest indentation: what is missed of it matters to no peak
+_HARDER = 1.002  # the same of what is expected
+_STAYS = 0.5  # of the gap of a closed contact: way in a macro step in which it stays closed
+_BEND = 2e-3  # of a force that swings: what its second derivative changes in the mean of a step
+_CREST = 1e-5  # the same where a contact presses harder than before
+_JERK = 1e-3  # the same of the change from one step to the next: 1e-5 of the time of the swings
 
 
 @phase
@@ -115,21 +145,158 @@ def may_fly(contacts: Any, now: float, length: float) -> bool:
     rows, state = contacts.rows, contacts.state
     quiet = True
     for c in range(rows.interfaces):
-        rate = abs(state.rate[c])
         if state.since[c] < np.inf:
             # a swing is steady for a moment at its crests
             if now - max(state.since[c], state.calm[c]) < rows.rest[c]:
                 quiet = False
-            continue
-        x = state.gap[c] - 3.0 * rate * length
-        creeping = rate * length < 1e-3 * (max(state.gap[c], 0.0) + rows.cut_off[c])
-        if x <= 0.0:
-            if not (creeping and rows.dry[c] == 0):
-                quiet = False
-        elif rows.dry[c] == 0:
-            if rate * film_damping(rows, c, x) > rows.film_small[c] and not creeping:
-                quiet = False
+        elif not _flies(contacts, c, length):
+            quiet = False
     return quiet
+
+
+@phase
+def _flies(contacts: Any, c: int, length: float) -> bool:
+    """Whether an open interface stays far apart, with a small film force."""
+    rows, state = contacts.rows, contacts.state
+    rate = abs(state.rate[c])
+    x = state.gap[c] - 3.0 * rate * length
+    creeping = rate * length < 1e-3 * (max(state.gap[c], 0.0) + rows.cut_off[c])
+    if rows.dry[c] != 0:
+        return x > 0.0
+    if x <= 0.0:
+        return creeping
+    return creeping or rate * film_damping(rows, c, x) <= rows.film_small[c]
+
+
+@phase
+def may_swing(contacts: Any, now: float, length: float) -> bool:
+    """Whether contacts stay closed in the next ``length`` [s] while they swing, others far apart.
+
+    Of those that swing the law must be elastic: its force then depends on the gap alone.  None may
+    press harder than before: that is the peak of an impact.
+    """
+    rows, state = contacts.rows, contacts.state
+    may = True
+    for c in range(rows.interfaces):
+        rate = abs(state.rate[c])
+        if state.since[c] == np.inf:
+            may = may and _flies(contacts, c, length)
+        elif not _elastic(contacts, c) or now < state.rough[c]:
+            may = False
+        else:
+            deep = -state.gap[c]
+            may = may and rate * length <= _STAYS * deep and state.film_before[c] == 0.0
+            may = may and deep - state.rate[c] * length <= _HARDER * state.deepest[c]
+    return may
+
+
+@phase
+def _elastic(contacts: Any, c: int) -> bool:
+    rows = contacts.rows
+    return rows.alpha[c] == 0.0 and rows.kind[c] < LAW_RUBBING and rows.kind[c] != NO_LAW
+
+
+@phase
+def swings_follow(contacts: Any, length: float) -> bool:
+    """Whether one step of this length is expected to follow the swings of closed contacts."""
+    state, follow = contacts.state, True
+    for c in range(contacts.rows.interfaces):
+        if state.since[c] < np.inf:
+            follow = follow and state.jerk[c] * length**3 <= _JERK * state.force[c]
+    return follow
+
+
+@phase
+def forget_swings(contacts: Any, now: float) -> None:
+    """Expect nothing of closed contacts; try no longer steps for a while after ``now`` [s]."""
+    rows, state = contacts.rows, contacts.state
+    for c in range(rows.interfaces):
+        state.jerk[c] = np.inf
+        state.rough[c] = max(state.rough[c], now + _ROUGH * rows.rest[c])
+
+
+@phase
+def begin_swings(contacts: Any, bodies: Any, step: Step) -> None:
+    """Slopes of the forces of closed contacts in a sub-step, and mean gaps without all forces.
+
+    The slope in the middle of the way that is ahead at the last speed.
+    """
+    rows, state, trial = contacts.rows, contacts.state, contacts.trial
+    for c in range(rows.interfaces):
+        trial.stiffness[c] = 0.0
+        if state.since[c] < np.inf and state.far[c] == 0.0:
+            series, deep = rows.series[c], -(state.gap[c] + state.e[c])
+            k = _stiffness(contacts, c, deep)
+            ahead = -0.5 * state.rate[c] * step.H / (1.0 + k * series)
+            k = _stiffness(contacts, c, max(deep + ahead, 0.5 * deep))
+            trial.stiffness[c] = k / (1.0 + k * series)
+            for port in (rows.upper[c], rows.lower[c]):
+                if port < bodies.ports:
+                    watch_average(bodies, step.level, step.rate, port)
+
+
+@phase
+def _stiffness(contacts: Any, c: int, deep: float) -> float:
+    """Slope of the law of a contact at an indentation; 0 where it is open."""
+    rows, hint = contacts.rows, contacts.state.hint[c]
+    _, slope, _ = mean_force(rows.kind[c], contacts.laws, rows.law0[c], deep, deep, hint)
+    return 2.0 * slope
+
+
+@phase
+def push_by_rise(contacts: Any, bodies: Any, share: float) -> None:
+    """Rise of the forces of ports in a sub-step, which is a ``share`` of the macro step."""
+    rows, rise, S = contacts.rows, contacts.trial.rise, bodies.at
+    for p in range(bodies.ports + 1):
+        S[TURN + p] = share * S[RISE + p]
+    for c in range(rows.interfaces):
+        S[TURN + rows.upper[c]] += rise[c]
+        S[TURN + rows.lower[c]] -= rise[c]
+
+
+@phase
+def swings_hold(contacts: Any, length: float) -> bool:
+    """Whether contacts stayed closed and followed their swings, and nothing else was met.
+
+    A contact that presses harder than before has the peak of its impact: nothing of it is missed.
+    """
+    rows, state, trial = contacts.rows, contacts.state, contacts.trial
+    holds = True
+    for c in range(rows.interfaces):
+        force = trial.contact[c]
+        if state.since[c] < np.inf:
+            bend = abs(trial.stiffness[c] * trial.bow[c])
+            deeper = max(-state.gap[c], -trial.gap[c]) > _AS_HARD * state.deepest[c]
+            holds = holds and trial.stiffness[c] > 0.0 and abs(trial.rise[c]) <= force
+            holds = holds and bend <= (_CREST if deeper else _BEND) * force
+            if state.bend[c] < np.inf:
+                jerk = trial.stiffness[c] * trial.bow[c] - state.bend[c] * length**2
+                holds = holds and abs(jerk) <= 2.0 * _JERK * force
+        elif force > 0.0 or abs(trial.film[c]) > 2.0 * rows.film_small[c]:
+            holds = False
+    return holds
+
+
+@phase
+def end_swings(contacts: Any, S: Any, step: Step, first: bool) -> float:
+    """Take over how the forces of closed contacts changed in a sub-step.
+
+    Returns
+    -------
+    float [J]
+        Work of these changes on the bodies.
+    """
+    rows, state, trial, work = contacts.rows, contacts.state, contacts.trial, 0.0
+    for c in range(rows.interfaces):
+        rise, was = trial.rise[c], state.bend[c]
+        if trial.stiffness[c] == 0.0:
+            continue
+        behind = rows.gap0[c] + S[Y0 + rows.upper[c]] - S[Y0 + rows.lower[c]] - state.gap[c]
+        work += rise * (trial.bow[c] + 0.5 * behind)
+        state.bend[c] = trial.stiffness[c] * trial.bow[c] * step.rate * step.rate
+        jerk = abs(state.bend[c] - was) * step.rate if was < np.inf else np.inf
+        state.jerk[c] = jerk if first or state.jerk[c] == np.inf else max(state.jerk[c], jerk)
+    return work
 
 
 @phase
@@ -162,13 +329,21 @@ def solve_interfaces(contacts: Any, sliding: Any, bodies: Any, G: Any, step: Ste
     which the last change of the others moved; they catch up in the next step.
     """
     rows, state, trial, S = contacts.rows, contacts.state, contacts.trial, bodies.at
+    Gr = shift(bodies.Gr, step.level * PORTS * PORTS)
     for sweep in range(_MOST_SWEEPS):
         moved = 0.0
         for c in range(rows.interfaces):
             if state.far[c] != 0.0:
                 continue
             u, low = rows.upper[c], rows.lower[c]
-            _solve_interface(contacts, S, c, step)
+            rise = trial.rise[c]
+            _solve_interface(contacts, bodies, c, step)
+            if trial.stiffness[c] > 0.0:
+                rise = trial.rise[c] - rise
+                S[TURN + u] += rise
+                S[TURN + low] -= rise
+                moved = move_body(bodies, Gr, u, rise, moved)
+                moved = move_body(bodies, Gr, low, -rise, moved)
             change = trial.contact[c] + trial.film[c] - trial.force[c]
             if change != 0.0 or trial.force[c] != 0.0:
                 trial.force[c] += change
@@ -199,10 +374,31 @@ def solve_interfaces(contacts: Any, sliding: Any, bodies: Any, G: Any, step: Ste
 
 
 @phase
-def _solve_interface(contacts: Any, S: Any, c: int, step: Step) -> None:
-    rows, state, trial = contacts.rows, contacts.state, contacts.trial
-    G, g0 = rows.G[step.level * rows.interfaces + c], state.gap[c]
+def _solve_interface(contacts: Any, bodies: Any, c: int, step: Step) -> None:
+    """Force of one interface, whose changes move its gap.
+
+    That of a contact that swings is ``F + s (t/h - 1/2)`` with the change ``s = -k (g1 - g0)`` over
+    the step and the mean ``F = F* + k ((g0 + g1)/2 - g_mean)``, ``F*`` the discrete gradient.  Its
+    work on the bodies is ``F* (g1 - g0)``, whatever the slope ``k``.  Gaps are linear in ``F`` and
+    ``s``: ``F*`` meets a free gap and a compliance as it does elsewhere.
+    """
+    rows, state, trial, S = contacts.rows, contacts.state, contacts.trial, bodies.at
+    G, g0, k = rows.G[step.level * rows.interfaces + c], state.gap[c], trial.stiffness[c]
     gap_free = gap_between(rows, S, c) - G * trial.force[c]
+    mean, turned, more, average = 0.0, 0.0, 0.0, 0.0
+    if k > 0.0:
+        u, low, at = rows.upper[c], rows.lower[c], step.level * PORTS * PORTS
+        turned = _opened(shift(bodies.Gr, at), u, low)
+        more = _opened(shift(bodies.Gm, at), u, low)
+        mean = mean_displacement(bodies, step.level, u) - mean_displacement(bodies, step.level, low)
+        average = turned + 0.5 * G
+        mean += rows.gap0[c] - average * trial.force[c] - more * trial.rise[c]
+        gap_free -= turned * trial.rise[c]
+        softer = 1.0 + k * average
+        slope = (1.0 + k * turned) * softer / G - k * (0.5 + k * more)
+        gap_free = softer / G * (gap_free + k * turned * g0) + k * (g0 * (0.5 - k * more) - mean)
+        gap_free /= slope
+        G = 1.0 / slope
     trial.gap[c] = gap_free
     if rows.dry[c] and g0 >= 0.0 and gap_free >= 0.0 and state.e[c] == 0.0:
         trial.contact[c] = trial.film[c] = trial.e[c] = 0.0
@@ -238,6 +434,19 @@ def _solve_interface(contacts: Any, S: Any, c: int, step: Step) -> None:
         state.hint[c],
         state.film_before[c],
     )
+    if k > 0.0:
+        g1 = trial.gap[c]
+        trial.rise[c] = -k * (g1 - g0)
+        change = 0.5 * (g0 + g1) - mean + k * more * (g1 - g0)
+        trial.bow[c] = (change - average * trial.contact[c]) / (1.0 + k * average)
+        trial.contact[c] += k * trial.bow[c]
+
+
+@phase
+def _opened(G: Any, upper: int, lower: int) -> float:
+    """Opening of a gap per force, from displacements per force."""
+    cross = G[upper * PORTS + lower] + G[lower * PORTS + upper]
+    return G[upper * PORTS + upper] + G[lower * PORTS + lower] - cross
 
 
 @phase
@@ -273,6 +482,8 @@ def _remembered(contacts: Any, accounts: Any, peaks: Any) -> tuple[Any, ...]:
         accounts.contact,
         accounts.film,
         peaks,
+        state.bend,
+        state.jerk,
     )
 
 
@@ -303,7 +514,7 @@ def begin_attempt(contacts: Any, c: int) -> None:
     state, trial = contacts.state, contacts.trial
     force = state.force[c]
     trial.force[c] = trial.least[c] = trial.most[c] = force
-    trial.first[c] = 0.0
+    trial.first[c] = trial.stiffness[c] = trial.rise[c] = 0.0
     if state.far[c] != 0.0:  # it acts among elements
         trial.first[c] = force
         trial.force[c] = trial.contact[c] = trial.film[c] = 0.0
@@ -427,7 +638,8 @@ def end_macro_interfaces(contacts: Any, S: Any, step: Step, longest: float) -> f
     for c in range(rows.interfaces):
         begin = trial.kept[KEPT * c + 3]
         state.force_before[c] = begin
-        if not _steady(begin, state.force[c], step.H / longest):
+        share = _STILL if _elastic(contacts, c) else 1.0
+        if not _steady(begin, state.force[c], share * step.H / longest):
             state.calm[c] = step.t + step.H
         behind = rows.gap0[c] + S[BEGIN + rows.upper[c]] - S[BEGIN + rows.lower[c]]
         if rows.kind[c] == LAW_YIELDING:
@@ -461,19 +673,21 @@ def end_interfaces(
             if state.since[c] == np.inf or trial.contact[c] == 0.0:
                 trial.opening[c] = _opening(bodies, recording, c, step.level)
             settled = end_force(contacts, c, step, gap, accounts, recording, sums, peaks)
+            force, half = trial.force[c], 0.5 * trial.rise[c]
             if first:
-                trial.first[c] = trial.force[c]
-            trial.least[c] = min(trial.least[c], trial.force[c])
-            trial.most[c] = max(trial.most[c], trial.force[c])
+                trial.first[c] = force - half
+            trial.least[c] = min(trial.least[c], force - abs(half))
+            trial.most[c] = max(trial.most[c], force + abs(half))
+            if trial.stiffness[c] == 0.0:
+                state.bend[c] = state.jerk[c] = np.inf
         else:
             state.force[c] = 0.0
         state.pulled[c] = 1.0 if _pulls(contacts, c) else 0.0
         state.rate[c] = (gap - state.gap[c]) * step.rate
         state.gap[c] = gap + settled
-        if state.chi[c] != 0.0:
-            state.deepest[c] = max(state.deepest[c], -gap)
-            if gap > SEPARATED * state.deepest[c]:
-                state.chi[c] = state.deepest[c] = 0.0
+        state.deepest[c] = max(state.deepest[c], -gap)
+        if gap > SEPARATED * state.deepest[c]:
+            state.chi[c] = state.deepest[c] = 0.0
 
 
 @phase

@@ -4,8 +4,9 @@ One macro step ``H = M h`` while elements and fluid are slow beside it:
 
 1. **Guess** the forces of elements and fluid, their mean over the macro step and an even rise.
 2. **Act**: modes move exactly; contacts, films and dry friction find their mean forces.  Far apart
-   or at rest, in one step of ``H``; else in sub-steps of a few fine ones ``h``, or of one where
-   films change fast.  A sub-step in which a contact closes or opens is cut into parts.
+   or at rest, in one step of ``H``; while closed contacts swing, in one or a few in which their
+   forces rise or fall; else in sub-steps of a few fine ones ``h``, or of one where films change
+   fast.  A sub-step in which a contact closes or opens is cut into parts.
 3. **Answer**: elements, pressures and lines are asked once, for the motion of their ports.
 4. **Repair**: what the guess missed of their forces acts as if it had acted all the time.  Modes
    are linear, so that is exact.  Elements, fluid and interfaces see the displacement ``d`` that it
@@ -19,6 +20,8 @@ with elements and fluid in each of them, repeated until nothing moves any more.
 """
 
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from klack.arrays import Index, Matrix, Vector
 from klack.machine.compiling.jit import njit
@@ -34,6 +37,7 @@ from klack.simulation.network_arrays import (
     NEAR,
     PARTS,
     PORTS,
+    WITHIN,
     Accounts,
     Bodies,
     Contacts,
@@ -51,22 +55,29 @@ from klack.simulation.network_interfaces import (
     begin_cut_contacts,
     begin_interfaces,
     begin_macro_interfaces,
+    begin_swings,
     coarse_step_holds,
     contacts_hold,
     cost_of_catching_up,
     end_far_films,
     end_interfaces,
     end_macro_interfaces,
+    end_swings,
     far_ones_stay,
+    forget_swings,
     keep_dissipation,
     mark_far_ones,
     mark_none_far,
     may_fly,
+    may_swing,
     may_touch,
     push_by_far_films,
     push_by_guess,
+    push_by_rise,
     smooth_films,
     solve_interfaces,
+    swings_follow,
+    swings_hold,
     take_back_interfaces,
 )
 from klack.simulation.network_ports import (
@@ -95,7 +106,9 @@ from klack.simulation.network_ports import (
     respace_forces,
     row_length,
     take_back_ports,
+    turn_bodies,
     turn_ports,
+    turn_ports_by_all,
 )
 from klack.simulation.network_pressures import (
     begin_fluid,
@@ -150,6 +163,15 @@ displacement of a port, and energy that catching up costs over the work of the s
 FEW_REPEATS = 8  # are enough, unless what still changes is round-off
 MOST_REPEATS = 200
 MACRO_REPEATS = 6  # without success: fine steps
+
+
+class _Way(NamedTuple):
+    """How bodies move in a step that elements and fluid answer once."""
+
+    parts: int  # sub-steps
+    whole: bool  # nothing that acts can be cut, so that the free motion is asked once
+    flight: bool
+    swing: bool  # contacts stay closed, and their forces change within sub-steps
 
 
 class _Loop(NamedTuple):
@@ -207,13 +229,15 @@ def run_network(
             kink += 1
         together = allow_macro and network.kinks[kink] >= origin + (now + M) * h
         flight = together and may_fly(contacts, origin + now * h, M * h)
+        swing = together and not flight and bodies.driven == 0
+        swing = swing and may_swing(contacts, origin + now * h, M * h)
         smooth, apart = R > 1, True
         done = 0
         while done < M:
             # what acts: one step, or sub-steps
             level = FINE
             if together:
-                level = COARSE if flight else NEAR
+                level = COARSE if flight or swing else NEAR
             steps = _steps_of(level, M, near)
             if together and apart:
                 mark_far_ones(contacts, bodies, level, steps * h)
@@ -224,7 +248,10 @@ def run_network(
                 smooth = smooth and smooth_films(contacts, near * h, R * h)
                 of_sub = MIDDLE if smooth else FINE
                 parts = near // R if smooth else near
-            whole = parts == 1 and not (of_sub == FINE and may_touch(contacts, h))
+            elif swing and not swings_follow(contacts, M * h):
+                of_sub, parts = NEAR, M // near
+            whole = parts == 1 and not swing and not (of_sub == FINE and may_touch(contacts, h))
+            way = _Way(parts, whole, flight, swing)
             begin, ratio = origin + now * h, steps / done_steps if done_steps > 0 else 0.0
             step = Step(level, steps, begin, steps * h, 1.0 / (steps * h))
             sub = Step(of_sub, steps // parts, begin, steps // parts * h, parts / (steps * h))
@@ -247,9 +274,7 @@ def run_network(
             if loop.fluid.nodes.ends > 0:
                 lines_incoming(loop.lines, loop.line_state, steps, loop.ends.c, loop.ends.Z)
                 waves_incoming(loop.waves, step.H, loop.ends.c, loop.ends.Z)
-            status = _settle(
-                step, sub, parts, whole, flight, ratio, loop, first(clock), first(report)
-            )
+            status = _settle(step, sub, way, ratio, loop, first(clock), first(report))
             if status > STATUS_DONE:
                 return status
             if status != STATUS_DONE:
@@ -260,9 +285,12 @@ def run_network(
                 )
                 take_back_sliders(loop.sliding, loop.accounts, _slider_sums(loop))
                 if status == STATUS_REFUSED:
-                    together = False
+                    together = swing = False
                 elif flight:
                     flight = False
+                elif swing:
+                    swing = parts < M // near
+                    forget_swings(contacts, -np.inf if swing else begin)
                 else:
                     smooth = apart = False
                 last_level, last_steps = level, steps  # forces so far are spaced like this now
@@ -361,9 +389,7 @@ def _begin(network: NetworkArrays, recording: Recording, scratch: Scratch) -> _L
 def _settle(
     step: Step,
     sub: Step,
-    parts: int,
-    whole: bool,
-    flight: bool,
+    way: _Way,
     ratio: float,
     loop: Any,
     clock: Any,
@@ -371,8 +397,7 @@ def _settle(
 ) -> int:
     """One step up to its end, repeated until its guess missed nothing.
 
-    ``whole``: it cannot be cut, so that its free motion is computed once; ``ratio``: its length
-    over that of the step before, 0 without one.
+    ``ratio``: its length over that of the step before, 0 without one.
 
     Returns
     -------
@@ -386,14 +411,14 @@ def _settle(
     share, energy = SETTLED[1 if fine else 0]
     for attempt in range(MOST_REPEATS if fine else MACRO_REPEATS):
         if attempt > 0:
-            take_back_ports(bodies, sub.level, not whole)
+            take_back_ports(bodies, sub.level, not way.whole)
             take_back_interfaces(
                 contacts, loop.accounts, loop.recording, _interface_sums(loop), loop.peaks
             )
             take_back_sliders(loop.sliding, loop.accounts, _slider_sums(loop))
             guess_answer(bodies)
             clock[7] += 1
-        status = _act(sub, parts, whole, flight, fine, attempt == 0, loop, report)
+        status = _act(sub, way, fine, attempt == 0, loop, report)
         if status == STATUS_DONE:
             status = push_by_rows(step, bodies, loop.elements, loop.fluid, contacts, report)
         if status != STATUS_DONE:
@@ -420,9 +445,7 @@ def _settle(
 @unfolded
 def _act(
     sub: Step,
-    parts: int,
-    whole: bool,
-    flight: bool,
+    way: _Way,
     fine: bool,
     first: bool,
     loop: Any,
@@ -434,6 +457,7 @@ def _act(
     a status: ``STATUS_FORCES`` where contacts do not settle in a fine step.
     """
     bodies, contacts, sliding = loop.bodies, loop.contacts, loop.sliding
+    parts, whole, swing = way.parts, way.whole, way.swing
     move = first or not whole
     done, cut, kept = 0, 0, False
     all_parts = PARTS * sub.steps
@@ -444,13 +468,17 @@ def _act(
             now = Step(CUT, 0, now.t + (all_parts - cut) * H, H, sub.rate * all_parts)
         elif move:
             keep_dissipation(contacts)
-            kept = not whole and (now.level == FINE or may_touch(contacts, now.H))
+            kept = not whole and not swing
+            kept = kept and (now.level == FINE or may_touch(contacts, now.H))
             if kept:
                 keep_for_cut(bodies, now.level)
         G = shift(bodies.G, now.level * PORTS * PORTS)
         if move:
             if bodies.driven > 0:
                 drive_bodies(bodies, now.level, now.t, now.H)
+            if swing:
+                bring(bodies, now.level, now.level)
+                begin_swings(contacts, bodies, now)
             move_free(bodies, now.level)
             begin_sub_sliders(sliding, bodies, now.level)
         late = 0.0
@@ -460,12 +488,17 @@ def _act(
         move_ports_by_guess(bodies, G)
         if whole:
             turn_ports(bodies, now.level)
+        if swing:
+            push_by_rise(contacts, bodies, 1.0 / parts)
+            turn_ports_by_all(bodies, now.level)
         if not solve_interfaces(contacts, sliding, bodies, G, now):
             report[0], report[2] = 0.0, now.t
             return STATUS_FORCES if fine else STATUS_REFUSED
-        if flight and not (coarse_step_holds(contacts) and sliders_hold(sliding)):
+        if way.flight and not coarse_step_holds(contacts):
             return STATUS_MET
-        if now.level == MIDDLE and not sliders_hold(sliding):
+        if swing and not swings_hold(contacts, now.H):
+            return STATUS_MET
+        if (way.flight or swing or now.level == MIDDLE) and not sliders_hold(sliding):
             return STATUS_MET
         if not whole and cut == 0 and not contacts_hold(contacts):
             if not kept:
@@ -475,6 +508,7 @@ def _act(
             cut = all_parts
             continue
         begins = done == 0 and (cut == 0 or cut == all_parts)
+        worked = end_swings(contacts, bodies.at, now, begins) if swing else 0.0
         end_interfaces(
             contacts,
             bodies,
@@ -487,6 +521,9 @@ def _act(
         )
         end_sliders(sliding, now, begins, loop.accounts, _slider_sums(loop))
         end_sub_step(bodies, late)
+        if swing:
+            turn_bodies(bodies, now.level)
+            bodies.at[WITHIN] -= worked
         if cut == 0:
             done += 1
         else:

@@ -6,6 +6,7 @@ import numpy as np
 
 from klack.network.step_function import shift
 from klack.simulation.modal_step import (
+    FIXED_ROWS,
     ROW,
     ROW_B1,
     ROW_Q,
@@ -13,6 +14,7 @@ from klack.simulation.modal_step import (
     ROW_V,
     advance,
     apply_forces,
+    average,
     copy_state,
     kick,
     watch,
@@ -20,6 +22,7 @@ from klack.simulation.modal_step import (
 from klack.simulation.network_arrays import (
     AHEAD,
     ANSWER,
+    AVERAGE,
     BEFORE,
     BEFORE_2,
     BEFORE_3,
@@ -40,6 +43,7 @@ from klack.simulation.network_arrays import (
     RISE,
     RISE_MISSED,
     SEEN,
+    TURN,
     WITHIN,
     WITHIN_BEGIN,
     WORK,
@@ -68,6 +72,7 @@ __all__ = [
     "keep_modes",
     "largest_missed",
     "matters",
+    "mean_displacement",
     "miss",
     "miss_rise",
     "move_body",
@@ -78,7 +83,10 @@ __all__ = [
     "respace_forces",
     "row_length",
     "take_back_ports",
+    "turn_bodies",
     "turn_ports",
+    "turn_ports_by_all",
+    "watch_average",
 ]
 
 
@@ -119,12 +127,16 @@ def _copy_state(bodies: Any, source: int, target: int) -> None:
 @phase
 def bring(bodies: Any, source: int, target: int) -> None:
     """Bring the modes from one step size to another, with the pending forces."""
-    S = bodies.at
-    for k in range(bodies.blocks):
-        block = block_of(bodies, k, source)
-        apply_forces(block, bodies.modes[k], shift(S, PENDING), bodies.port0[k], bodies.port1[k])
-    for i in range(row_length(bodies)):
-        S[PENDING + i] = 0.0
+    S, pending = bodies.at, False
+    for p in range(bodies.ports):
+        pending = pending or S[PENDING + p] != 0.0
+    if pending:
+        for k in range(bodies.blocks):
+            port0, port1 = bodies.port0[k], bodies.port1[k]
+            block = block_of(bodies, k, source)
+            apply_forces(block, bodies.modes[k], shift(S, PENDING), port0, port1)
+        for i in range(row_length(bodies)):
+            S[PENDING + i] = 0.0
     if target != source:
         _copy_state(bodies, source, target)
 
@@ -281,6 +293,51 @@ def turn_ports(bodies: Any, level: int) -> None:
     S = bodies.at
     for p in range(bodies.ports):
         S[Y1 + p] += _turned(bodies, level, p, RISE)
+
+
+@phase
+def turn_ports_by_all(bodies: Any, level: int) -> None:
+    """Add what the rise of all forces does in a sub-step with a swinging contact."""
+    S = bodies.at
+    for p in range(bodies.ports):
+        S[Y1 + p] += _turned(bodies, level, p, TURN)
+
+
+@phase
+def watch_average(bodies: Any, level: int, rate: float, port: int) -> None:
+    """Mean displacement of a port in free motion; before the modes move, no force is pending."""
+    total = 0.0
+    for k in range(bodies.blocks):
+        if bodies.port0[k] <= port < bodies.port1[k]:
+            row = FIXED_ROWS + port - bodies.port0[k]
+            total += average(block_of(bodies, k, level), bodies.modes[k], rate, row)
+    bodies.at[AVERAGE + port] = total
+
+
+@phase
+def mean_displacement(bodies: Any, level: int, port: int) -> float:
+    """Mean displacement of a port over a sub-step under the forces so far and their rise."""
+    at = level * PORTS * PORTS
+    G, Gr, Gm = shift(bodies.G, at), shift(bodies.Gr, at), shift(bodies.Gm, at)
+    forced = _port_end(bodies, Gr, port, FORCE) + 0.5 * _port_end(bodies, G, port, FORCE)
+    return bodies.at[AVERAGE + port] + forced + _port_end(bodies, Gm, port, TURN)
+
+
+@phase
+def turn_bodies(bodies: Any, level: int) -> None:
+    """Let the rise of all forces act in a sub-step that has ended; counted is all its work."""
+    S = bodies.at
+    within = 0.0
+    for p in range(bodies.ports):
+        work = S[PENDING + p] * _turned(bodies, level, p, TURN)
+        S[WORK + p] -= work
+        within -= work
+    bring(bodies, level, level)
+    for k in range(bodies.blocks):
+        energy = _kick_block(bodies, k, level, level, TURN, ROW_R1)
+        S[WORK + bodies.port0[k]] += energy
+        within += energy
+    S[WITHIN] += within
 
 
 @phase

@@ -223,7 +223,7 @@ class StepCounts:
     fine
         Taken by bodies, elements and fluid together.
     flight
-        Macro steps in flight or at rest.
+        Macro steps in flight, at rest, or while closed contacts swing.
     near
         Macro steps about a touch, in sub-steps of the bodies.
     sub

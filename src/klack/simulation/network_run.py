@@ -285,7 +285,8 @@ def simulate_network(
     for doubt in line_doubts(network, step * first_step):
         warnings.warn(doubt, AccuracyWarning, stacklevel=2)
     if network.moving is None:
-        for doubt in impact_doubts(result.events, result.interfaces, step):
+        longest = 1.5 * sizes.middle * step
+        for doubt in impact_doubts(result.events, result.interfaces, step, longest):
             warnings.warn(doubt, AccuracyWarning, stacklevel=2)
     if failure is not None:
         raise IncompleteRunError(str(failure), result) from failure

@@ -21,6 +21,8 @@ from klack.errors import InputError, require_positive
 
 __all__ = ["DampingLoss", "Propagator", "damping_loss", "modal_propagator"]
 
+_TWICE_BELOW = 0.5  # as TAYLOR_BELOW, for an integral that loses digits twice
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Propagator:
@@ -35,6 +37,8 @@ class Propagator:
         End state from a unit modal force during the step.
     R1, R2 [s^2], [s]
         The same from a modal force that rises evenly by one over the step and has no mean.
+    Rm : array [s^2]
+        Mean of ``q`` over the step from that force.
     """
 
     step: float
@@ -46,6 +50,7 @@ class Propagator:
     B2: NDArray[np.float64]
     R1: NDArray[np.float64]
     R2: NDArray[np.float64]
+    Rm: NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -89,17 +94,25 @@ def modal_propagator(
             expected="as many of both, none below zero",
             hint="give one damping ratio per mode.",
         )
-    A11, A12, A21, A22, B1, S = _matrices(w.tobytes(), z.tobytes(), float(step)).copy()
+    A11, A12, A21, A22, B1, S, SS = _matrices(w.tobytes(), z.tobytes(), float(step)).copy()
     # a force f(t) makes q(h) = int A12(h - t) f(t) dt; by parts with f = t/h - 1/2
-    R1, R2 = S / step - 0.5 * B1, B1 / step - 0.5 * A12
     return Propagator(
-        step=float(step), A11=A11, A12=A12, A21=A21, A22=A22, B1=B1, B2=A12.copy(), R1=R1, R2=R2
+        step=float(step),
+        A11=A11,
+        A12=A12,
+        A21=A21,
+        A22=A22,
+        B1=B1,
+        B2=A12.copy(),
+        R1=S / step - 0.5 * B1,
+        R2=B1 / step - 0.5 * A12,
+        Rm=SS / step**2 - 0.5 * S / step,
     )
 
 
 @lru_cache(maxsize=100)
 def _matrices(omega: bytes, damping: bytes, h: float) -> NDArray[np.float64]:
-    """``A11`` to ``B1``, and its integral; cached, because strokes of one valve share them."""
+    """``A11`` to ``B1``, its integral and that of this; cached: strokes of one valve share them."""
     w, z = np.frombuffer(omega), np.frombuffer(damping)
     A11, A12, A22 = np.ones(w.size), np.full(w.size, h), np.ones(w.size)
     B1 = np.full(w.size, 0.5 * h * h)
@@ -107,12 +120,16 @@ def _matrices(omega: bytes, damping: bytes, h: float) -> NDArray[np.float64]:
     for part, formula in (((w > 0.0) & ~over, _underdamped), ((w > 0.0) & over, _overdamped)):
         if np.any(part):
             A11[part], A12[part], A22[part], B1[part] = formula(w[part], z[part], h)
-    small = (w > 0.0) & (np.maximum(z, 1.0) * w * h < TAYLOR_BELOW)
+    far = np.maximum(z, 1.0) * w * h
+    small, smallish = (w > 0.0) & (far < TAYLOR_BELOW), (w > 0.0) & (far < _TWICE_BELOW)
     # the integral of q'' = 1 - 2 z w q' - w^2 q over the step
-    S = (h - A12 - 2.0 * z * w * B1) / np.where(w > 0.0, w**2, 1.0)
-    S[w == 0.0] = h**3 / 6.0
-    B1[small], S[small] = _series(w[small] * h, z[small]) * np.array([[h * h], [h**3]])
-    return np.array([A11, A12, -(w**2) * A12, A22, B1, S])
+    over_w2 = 1.0 / np.where(w > 0.0, w**2, 1.0)
+    S = (h - A12 - 2.0 * z * w * B1) * over_w2
+    SS = (0.5 * h * h - B1 - 2.0 * z * w * S) * over_w2
+    S[w == 0.0], SS[w == 0.0] = h**3 / 6.0, h**4 / 24.0
+    B1[small], S[small], _ = _series(w[small] * h, z[small], h)
+    SS[smallish] = _series(w[smallish] * h, z[smallish], h)[2]
+    return np.array([A11, A12, -(w**2) * A12, A22, B1, S, SS])
 
 
 def damping_loss(
@@ -189,11 +206,11 @@ def _overdamped(
     return A11, A12, A22, (-np.expm1(slow * h) + slow * A12) / w**2
 
 
-def _series(x: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np.float64]:
-    """B1/h^2 and its integral/h^3 as Taylor series of q'' = 1 - 2 z x q' - x^2 q at unit time."""
+def _series(x: NDArray[np.float64], z: NDArray[np.float64], h: float) -> NDArray[np.float64]:
+    """B1, its integral and that of this, as Taylor series of q'' = 1 - 2 z x q' - x^2 q."""
     before, now = np.zeros(x.size), np.full(x.size, 0.5)
-    total = np.array([now, now / 3.0])
+    total = np.array([now, now / 3.0, now / 12.0])
     for n in range(1, TAYLOR_TERMS):
         before, now = now, -(2.0 * z * x * (n + 1) * now + x**2 * before) / ((n + 1) * (n + 2))
-        total += np.array([now, now / (n + 3)])
-    return total
+        total += np.array([now, now / (n + 3), now / ((n + 3) * (n + 4))])
+    return total * np.array([[h**2], [h**3], [h**4]])
