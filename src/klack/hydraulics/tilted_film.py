@@ -376,12 +376,19 @@ class Land(NamedTuple):
 def land_of(film: SectorFilm, ways: Array) -> Land:
     """Return the arrays of a film, for slopes along some ways of its heights, shape (S N, w)."""
     apart = ways.T.reshape(ways.shape[1], film.sectors, film.circles).transpose(0, 2, 1)
-    load, (G, Q) = film.between.T @ film.load, film.load.shape
+    load = film.between.T @ film.load
+    points, functions = film.load.shape
     return Land(
-        *(film.sectors, film.circles, G, Q, film.shared),
+        film.sectors,
+        film.circles,
+        points,
+        functions,
+        film.shared,
         np.ascontiguousarray(apart),
         np.ascontiguousarray(np.einsum("ja,wjk->wak", load, apart)),
-        *(np.ascontiguousarray(part) for part in (film.between, film.along, film.around)),
+        np.ascontiguousarray(film.between),
+        np.ascontiguousarray(film.along),
+        np.ascontiguousarray(film.around),
         load,
         film.area,
     )
