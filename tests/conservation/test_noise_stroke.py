@@ -8,32 +8,49 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+import scipy
 
 from klack.acoustics.force_bands import force_bands
+from klack.acoustics.receivers.uff import read_uff_responses
+from klack.analyses.noise.mount_source import write_netcdf, write_uff
 from klack.analyses.noise.record import NoiseDesign
 from klack.analyses.noise.run import run_noise
 from klack.analyses.noise.source import NoiseSource, stroke_sources
 from klack.analyses.stroke.record import StrokeStudy
 from klack.analyses.stroke.run import run_stroke
 from klack.case.any_case import load_valve_case
+from klack.case.bodies import SurfaceName
+from klack.case.noise import NoiseInterface
 from klack.case.reader import find_case
 from klack.case.valve import ValveCase
+from klack.errors import InputError
 from klack.signals.sampled import TimeSeries
 
 pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
-def study() -> StrokeStudy:
-    """The dry stroke until it has bounced on the opening stop for a while."""
+def case() -> ValveCase:
+    """The shipped stroke, with housing and pole on one flange."""
     case: ValveCase = load_valve_case(find_case("demo-stroke"))
+    assert case.noise is not None
+    surfaces = tuple(SurfaceName(body, "rim") for body in ("housing", "pole"))
+    reactions = {"spring": SurfaceName("pole", "top"), "guide": SurfaceName("housing", "inside")}
+    update = {"mounts": {"flange": NoiseInterface(surface=surfaces)}, "reactions": reactions}
     run = case.run.model_copy(update={"duration": 1e-3})
-    return run_stroke(case.model_copy(update={"run": run}), variants=("dry",))
+    noise = case.noise.model_copy(update=update)
+    return case.model_copy(update={"run": run, "noise": noise})
 
 
 @pytest.fixture(scope="module")
-def source(study: StrokeStudy) -> NoiseSource:
-    (found,) = stroke_sources(study)
+def study(case: ValveCase) -> StrokeStudy:
+    """The dry stroke until it has bounced on the opening stop for a while."""
+    return run_stroke(case, variants=("dry",))
+
+
+@pytest.fixture(scope="module")
+def source(study: StrokeStudy, case: ValveCase) -> NoiseSource:
+    (found,) = stroke_sources(study, case=case)
     return found
 
 
@@ -89,3 +106,59 @@ def test_at_high_frequencies_nothing_but_the_contacts_pushes_the_needle(design, 
     slow = int(np.flatnonzero(np.isclose(one.middle, 501.19, rtol=1e-3))[0])
     assert design.net_share[slow] < 0.03
     assert 1e3 < design.balanced_below < 6e3
+
+
+def test_forces_on_the_held_bodies_are_the_momentum_of_the_needle(source, design):
+    """Contacts, magnet, spring and friction with their reactions; round-off of the run."""
+    held, net = source.held, source.net
+    assert held is not None
+    assert net is not None
+    assert held.unbalanced < 2e-8 * held.largest
+    assert design.at_mounts.balance == held.unbalanced / held.largest
+    total = sum(values.sum(axis=1) for values in held.forces.values())
+    assert total == pytest.approx(-net.values[: total.size], abs=2e-8 * held.largest)
+
+
+def test_the_free_valve_moves_as_a_mass_at_low_frequencies(design, study):
+    """Along the axis; across it nothing pushes, and the mobility is that of mass and inertia."""
+    found = design.at_mounts
+    source = found.source()
+    names = [str(freedom) for freedom in source.freedoms]
+    assert names == [f"flange.{name}" for name in ("x", "y", "z", "rx", "ry", "rz")]
+    mass = sum(body.mass for body in study.bodies if body.support != "free")
+    assert found.mass == pytest.approx(mass, rel=1e-9)
+    z, low = names.index("flange.z"), slice(0, 20)  # to 200 Hz
+    moved = source.blocked_force[low, z] / (2j * np.pi * source.frequency[low] * mass)
+    assert source.free_velocity[low, z] == pytest.approx(moved, rel=1e-3)
+    assert not source.blocked_force[:, [0, 1, 3, 4, 5]].any()
+    across = source.mobility[low, 0, 0] * 2j * np.pi * source.frequency[low]
+    # about its own reference point, where the centre of mass is not
+    assert np.all(across.real * mass > 1.0)
+    assert np.array_equal(source.mobility, source.mobility.transpose(0, 2, 1))
+
+
+def test_a_force_without_a_place_is_an_error(study, case):
+    """It names all of them and the key."""
+    noise = case.noise.model_copy(update={"reactions": None})
+    with pytest.raises(InputError, match=r"noise\.reactions: got no place .*spring.*guide"):
+        stroke_sources(study, case=case.model_copy(update={"noise": noise}))
+
+
+def test_files_of_a_source_hold_its_numbers(design, tmp_path):
+    """The universal file as a receiver would read it; netCDF by its variables."""
+    source = design.at_mounts.source()
+    write_uff(tmp_path / "source.uff", source, "dry")
+    write_netcdf(tmp_path / "source.nc", source, "dry")
+    read = read_uff_responses(tmp_path / "source.uff")
+    assert read.frequency == pytest.approx(source.frequency, rel=1e-5)  # six digits of a step
+    directions = [freedom.direction for freedom in source.freedoms]
+    assert [channel.direction for channel in read.outputs] == directions
+    assert [channel.direction for channel in read.sources] == directions
+    size = np.abs(source.mobility).max(axis=0)
+    assert np.all(np.abs(read.values - source.mobility) <= 1e-10 * size)
+    with scipy.io.netcdf_file(tmp_path / "source.nc", mmap=False) as file:
+        force = (
+            file.variables["blocked_force_real"][:] + 1j * file.variables["blocked_force_imag"][:]
+        )
+        assert np.array_equal(force, source.blocked_force)
+        assert file.freedoms.decode().startswith("flange.x, flange.y")

@@ -16,6 +16,7 @@ frequency above zero but for undamped resonances.
 from collections.abc import Sequence
 
 import numpy as np
+import scipy
 
 from klack.acoustics.interface import (
     Complexes,
@@ -24,10 +25,10 @@ from klack.acoustics.interface import (
     SourceAtMounts,
     laplace,
 )
-from klack.arrays import Vector
+from klack.arrays import Matrix, Vector
 from klack.bodies.reduction.craig_bampton import CraigBampton
 
-__all__ = ["blocked_force", "mount_impedance", "source_at_mounts"]
+__all__ = ["blocked_force", "mount_impedance", "source_at_mounts", "spectra_of_means"]
 
 
 def blocked_force(body: CraigBampton, forces: Complexes, s: Complexes) -> Complexes:
@@ -98,3 +99,36 @@ def source_at_mounts(
 def _receptance(body: CraigBampton, s: Complexes) -> Complexes:
     at = s[:, None]
     return np.asarray(1.0 / (body.omega**2 + 2.0 * body.damping * body.omega * at + at**2))
+
+
+def spectra_of_means(
+    step: float,
+    values: Matrix,
+    ends: tuple[Vector, Vector],
+    frequency: Vector,
+    shift: float = 0.0,
+) -> Complexes:
+    r"""Spectra of signals known as means over steps, :math:`\int f e^{-st}\,\mathrm dt`, (k, p).
+
+    What has acted before the first step is taken off, what acts after the last one stays.
+
+    Parameters
+    ----------
+    values (t, p) [N]
+    ends (p,) each [N]
+        Before and after.
+    frequency (k,) [Hz]
+        At even distances; above 0 where ``shift`` is 0.
+    """
+    (before, after), s = ends, laplace(frequency, shift)
+    changes = values - before
+    count, apart = frequency.size, float(frequency[-1] - frequency[0]) / max(frequency.size - 1, 1)
+    first = np.exp(s[0] * step)
+    turn = np.exp(-2j * np.pi * apart * step)
+    sums = scipy.signal.czt(changes, count, turn, first, axis=0)
+    half = 0.5 * s * step
+    # a mean over a step is the signal times sinh(x)/x in the spectrum
+    whole = sums * (step * np.exp(-half) * half / np.sinh(half))[:, None]
+    # summed to infinity in the same way, so that what stays has no jump at the end of the record
+    last = np.exp(-s * step * len(values)) * step * half / (2.0 * np.sinh(half) ** 2)
+    return np.asarray(whole + last[:, None] * (after - before))

@@ -70,6 +70,7 @@ def axial_freedom(structure: Structure, mass: float) -> CraigBampton:
         damping=structure.damping,
         mounts=("support",),
         directions=(3,),
+        references=np.zeros((1, 3)),
         participation=structure.participation[:, None],
         mass=np.full((1, 1), mass),
         stiffness=none,

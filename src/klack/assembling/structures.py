@@ -1,11 +1,13 @@
 """Structures of radiating bodies, built while modes and statics are available."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from klack.assembling.modes import damping_of, selection_of
+from klack.assembling.mounting import at_mounts, mount_references
 from klack.assembling.problem import ContactProblem
 from klack.assembling.reduced_pair import ReducedPair
 from klack.assembling.stops import StopContact
@@ -58,6 +60,7 @@ def impact_structures(
         (pair.lower, problem.flexibility_lower, own.ports[1], own.lower, -1.0),
     )
     held = [body.name for body, *_ in sides if body.is_fixed]
+    references = mount_references(case.noise, {body.name: body for body, *_ in sides})
 
     def static(flexibility: Flexibility, port: Port, reduced: ReducedBody) -> NDArray[np.float64]:
         load = port.pattern[:, None]
@@ -74,6 +77,7 @@ def impact_structures(
             pools[body.name],
             static(flexibility, port, reduced),
             radiating_surfaces(case.noise, body, held, _contact_names(case, body.name)),
+            (flexibility, references),
         )
         for body, flexibility, port, reduced, sign in sides
         if body.is_fixed
@@ -90,6 +94,7 @@ def valve_structures(
 ) -> tuple[Structure, ...]:
     """Structures of the held bodies of a valve; mappings by body, contacts by stop."""
     held = [name for name, body in bodies.items() if body.is_fixed]
+    references = mount_references(case.noise, bodies)
     return tuple(
         _structure(
             case,
@@ -98,6 +103,7 @@ def valve_structures(
             pools[name],
             flexibilities[name].deflections(_patterns(ports[name])),
             radiating_surfaces(case.noise, bodies[name], held, _stop_names(case, name)),
+            (flexibilities[name], references),
         )
         for name in held
     )
@@ -142,16 +148,25 @@ def _structure(
     pool: Modes,
     deflections: NDArray[np.float64],
     surfaces: tuple[tuple[str, ...], tuple[str, ...]],
+    mounts: tuple[Flexibility, Mapping[str, NDArray[np.float64]]],
 ) -> Structure:
-    patterns = _patterns([item.port for item in ports])
-    return build_structure(
+    """``mounts``: factors of the body, and the reference point of each mount."""
+    plain = [item.port for item in ports]
+    modes = kept_modes(selection_of(case.reduction.choice(body.name)), pool, _patterns(plain))
+    structure = build_structure(
         body,
-        modes=kept_modes(selection_of(case.reduction.choice(body.name)), pool, patterns),
+        modes=modes,
         damping=damping_of(case.bodies[body.name].damping),
         ports=ports,
         deflections=deflections,
         surfaces=surfaces[0],
         left_out=surfaces[1],
+    )
+    if case.noise is None or not case.noise.mounts:
+        return structure
+    return replace(
+        structure,
+        at_mounts=at_mounts(case, case.noise, body, modes, mounts[0], plain, mounts[1]),
     )
 
 

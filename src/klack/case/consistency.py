@@ -6,6 +6,7 @@ import numpy as np
 
 from klack.case.bodies import CaseBody, CaseFile, Reduction, SurfaceName
 from klack.case.impact_sections import ImpactSections
+from klack.case.noise import CaseNoise, mounting_places
 from klack.case.outputs import check_outputs
 from klack.case.valve_roles import find_roles
 from klack.case.valve_sections import ValveSections
@@ -631,6 +632,54 @@ def check_noise(case: ImpactSections | ValveSections) -> None:
             expected=f"fixed: the surfaces that hold '{surface.body}'",
             hint="add 'fixed: [{surface: NAME}]' to the body, or remove its surfaces from 'noise'.",
         )
+    _check_mounts(case, noise)
     if noise.plate is not None:
         key = ("noise", "plate", "material")
         require_known(key, noise.plate.material, case.materials, "material")
+
+
+def _check_mounts(case: ImpactSections | ValveSections, noise: CaseNoise) -> None:
+    """Mounts are the supports of held bodies, all of them; reactions act on held bodies."""
+    taken: dict[SurfaceName, str] = {}
+    for key, place in mounting_places(noise):
+        check_surface(case, key, place)
+        supports = [support.surface for support in case.bodies[place.body].fixed or ()]
+        held = [f"{place.body}.{surface}" for surface in supports]
+        on_mount = key[1] == "mounts"
+        if (on_mount and place.surface not in supports) or not supports:
+            raise CaseProblem(
+                key,
+                got=f"'{place}', which nothing holds",
+                expected=f"a held surface: {one_of(held)}" if held else "a held body",
+                hint=f"add it to bodies.{place.body}.fixed, or name another surface.",
+            )
+        if on_mount and place in taken:
+            raise CaseProblem(
+                key,
+                got=f"'{place}', which mount '{taken[place]}' has already",
+                expected="each held surface in one mount",
+                hint="remove it from one of the two.",
+            )
+        if on_mount:
+            taken[place] = str(key[2])
+    for body in {place.body for place in taken}:
+        for support in case.bodies[body].fixed or ():
+            if SurfaceName(body, support.surface) not in taken:
+                raise CaseProblem(
+                    ("noise", "mounts"),
+                    got=f"no mount at '{body}.{support.surface}', which is held",
+                    expected=f"all held surfaces of '{body}'",
+                    hint="add a mount, or list the surface beside those that it moves with.",
+                )
+    components = case.network.components if isinstance(case, ValveSections) else {}
+    for name in noise.reactions or {}:
+        key = ("noise", "reactions", name)
+        require_known(key, name, [*components, "fluid"], "component of the network")
+    if noise.reactions and not noise.mounts:
+        raise CaseProblem(
+            ("noise", "reactions"),
+            got="reactions without mounts",
+            expected="noise.mounts",
+            hint="add a mount, or remove the reactions.",
+            on_key=True,
+        )

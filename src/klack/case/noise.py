@@ -1,11 +1,12 @@
 """Sound of a valve: which surfaces radiate, how it is mounted, how often it clicks."""
 
+from collections.abc import Iterator
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from klack.case.bodies import BodySurface
-from klack.input.problem import CaseProblem
+from klack.case.bodies import BodySurface, SurfaceName
+from klack.input.problem import CaseProblem, Key
 from klack.input.section import Name, Section
 from klack.units import (
     Area,
@@ -21,7 +22,14 @@ from klack.units import (
     Time,
 )
 
-__all__ = ["CaseNoise", "NoiseDrive", "NoiseMount", "NoisePlate"]
+__all__ = [
+    "CaseNoise",
+    "NoiseDrive",
+    "NoiseInterface",
+    "NoiseMount",
+    "NoisePlate",
+    "mounting_places",
+]
 
 
 class NoiseMount(Section):
@@ -48,6 +56,25 @@ class NoisePlate(Section):
     loss_factor: Ratio = Field(
         default=0.01, gt=0, lt=1, description="Of the mounted plate; 0.5 to 5 %, an assumption."
     )
+
+
+class NoiseInterface(Section):
+    """Held surfaces by which the valve stands in a machine, as one mount of up to six freedoms."""
+
+    surface: BodySurface | tuple[BodySurface, ...] = Field(
+        description="Surface in 'fixed' of its body, as body.surface; several, also of several "
+        "bodies, move together.",
+    )
+    interface: Literal["rigid", "averaged"] = Field(
+        default="rigid",
+        description="The joint moves all points of the surface alike, or the surface stays "
+        "flexible and its mean motion counts.",
+    )
+
+    @property
+    def surfaces(self) -> tuple[SurfaceName, ...]:
+        """All of them."""
+        return (self.surface,) if isinstance(self.surface, SurfaceName) else self.surface
 
 
 class NoiseDrive(Section):
@@ -93,6 +120,18 @@ class CaseNoise(Section):
     plate: NoisePlate | None = Field(
         default=None, description="Plate below the mount that radiates as well."
     )
+    mounts: dict[Name, NoiseInterface] | None = Field(
+        default=None,
+        min_length=1,
+        description="The valve as a source at its mounts: free velocity, blocked force, mobility.",
+    )
+    reactions: dict[Name, Literal["outside"] | BodySurface] | None = Field(
+        default=None,
+        description="With mounts: surface of a held body, as body.surface, on which the reaction "
+        "of a component acts that pushes moving parts alone; 'fluid' of all pressures and flows; "
+        "outside: it acts on the valve from outside.",
+        examples=[{"magnet": "housing.pole", "spring": "housing.spring_seat"}],
+    )
     radiation: Literal["piston", "unity", "elements"] = Field(
         default="piston",
         description="How the bodies radiate: estimated with the efficiency of a piston of the same "
@@ -124,3 +163,13 @@ class CaseNoise(Section):
                 hint="the estimate is for the far field; 1 m is usual.",
             )
         return self
+
+
+def mounting_places(noise: CaseNoise) -> Iterator[tuple[Key, SurfaceName]]:
+    """Surfaces of mounts and reactions, and their keys."""
+    for name, mount in (noise.mounts or {}).items():
+        for surface in mount.surfaces:
+            yield ("noise", "mounts", name, "surface"), surface
+    for name, place in (noise.reactions or {}).items():
+        if isinstance(place, SurfaceName):
+            yield ("noise", "reactions", name), place

@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 
 from klack.case.bodies import CaseFile
+from klack.case.noise import mounting_places
 from klack.case.reader import parse
 from klack.case.schema import Case
 from klack.case.valve import ValveCase
@@ -43,6 +44,8 @@ def _of_bodies(case: CaseFile) -> Iterator[_Named]:
     noise = case.noise if isinstance(case, Case | ValveCase) else None
     for i, place in enumerate(noise.surfaces or () if noise else ()):
         yield ("noise", "surfaces", i), place.body, place.surface
+    for key, place in mounting_places(noise) if noise else ():
+        yield key, place.body, place.surface
 
 
 def _of_contacts(case: CaseFile) -> Iterator[_Named]:

@@ -5,11 +5,12 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from operator import itemgetter
+from operator import attrgetter, itemgetter
 
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.acoustics.source_levels import FORCE_REFERENCE, VELOCITY_REFERENCE
 from klack.acoustics.third_octave import ENERGY_REFERENCE, ThirdOctaves, nominal_label
 from klack.analyses.analysis import Measured, StoredAnalysis
 from klack.analyses.json_parts import (
@@ -22,7 +23,12 @@ from klack.analyses.json_parts import (
     schema_key,
 )
 from klack.analyses.measures import text_table
-from klack.analyses.noise.measures import BODY_MEASURES, DESIGN_MEASURES, STOP_MEASURES
+from klack.analyses.noise.measures import (
+    BODY_MEASURES,
+    DESIGN_MEASURES,
+    MOUNT_MEASURES,
+    STOP_MEASURES,
+)
 from klack.analyses.noise.record import NoiseDesign, NoiseStudy
 from klack.analyses.store import RecordFormat
 from klack.terminal.tables import TextTable
@@ -61,6 +67,44 @@ _BODY = JsonForm(
         lambda body: dict(zip(body.groups, body.radiated.sum(axis=1), strict=True)),
     ),
 )
+_FREEDOM = JsonForm(
+    "MountFreedomJson",
+    "One freedom of a mount; its curves are in the files of the source.",
+    *measured_keys(MOUNT_MEASURES),
+    Key(
+        "free_velocity_dB",
+        [float],
+        "Third octaves re (1 nm/s)^2 s; empty where nothing moves.",
+        lambda item: _levels(item.velocity_bands, VELOCITY_REFERENCE),
+    ),
+    Key(
+        "blocked_force_dB",
+        [float],
+        "Third octaves re (1 uN)^2 s; empty where nothing acts.",
+        lambda item: _levels(item.force_bands, FORCE_REFERENCE),
+    ),
+)
+_MOUNTS = JsonForm(
+    "MountSourceJson",
+    "The valve as a source at its mounts.",
+    Key("mass_kg", float, "Of the held bodies.", attrgetter("mass")),
+    Key(
+        "balance",
+        Real,
+        "Sum of forces and momentum over the largest force; null if closed by momentum.",
+    ),
+    Key(
+        "band_center_Hz",
+        [float],
+        of=lambda source: list(source.freedoms[0].velocity_bands.middle),
+    ),
+    Key(
+        "freedoms",
+        {str: _FREEDOM},
+        "By name, flange.z.",
+        lambda source: {item.name: item for item in source.freedoms},
+    ),
+)
 _DESIGN = JsonForm(
     "DesignNoiseJson",
     "Noise of one design; measures of sound are null where nothing radiates.",
@@ -76,6 +120,12 @@ _DESIGN = JsonForm(
     *measured_keys(DESIGN_MEASURES),
     Key("stops", {str: _STOP}, "By stop.", lambda design: {x.stop: x for x in design.stops}),
     Key("bodies", {str: _BODY}, "By body.", lambda design: {x.name: x for x in design.bodies}),
+    Key(
+        "mounts",
+        {str: _MOUNTS},
+        "The valve as a source at its mounts; empty without noise.mounts.",
+        lambda design: {} if design.at_mounts is None else {"source": design.at_mounts},
+    ),
 )
 _STUDY = JsonForm(
     "NoiseJson",
@@ -105,6 +155,10 @@ def _bands(bands: ThirdOctaves, energy: Floats) -> list[tuple[float, str, float]
     ]
 
 
+def _levels(bands: ThirdOctaves, reference: float) -> list[float]:
+    return list(bands.level_re(reference**2)) if np.any(bands.energy > 0.0) else []
+
+
 def _told(study: NoiseStudy) -> Iterator[TextTable | str]:
     """Show the designs side by side, then how far each is from the first.
 
@@ -114,6 +168,19 @@ def _told(study: NoiseStudy) -> Iterator[TextTable | str]:
     first, *others = study.designs
     table = text_table(study.title, "design", DESIGN_MEASURES, ((d.name, d) for d in study.designs))
     yield replace(table, rows=(*table.rows, *(_difference_row(other, first) for other in others)))
+    mounted = [design for design in study.designs if design.at_mounts is not None]
+    if mounted:
+        yield text_table(
+            "Source at its mounts, exposure of one click to 20 kHz, re 1 nm/s and 1 uN",
+            "freedom",
+            MOUNT_MEASURES,
+            (
+                (f"{design.name} {item.name}" if len(mounted) > 1 else item.name, item)
+                for design in mounted
+                if design.at_mounts is not None
+                for item in design.at_mounts.freedoms
+            ),
+        )
 
 
 def _measured(study: NoiseStudy) -> Iterator[Measured]:
@@ -123,6 +190,8 @@ def _measured(study: NoiseStudy) -> Iterator[Measured]:
             yield f"{design.name}, {stop.stop}", stop, STOP_MEASURES
         for body in design.bodies:
             yield f"{design.name}, {body.name}", body, BODY_MEASURES
+        for freedom in design.at_mounts.freedoms if design.at_mounts else ():
+            yield f"{design.name}, {freedom.name}", freedom, MOUNT_MEASURES
 
 
 def _difference_row(design: NoiseDesign, first: NoiseDesign) -> tuple[str, ...]:
@@ -150,7 +219,10 @@ NOISE = StoredAnalysis(
             "low": "Hz",
             "high": "Hz",
             "injected": "J",
-            "mobility": "m/(N s)",
+            "mobility": "m/(N s), of rotations and moments 1/(N s), 1/(N m s)",
+            "position": "m",
+            "free_velocity": "m/s/Hz, of rotations 1/Hz",
+            "blocked_force": "N/Hz, of moments N m/Hz",
             "area": "m^2",
             "radiated": "J",
             "upper_bound": "J",
@@ -169,6 +241,7 @@ NOISE = StoredAnalysis(
         "design and its noise": DESIGN_MEASURES,
         "stop and its force": STOP_MEASURES,
         "body that vibrates": BODY_MEASURES,
+        "freedom of a mount": MOUNT_MEASURES,
     },
     measured=_measured,
 )

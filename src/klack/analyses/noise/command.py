@@ -56,6 +56,7 @@ def noise(
 
     with show_progress(wanted.quiet):
         from klack.analyses.noise.analysis import NOISE
+        from klack.analyses.noise.mount_source import write_sources
         from klack.analyses.noise.run import run_noise
         from klack.analyses.noise.sounds import write_sounds
 
@@ -66,7 +67,11 @@ def noise(
             for source in _sources(path, case, names, progress, wanted.threads)
         ]
         study = run_noise(sources, names=_names(paths, sources), progress=progress)
-    return ending.end(NOISE, study, beside=lambda folder: write_sounds(study, folder))
+    return ending.end(
+        NOISE,
+        study,
+        beside=lambda folder: (*write_sounds(study, folder), *write_sources(study, folder)),
+    )
 
 
 def _cases(paths: Sequence[Path], own: "OwnComponents") -> "list[AnyCase | None]":

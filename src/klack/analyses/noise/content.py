@@ -14,6 +14,7 @@ from klack.analyses.noise.figures import (
     force_chart,
     mobility_charts,
     radiation_chart,
+    source_charts,
     spectrum_chart,
     strongest_chart,
 )
@@ -22,6 +23,7 @@ from klack.analyses.noise.measures import (
     DESIGN_MEASURES,
     EXPOSURE_LEVEL_A,
     FORCE_LEVEL,
+    MOUNT_MEASURES,
     STOP_MEASURES,
     strongest,
 )
@@ -97,6 +99,7 @@ def noise_content(study: NoiseStudy) -> Content:
         _energy(study),
         Section(title="Mobility at the contacts", charts=mobility_charts(study)),
         Section(title="Force on the support", charts=blocked_charts(study)),
+        *_source_sheet(study),
         _radiation(study),
         Section(title="How the surfaces move", picture=surface_figure(study)),
         Section(title="The click", charts=click_charts(study)),
@@ -143,6 +146,45 @@ def _number_table(study: NoiseStudy) -> Table:
 
 
 # --------------------------------------------------------------------------- sections
+
+
+def _source_sheet(study: NoiseStudy) -> tuple[Section, ...]:
+    """What a supplier hands to the maker of a machine."""
+    mounted = [design for design in study.designs if design.at_mounts is not None]
+    if not mounted:
+        return ()
+    rows, words = [], []
+    for design in mounted:
+        source = design.at_mounts
+        assert source is not None
+        whose = f"{design.name}, " if len(mounted) > 1 else ""
+        for item in source.freedoms:
+            place = ", ".join(f"{1e3 * x:.4g}" for x in item.position)
+            rows.append((f"{whose}{item.name}", place, *page_cells(MOUNT_MEASURES, item)))
+        balance = (
+            "forces of the fluid close the sum by momentum"
+            if np.isnan(source.balance)
+            else f"all forces and m a leave {source.balance:.1g} of the largest force"
+        )
+        words.append(f"{whose}{quantity(source.mass, 'kg', 3)} of held bodies; {balance}.")
+    return (
+        Section(
+            title="Source at its mounts",
+            paragraphs=(
+                "Independent of the machine: free velocity, blocked force and mobility of the free "
+                "valve (files source.nc and source.uff). Forces act along the axis; a body of "
+                "revolution moves across it only where a machine pushes back.",
+                *words,
+            ),
+            tables=(
+                Table(
+                    columns=("freedom", "x, y, z in mm", *page_heads(MOUNT_MEASURES)),
+                    rows=tuple(rows),
+                ),
+            ),
+            charts=source_charts(study),
+        ),
+    )
 
 
 def _listen(study: NoiseStudy) -> Section:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.acoustics.signal_statistics import EXPOSURE_REFERENCE
+from klack.acoustics.source_levels import FORCE_REFERENCE, VELOCITY_REFERENCE, drive_lines
 from klack.acoustics.third_octave import ENERGY_REFERENCE, ThirdOctaves
 from klack.analyses.noise.record import BodyNoise, NoiseDesign, NoiseStudy, StopForce
 from klack.report.chart import AxisSpec, Band, Chart, Curve, Mark, Panel
@@ -24,6 +25,7 @@ __all__ = [
     "force_chart",
     "mobility_charts",
     "radiation_chart",
+    "source_charts",
     "spectrum_chart",
     "strongest_chart",
 ]
@@ -361,6 +363,78 @@ def blocked_charts(study: NoiseStudy) -> tuple[Chart, ...]:
             )
         )
     return tuple(charts)
+
+
+def source_charts(study: NoiseStudy) -> tuple[Chart, ...]:
+    """Free velocity, blocked force and their drive lines, and mobility, by freedom."""
+    mounted = [d for d in study.designs if d.at_mounts is not None]
+    if not mounted:
+        return ()
+    velocity: list[Curve] = []
+    force: list[Curve] = []
+    lines: list[Curve] = []
+    mobility: list[Curve] = []
+    for design in mounted:
+        source, whose = design.at_mounts, f"{design.name}, " if len(mounted) > 1 else ""
+        assert source is not None
+        f = 1e-3 * source.frequency
+        for i, item in enumerate(source.freedoms):
+            k, label = len(mobility), f"{whose}{item.name}"
+            drive_point = np.abs(source.mobility[:, i, i])
+            mobility.append(look_of(k).curve(f, drive_point, label))
+            if not item.force_bands.energy.any():
+                continue
+            for bands, reference, curves in (
+                (item.velocity_bands, VELOCITY_REFERENCE, velocity),
+                (item.force_bands, FORCE_REFERENCE, force),
+            ):
+                level = _level(bands.energy, reference**2)
+                curves.append(_steps(bands, level, k, label, listed=True))
+            at, rms = drive_lines(source.frequency, item.blocked_force, design.settings.rate)
+            lines.append(look_of(k).curve(1e-3 * at, _level(rms**2, FORCE_REFERENCE**2), label))
+    top = max(1e-3 * float(d.at_mounts.frequency[-1]) for d in mounted if d.at_mounts)
+    axis = AxisSpec(label="frequency", unit="kHz", log=True, range=(_FREQUENCY[0], top))
+
+    def chart(name: str, title: str, y: AxisSpec, curves: list[Curve], note: str) -> Chart:
+        return Chart(
+            name=name,
+            title=title,
+            x=axis,
+            panels=(Panel(y=y, curves=tuple(curves)),),
+            note=note,
+        )
+
+    rate = mounted[0].settings.rate
+    return (
+        chart(
+            "free-velocity",
+            "Free velocity of the mounts",
+            AxisSpec(label="exposure of one click", unit="dB re (1 nm/s)² s"),
+            velocity,
+            "Third octaves of one click, divided by no duration. Rotations re (1 nrad/s)² s.",
+        ),
+        chart(
+            "mount-force",
+            "Blocked force of the mounts",
+            AxisSpec(label="exposure of one click", unit="dB re (1 µN)² s"),
+            force,
+            "Third octaves of one click on mounts that are held. Moments re (1 µN m)² s.",
+        ),
+        chart(
+            "drive-lines",
+            "Lines of the drive",
+            AxisSpec(label="rms", unit="dB re 1 µN"),
+            lines,
+            f"Rms of the lines of the blocked force at multiples of {quantity(rate, 'Hz', 3)}.",
+        ),
+        chart(
+            "source-mobility",
+            "Mobility of the free valve at its mounts",
+            AxisSpec(label="velocity per force", unit="m/(N s), 1/(N m s)", log=True),
+            mobility,
+            "Drive points, of rotations per moment. The files of the source have the matrix.",
+        ),
+    )
 
 
 def radiation_chart(study: NoiseStudy) -> Chart | None:

@@ -6,9 +6,16 @@ from math import log10
 from typing import cast
 
 from klack.acoustics.signal_statistics import SoundStatistics
+from klack.acoustics.source_levels import FORCE_REFERENCE, VELOCITY_REFERENCE
 from klack.acoustics.third_octave import ENERGY_REFERENCE
 from klack.analyses.measures import Column, Measure, Value, described_in
-from klack.analyses.noise.record import BodyNoise, ClickSound, NoiseDesign, StopForce
+from klack.analyses.noise.record import (
+    BodyNoise,
+    ClickSound,
+    MountFreedom,
+    NoiseDesign,
+    StopForce,
+)
 
 __all__ = [
     "BODY_MEASURES",
@@ -16,6 +23,7 @@ __all__ = [
     "DESIGN_MEASURES",
     "EXPOSURE_LEVEL_A",
     "FORCE_LEVEL",
+    "MOUNT_MEASURES",
     "STOP_MEASURES",
     "strongest",
 ]
@@ -436,3 +444,44 @@ BODY_MEASURES: tuple[Measure[BodyNoise], ...] = described_in(
     ),
 )
 """Of one rigidly held body."""
+
+
+def _exposure_level(energy: float, reference: float) -> float | None:
+    """None of what does not move."""
+    return 10.0 * log10(energy / reference**2) if energy > 0.0 else None
+
+
+MOUNT_MEASURES: tuple[Measure[MountFreedom], ...] = described_in(
+    "theory/structure-borne-source",
+    Measure(
+        key="free_velocity_level",
+        name="free velocity",
+        symbol="L_vf",
+        unit="dB",
+        definition="Exposure of one click, ∫ v² dt over the bands to 20 kHz, of mounts that are "
+        "free, re (1 nm/s)² s; of rotations re (1 nrad/s)² s.",
+        note="ISO 9611 refers to 50 nm/s, which makes levels 34 dB lower.",
+        read=lambda freedom: _exposure_level(
+            float(freedom.velocity_bands.energy.sum()), VELOCITY_REFERENCE
+        ),
+        form="fixed",
+        digits=1,
+        column=Column("dB", 1.0, ".1f"),
+        page=True,
+    ),
+    Measure(
+        key="blocked_force_level",
+        name="blocked force",
+        symbol="L_Fbl",
+        unit="dB",
+        definition="Exposure of one click, ∫ F² dt over the bands to 20 kHz, on mounts that are "
+        "held, re (1 µN)² s; of moments re (1 µN m)² s.",
+        read=lambda freedom: _exposure_level(
+            float(freedom.force_bands.energy.sum()), FORCE_REFERENCE
+        ),
+        form="fixed",
+        digits=1,
+        column=Column("dB", 1.0, ".1f"),
+        page=True,
+    ),
+)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.acoustics.impulsive import Prominence
+from klack.acoustics.interface import InterfacePoint, SourceAtMounts, freedoms_of
 from klack.acoustics.loudness import Loudness
 from klack.acoustics.signal_statistics import SoundStatistics
 from klack.acoustics.third_octave import ThirdOctaves
@@ -16,6 +17,8 @@ from klack.signals.sampled import TimeSeries
 __all__ = [
     "BodyNoise",
     "ClickSound",
+    "MountFreedom",
+    "MountSource",
     "NoiseDesign",
     "NoiseSettings",
     "NoiseStudy",
@@ -173,6 +176,67 @@ class ClickSound:
     prominence: Prominence | None = None
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MountFreedom:
+    """One freedom of a mount; exposures of one click.
+
+    Parameters
+    ----------
+    name
+        ``flange.z``.
+    position (3,) [m]
+        Of its mount.
+    free_velocity, blocked_force (k,) [m/s/Hz], [N/Hz]
+        Of rotations 1/Hz, N m/Hz.
+    velocity_bands, force_bands [(m/s)^2 s], [N^2 s]
+    """
+
+    name: str
+    position: Floats
+    free_velocity: NDArray[np.complex128]
+    blocked_force: NDArray[np.complex128]
+    velocity_bands: ThirdOctaves
+    force_bands: ThirdOctaves
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MountSource:
+    """The valve as a source at its mounts; ``n`` freedoms, ``k`` frequencies.
+
+    Parameters
+    ----------
+    frequency (k,) [Hz]
+    mobility (k, n, n) [m/(N s), 1/(N s), 1/(N m s)]
+    mass [kg]
+        Of the held bodies.
+    balance [-]
+        Largest value of the sum of all forces on held bodies and of m a of what moves, over the
+        largest force; nan where forces of a fluid close the sum by momentum.
+    """
+
+    frequency: Floats
+    freedoms: tuple[MountFreedom, ...]
+    mobility: NDArray[np.complex128]
+    mass: float
+    balance: float
+
+    def source(self) -> SourceAtMounts:
+        """As what couples with a receiver."""
+        places = {item.name.split(".")[0]: item.position for item in self.freedoms}
+        return SourceAtMounts(
+            frequency=self.frequency,
+            points=tuple(InterfacePoint(name=n, position=x) for n, x in places.items()),
+            freedoms=tuple(
+                freedom
+                for item in self.freedoms
+                for freedom in freedoms_of(item.name.split(".")[0], [item.name.split(".")[1]])
+            ),
+            free_velocity=np.stack([item.free_velocity for item in self.freedoms], axis=1),
+            blocked_force=np.stack([item.blocked_force for item in self.freedoms], axis=1),
+            mobility=self.mobility,
+        )
+
+
 @dataclass(frozen=True, kw_only=True)
 class NoiseSettings:
     """Section ``noise`` of a case, in SI.
@@ -233,6 +297,8 @@ class NoiseDesign:
         sound.
     bodies
         Elastic held ones; without any there is no sound.
+    at_mounts
+        If mounts are described.
     """
 
     name: str
@@ -251,6 +317,7 @@ class NoiseDesign:
     settings: NoiseSettings
     notes: tuple[str, ...] = ()
     own_components: Mapping[str, str] = field(default_factory=dict)
+    at_mounts: MountSource | None = None
 
     @property
     def band_middle(self) -> Floats:

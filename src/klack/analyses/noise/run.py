@@ -29,6 +29,7 @@ from klack.analyses.noise.body import (
     net_share,
     port_transfers,
 )
+from klack.analyses.noise.mount_source import mount_source
 from klack.analyses.noise.record import (
     BodyNoise,
     ClickSound,
@@ -140,6 +141,7 @@ def _design(source: NoiseSource, name: str, *, several: bool, clock: StageClock)
     found = [body_noise(structure, forces, around) for structure in source.structures]
     bodies = tuple(body for body in found if body is not None)
     clock("sound", 0.0)
+    at_mounts = None if source.held is None else mount_source(source.structures, source.held)
     pressure = _pressure(source, around, transfers)
     sound = _heard(pressure, source, clock) if pressure is not None else None
     return NoiseDesign(
@@ -159,6 +161,7 @@ def _design(source: NoiseSource, name: str, *, several: bool, clock: StageClock)
         settings=_settings(source, elements[0]),
         notes=(*source.notes, *_design_notes(source, bodies, sound, elements)),
         own_components=source.own_components,
+        at_mounts=at_mounts,
     )
 
 

@@ -21,6 +21,7 @@ from klack.analyses.noise.force import (
     interrupted_impact,
     stop_forces,
 )
+from klack.analyses.noise.reactions import HeldForces, forces_of_impact, forces_of_stroke
 from klack.analyses.stroke.record import StopSummary, StrokeStudy, StrokeVariant
 from klack.analyses.stroke.run import run_stroke
 from klack.assembling.body_summary import BodySummary
@@ -71,6 +72,8 @@ class NoiseSource:
         ``"impact"`` or ``"stroke"``.
     run, label
         Variant or level, and in words.
+    held
+        All forces on held bodies with their reactions, if mounts are described.
     net [N]
         Mass times acceleration of the needle, means over records: all forces on it. None where it
         is the contact force (a needle that only falls), or unknown.
@@ -93,6 +96,7 @@ class NoiseSource:
     given: bool
     materials: Mapping[str, CaseMaterial]
     net: TimeSeries | None = None
+    held: HeldForces | None = None
     notes: tuple[str, ...] = ()
     own_components: Mapping[str, str] = field(default_factory=dict)
 
@@ -197,6 +201,7 @@ def impact_sources(
                 noise=noise,
                 given=given,
                 materials=materials,
+                held=forces_of_impact(_mounted(study, noise), force) if noise.mounts else None,
                 notes=(
                     *failed,
                     *(f"level '{name}': {doubt}" for doubt in result.doubts),
@@ -245,6 +250,7 @@ def stroke_sources(
                 given=given,
                 materials=materials,
                 net=net if net is None else before_impact(net, last),
+                held=_held(study, variant, noise, last),
                 notes=(
                     *filter(None, [cut]),
                     *_notes(variant, last),
@@ -254,6 +260,59 @@ def stroke_sources(
             )
         )
     return tuple(found)
+
+
+def _held(
+    study: StrokeStudy, variant: StrokeVariant, noise: CaseNoise, last: ImpactEvent | None
+) -> HeldForces | None:
+    if not noise.mounts:
+        return None
+    structures = _mounted(study, noise)
+    return forces_of_stroke(
+        structures,
+        variant.result,
+        variant.acting,
+        variant.moving,
+        noise,
+        until=None if last is None else last.time,
+    )
+
+
+def _mounted(study: ImpactStudy | StrokeStudy, noise: CaseNoise) -> tuple[Structure, ...]:
+    """Structures at mounts, of all held bodies; rejects what nothing but the mounts joins."""
+    found = tuple(item for item in study.structures if item.at_mounts)
+    without = [item.name for item in study.structures if not item.at_mounts]
+    if without or not found:
+        raise InputError(
+            f"result of case {study.case}: noise.mounts",
+            got=f"no mount of {one_of(without)}" if found else "no bodies at mounts in the result",
+            expected="every held body at a mount, since all of them carry forces",
+            hint="list the surfaces that move together: "
+            "mounts: {flange: {surface: [housing.rim, pole.rim]}}."
+            if found
+            else "run the case again with these mounts, then klack noise.",
+        )
+    joined = {found[0].name}
+    mounts = {item.name: set(item.at_mounts[0].mounts) for item in found}
+    for _ in found:
+        reached = {mount for name in joined for mount in mounts[name]}
+        joined |= {name for name, own in mounts.items() if own & reached}
+    apart = [name for name in mounts if name not in joined]
+    known = {mount for own in mounts.values() for mount in own}
+    missing = [name for name in noise.mounts or {} if name not in known]
+    if apart or missing:
+        raise InputError(
+            f"case {study.case}: noise.mounts",
+            got=f"{one_of(apart)} and {found[0].name}, which share no mount"
+            if apart
+            else f"the mount '{missing[0]}', which the result does not hold",
+            expected="one vibrating body: held bodies that share a mount",
+            hint="list both surfaces in one mount, if they are joined stiffly there: "
+            "surface: [housing.rim, pole.rim]."
+            if apart
+            else "run the case again, then klack noise.",
+        )
+    return found
 
 
 def _stops(

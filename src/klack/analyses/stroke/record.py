@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.analyses.record import CaseRecord
+from klack.analyses.stroke.acting import ActingForce, MovingBody
 from klack.analyses.stroke.step_check import ImpactChange
 from klack.analyses.stroke.times import LiftTimes, Passage
 from klack.assembling.body_summary import BodySummary
@@ -182,6 +183,8 @@ class StrokeVariant:
         Of each impact when all steps are doubled, if asked for.
     halvings
         Of all steps, by their check.
+    acting, moving
+        Recorded forces and where they act, and what moves; empty in results of former versions.
     """
 
     name: str
@@ -196,6 +199,8 @@ class StrokeVariant:
     times: tuple[LiftTimes, ...] = ()
     changes: tuple[ImpactChange, ...] = ()
     halvings: int = 0
+    acting: tuple[ActingForce, ...] = ()
+    moving: tuple[MovingBody, ...] = ()
 
     @property
     def needle_times(self) -> LiftTimes:

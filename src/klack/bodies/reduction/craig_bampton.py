@@ -27,7 +27,7 @@ held there.
 motions stay free of stiffness and loss.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -42,7 +42,28 @@ from klack.bodies.reduction.damping import Damping
 from klack.bodies.reduction.reduce import at_ports
 from klack.machine.cache.entry import Entry
 
-__all__ = ["CraigBampton", "Interface", "InterfaceKind", "constrained_modes", "craig_bampton"]
+__all__ = [
+    "CRAIG_BAMPTON_UNITS",
+    "CraigBampton",
+    "Interface",
+    "InterfaceKind",
+    "averages_of",
+    "constrained_modes",
+    "craig_bampton",
+]
+
+CRAIG_BAMPTON_UNITS: Mapping[str, str] = {
+    "omega": "rad/s",
+    "damping": "1",
+    "references": "m",
+    "participation": "kg^0.5",
+    "mass": "kg",
+    "stiffness": "N/m",
+    "loss": "N s/m",
+    "port_shapes": "kg^-0.5",
+    "port_motion": "1",
+}
+"""Units of the arrays of a stored :class:`CraigBampton`, of translations."""
 
 InterfaceKind = Literal["rigid", "averaged"]
 
@@ -60,6 +81,8 @@ class CraigBampton:
     omega, damping (m,) [rad/s], [-]
     mounts, directions (n,)
         Mount of each freedom, and 1 to 6 for x, y, z, rx, ry, rz.
+    references (n, 3) [m]
+        Where the mount of each freedom is.
     participation (m, n) [sqrt(kg), m sqrt(kg) for rotations]
         ``P``.
     mass, stiffness, loss (n, n) [kg], [N/m], [N s/m]
@@ -74,6 +97,7 @@ class CraigBampton:
     damping: Vector
     mounts: tuple[str, ...]
     directions: tuple[int, ...]
+    references: Matrix
     participation: Matrix
     mass: Matrix
     stiffness: Matrix
@@ -107,6 +131,7 @@ class Interface:
         Area that each degree of freedom stands for; zero off the surface.
     rows
         Degrees of freedom of its nodes.
+    reference (3,) [m]
     """
 
     mount: str
@@ -115,6 +140,7 @@ class Interface:
     motion: Matrix
     weights: Vector
     rows: Ints
+    reference: Vector
 
     def averages(self) -> Matrix:
         """``B``, shape (n_dof, d)."""
@@ -237,6 +263,7 @@ def craig_bampton(
         damping=damping.ratios(modes.omega),
         mounts=tuple(part.mount for part in interfaces for _ in part.directions),
         directions=tuple(d for part in interfaces for d in part.directions),
+        references=np.vstack([np.tile(p.reference, (len(p.directions), 1)) for p in interfaces]),
         participation=modes.shapes.T @ (body.M @ Psi),
         mass=M_b,
         stiffness=K_b,

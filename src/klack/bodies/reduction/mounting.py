@@ -113,6 +113,7 @@ def interface_of(
         motion=motion,
         weights=np.outer(surface.area, share).ravel(),
         rows=(d * surface.nodes[:, None] + np.arange(d)).ravel(),
+        reference=surface.reference,
     )
 
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from klack.bodies.elasticity.body import ElasticBody
 from klack.bodies.elasticity.eigen import Modes
+from klack.bodies.reduction.craig_bampton import CRAIG_BAMPTON_UNITS, CraigBampton
 from klack.bodies.reduction.damping import Damping
 from klack.bodies.reduction.ports import Port, face_samples
 from klack.bodies.reduction.reduce import at_ports
@@ -20,6 +21,7 @@ __all__ = ["STRUCTURE_UNITS", "Structure", "StructurePort", "build_structure"]
 
 
 STRUCTURE_UNITS: Mapping[str, str] = {
+    **CRAIG_BAMPTON_UNITS,
     "omega": "rad/s",
     "damping": "1",
     "port_signs": "1",
@@ -81,6 +83,8 @@ class Structure:
         Static normal displacement per force at each port, less the share of the modes.
     axial_normals (f,) [-]
         Mean axial component of the outward normal.
+    at_mounts
+        The body at its mounts, in parts that do not couple (Fourier orders); empty without.
     """
 
     name: str
@@ -105,6 +109,7 @@ class Structure:
     face_shapes: NDArray[np.float32]
     face_residual: NDArray[np.float32]
     axial_normals: NDArray[np.float64]
+    at_mounts: tuple[CraigBampton, ...] = ()
 
     @property
     def highest_frequency(self) -> float:
