@@ -13,6 +13,7 @@ from shutil import copytree
 import numpy as np
 import pytest
 
+from klack.acoustics.boundary import outline
 from klack.analyses.impact.analysis import IMPACT
 from klack.analyses.noise.analysis import NOISE
 from klack.analyses.noise.content import noise_content
@@ -323,6 +324,16 @@ def test_surfaces_that_enclose_nothing_radiate_as_pistons_and_say_so(impact):
     (note,) = [note for note in design.notes if "pistons" in note]
     assert "enclose nothing" in note
     assert design.settings.radiation == "piston"
+
+
+def test_large_elements_say_up_to_where_they_hold(impact, monkeypatch):
+    """17 mm of outline in elements of 0.7 mm or up to half as much more, in slow air."""
+    monkeypatch.setattr(outline, "_MOST", 24)
+    design = sounding(impact, radiation="elements", sound_speed=60.0)
+    (note,) = [note for note in design.notes if "boundary elements hold" in note]
+    found = float(re.search(r"up to ([\d.]+) kHz", note)[1])
+    assert 60.0 / 6.0 / (1.5 * 0.72) < found < 60.0 / 6.0 / 0.7
+    assert design.settings.radiation == "elements"
 
 
 def test_the_page_of_the_how_to_prints_the_right_numbers(numbers):

@@ -138,7 +138,9 @@ def test_what_is_no_closed_surface(change, words: str) -> None:
         Meridian(nodes=change(sphere_meridian(20).nodes))
 
 
-@pytest.mark.parametrize(("k", "along", "rocking"), [(0.3, 5.08e-4, 3.4e-7), (1.0, 0.0544, None)])
+@pytest.mark.parametrize(
+    ("k", "along", "rocking"), [(0.3, 5.08e-4, 3.4e-7), (1.0, 0.0544, None), (4.0, 1.14, None)]
+)
 def test_rigid_box_in_triangles(k: float, along: float, rocking: float | None) -> None:
     """Efficiency of another program, 0.3 dB; with motions that cancel 5 %."""
     mesh = box(0.125)

@@ -13,7 +13,8 @@ that falls with :math:`f^4`,
 .. math:: R(k) = \frac{k^2}{4\pi} V V^T + \Big(\frac{k}{k_0}\Big)^4
           \Big(R(k_0) - \frac{k_0^2}{4\pi} V V^T\Big),
 
-and from twice the top on waves are plane. Matrices are per :math:`\rho c`; each group of the
+and from twice the top on waves are plane. The top is 20 kHz, or where the largest element is a
+sixth of the wavelength. Matrices are per :math:`\rho c`; each group of the
 surface has its own, for the power that leaves through it, and their sum is the whole.
 """
 
@@ -40,7 +41,7 @@ __all__ = ["TOP", "SurfaceRadiation", "surface_radiation"]
 Complexes = NDArray[np.complex128]
 
 TOP = 20e3
-"""Highest frequency [Hz] that is solved for."""
+"""Highest frequency [Hz] that is solved for, if the elements hold that far."""
 
 _LOWEST = 10.0  # [Hz]
 _PER_OCTAVE = 6
@@ -142,12 +143,13 @@ def surface_radiation(
         outline = solid_outline(structures)
     else:
         outline = revolved_outline(structures, sound_speed / TOP / _PER_WAVE)
+    holds_up_to = sound_speed / (_PER_WAVE * outline.largest)
     found = []
     solved = remembered(
         cache,
         "surface radiation",
-        (outline.mesh, outline.motions, outline.group, sound_speed, TOP),
-        lambda: _solved(outline, sound_speed),
+        (outline.mesh, outline.motions, outline.group, sound_speed, min(TOP, holds_up_to)),
+        lambda: _solved(outline, sound_speed, min(TOP, holds_up_to)),
         pack=lambda arrays: Entry(arrays=arrays),
         unpack=lambda entry: dict(entry.arrays),
     )
@@ -159,7 +161,7 @@ def surface_radiation(
                 frequency=solved["frequency"],
                 scale=solved[f"scale {s}"],
                 correlation=_kept(solved[f"correlation {s}"], mine),
-                holds_up_to=sound_speed / (_PER_WAVE * outline.largest),
+                holds_up_to=holds_up_to,
                 residual=float(solved["residual"][0]),
                 covered=outline.covered,
                 elements=len(outline.group),
@@ -175,12 +177,12 @@ def _kept(correlation: NDArray[np.float64], mine: Sequence[int]) -> NDArray[np.f
     return np.concatenate([correlation[:, list(mine)], rest], axis=1)
 
 
-def _solved(outline: Outline, sound_speed: float) -> dict[str, NDArray[np.float64]]:
+def _solved(outline: Outline, sound_speed: float, top: float) -> dict[str, NDArray[np.float64]]:
     """Frequencies, and scales and correlations of each structure."""
     mesh = outline.mesh
     radius = float(np.sqrt(mesh.areas.sum() / (4.0 * pi)))
-    first = min(max(_LOWEST, _SMALL * sound_speed / (2.0 * pi * radius)), TOP / 2.0)
-    upper = np.geomspace(first, TOP, 1 + round(_PER_OCTAVE * float(np.log2(TOP / first))))
+    first = min(max(_LOWEST, _SMALL * sound_speed / (2.0 * pi * radius)), top / 2.0)
+    upper = np.geomspace(first, top, 1 + round(_PER_OCTAVE * float(np.log2(top / first))))
     lower = np.geomspace(_LOWEST, first, 1 + round(_PER_OCTAVE * float(np.log2(first / _LOWEST))))
     velocity = np.hstack(outline.motions)
     size = np.sqrt(mesh.weights @ velocity**2)  # fields have units of their own
@@ -207,7 +209,7 @@ def _solved(outline: Outline, sound_speed: float) -> dict[str, NDArray[np.float6
         scale = np.sqrt(np.maximum(power, _NOTHING))
         arrays[f"scale {s}"] = scale * size[own]
         arrays[f"correlation {s}"] = matrices / (scale[:, None, :, None] * scale[:, None, None, :])
-    arrays["frequency"] = np.concatenate([lower[:-1], upper, [2.0 * TOP]])
+    arrays["frequency"] = np.concatenate([lower[:-1], upper, [2.0 * top]])
     return arrays
 
 

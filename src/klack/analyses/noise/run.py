@@ -369,7 +369,8 @@ def _design_notes(
         if way.holds_up_to < _HEARING:
             found.append(
                 f"The boundary elements hold up to {format_si(way.holds_up_to, 'Hz')}, where the "
-                "largest is a sixth of the wavelength; above, the radiated sound is an estimate."
+                "largest is a sixth of the wavelength; above, the surface is taken to radiate "
+                "plane waves, an estimate."
             )
     if bodies and not source.given:
         found.append(
