@@ -54,18 +54,15 @@ from klack.simulation.network_result import StaticStart
 from klack.simulation.rest import resting_dissipation
 from klack.simulation.row_calls import SHARE_OF_STEP
 from klack.simulation.static_rows import (
-    EMPTIED,
-    EMPTY,
-    FOUND,
-    MORE,
-    NONE,
     Balance,
-    Begin,
     Couplings,
-    Parts,
-    State,
+    at_rest,
+    contacts_at_rest,
     fluids_at,
-    newton_steps,
+    last_change,
+    least_share,
+    newton_system,
+    slopes_at_rest,
 )
 from klack.simulation.wave_rows import start_wave
 from klack.units import format_si
@@ -76,13 +73,19 @@ __all__ = ["RestState", "SteadySlopes", "begin_at_rest", "begin_steady"]
 _FIRST, _LONGEST, _SHORTEST = 2e2, 2e13, 2e-5  # steps of pseudo-time over the step of the run
 _GROWTH = 8.0  # from one to the next
 _MOST_STATES = 64  # of elements that are kept for places which come again
-_MOST_ROUNDS = 100  # Newton steps at once, more than there are
+_MOST_NEWTON = 60
+_PLAIN_NEWTON = 15  # without a half step among them
 _MOST_BEYOND = 20  # steps that are shortened because a magnet would leave its range, or for fluid
+_HALVINGS = 12  # of a Newton step that leads where a part knows no answer
+_FALL = 0.1  # least share of a pressure that a Newton step leaves
+_FOUND = 1e-13  # last Newton step over the largest displacement, and over each pressure
+_STUCK = 1e-8  # the same, where round-off lets it fall no more
 _LENGTH = 20.0  # [m/s] displacements are told apart to a share of what this covers in a step
 _MOVE = 0.02  # [m/s] the same for the way by which a port is moved to see what changes
 _FAR = 2e9  # [m/s] ... and for what an unsupported body has gone
 _HIGH = 1e11  # [Pa] a volume that came so high lets nothing out
 _MOST_STEADY = 1e9  # [Pa] the same of an operating point: no valve is meant for more
+_EMPTY = 1e-3  # [Pa] ... so low gets nothing
 _UNDAMPED = float(np.finfo(float).tiny)  # [s/m]: known, and nothing
 _SHALLOW = 1e-6  # [m] no contact is looked at that is less deep
 _DEEP = 10.0  # of the way between the stops: nobody means a stop so soft
@@ -92,11 +95,22 @@ _FILLED = 1e-6  # of ambient pressure: a closed volume that something has filled
 _NEARLY = 1e-9  # the same where they come no closer
 
 
+@dataclass(slots=True)
+class _State:
+    z: Vector  # axial coordinates of all free bodies
+    y: Vector  # ports, the ground last
+    p: Vector  # all nodes
+    m: Vector  # columns
+
+    def copy(self) -> "_State":
+        return _State(self.z.copy(), self.y.copy(), self.p.copy(), self.m.copy())
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class RestState:
     """Equilibrium of a network, from which that of a similar one is found at once."""
 
-    _state: State
+    _state: _State
     _first: Vector  # pressures from which the search for it began
     _held: frozenset[int]
     _stuck: frozenset[int]
@@ -265,7 +279,7 @@ def _settled(
                 raise _unheld(network, away.bodies) from None
 
 
-def _march(problem: "_Balance", near: RestState | None) -> State:
+def _march(problem: "_Balance", near: RestState | None) -> _State:
     """Lead the start through pseudo-time to the equilibrium, from a near one with long steps.
 
     A body that nothing holds and on which nothing acts stays: in a long step it would drift.
@@ -314,6 +328,7 @@ class _Balance:
         lifts: Vector | None = None,
     ) -> None:
         self.network, self.step, self.enclosed, self.stuck = network, step, enclosed, sorted(stuck)
+        self.shift = 0.0 if shift is None else shift
         self.is_steady = lifts is not None
         self.high = _MOST_STEADY if self.is_steady else _HIGH
         self.emptied: list[int] = []  # volumes in the last step that failed for them
@@ -357,25 +372,22 @@ class _Balance:
         self.free = np.array(free, np.int64)
         self.shut = np.array([self.given[i] for i in free], dtype=bool)
         self._columns()
-        self.shift = np.zeros(count) if shift is None else shift
         self.kept = [
             (k, row.at_rest) for k, row in enumerate(rows.elements) if row.at_rest is not None
         ]
-        self.parts = Parts(
-            network.elements, network.branches, nodes, network.node_state.hint, network.interfaces
+        self._rows = (
+            network.elements,
+            network.branches,
+            nodes,
+            network.node_state.hint,
+            self.column_rows,
         )
-        size = count + 1 + nodes.nodes
-        self.now = Balance(
-            force=np.zeros(count + 1),
-            acting=np.zeros(count + 1),
-            inflow=np.zeros(nodes.nodes),
-            size=np.zeros(size),
-            by_port=np.zeros((size, count)),
-            by_pressure=np.zeros((size, self.free.size)),
-            contact=np.zeros(len(rows.interfaces)),
-            report=np.zeros(3, np.int64),
-            left=np.array([-1.0, 0.0]),
-        )
+        self.force, self.inflow = np.zeros(count + 1), np.zeros(nodes.nodes)
+        self.elements = self.force
+        self.size = np.zeros(count + 1 + nodes.nodes)
+        self.by_port = np.zeros((self.size.size, count))
+        self.by_pressure = np.zeros((self.size.size, self.free.size))
+        self.contact_force = np.zeros(len(rows.interfaces))
         length = _LENGTH * step  # in these units no unknown has a size of its own
         largest = np.max(np.abs(self.shapes), axis=1, initial=0.0)
         units = np.concatenate(
@@ -386,9 +398,11 @@ class _Balance:
                 np.full(len(self.ends), nodes.density * length**2),
             ]
         )
+        self.couplings = self._couplings(units)
+        self.code = np.zeros(3, np.int64)
         self.states: dict[tuple[int, bytes], Vector] = {}  # of elements, where they are asked again
         self.ranges = [limit for limit in rows.limits if limit.ports]
-        self.couplings = self._couplings(units)
+        self.beyond: tuple[LimitRow, float] | None = None  # range that was left last, and how far
 
     def _dry_friction(self, rigid: list[int]) -> Vector:
         """Largest force by which friction on what cannot move away holds each body [N]."""
@@ -439,7 +453,6 @@ class _Balance:
             *(row.drop(float(p[place[row.a]]), 0.0)[1] for row in waves),
         ]
         self.friction = np.array(friction, dtype=float)
-        self.drop = np.full(len(friction), np.nan)
 
     def _couplings(self, units: Vector) -> Couplings:
         nodes = self.network.nodes
@@ -455,32 +468,12 @@ class _Balance:
             for i, port, area in zip(nodes.wall_node, nodes.wall_port, nodes.wall_area, strict=True)
             if self.enclosed and int(i) in place and port < self.ports
         ]
-        range_ports = np.zeros((len(self.ranges), self.ports + 1))
-        for weights, limit in zip(range_ports, self.ranges, strict=True):
-            for port, factor in limit.ports:
-                weights[self.network.port_of[port]] += factor
-        ranges = [(x.start, x.valid[0] - x.slack, x.usable[1]) for x in self.ranges]
-        elements = self.network.elements
-        of_kept = [elements.ports[elements.port0[k] : elements.port0[k + 1]] for k, _ in self.kept]
-        asked = sorted({int(port) for ports in of_kept for port in ports} - {self.ports})
         return Couplings(
             shapes=self.shapes,
-            compliance=self.compliance,
-            shift=self.shift,
             units=units,
-            h=self.h,
-            move=self.move,
-            length=_LENGTH * self.step,
             free=self.free,
             shut=self.shut,
-            ends=self.ends,
             friction=self.friction,
-            drop=self.drop,
-            flows=self.column_rows,
-            range_ports=range_ports,
-            ranges=np.array(ranges, dtype=float).reshape(-1, 3),
-            asked_port=np.array(asked, dtype=np.int64),
-            asked=np.zeros((len(asked), self.now.size.size)),
             column=np.array([k for k, _, _ in joined], dtype=np.int64),
             sign=np.array([sign for _, sign, _ in joined], dtype=float),
             volume=np.array([j for _, _, j in joined], dtype=np.int64),
@@ -489,33 +482,27 @@ class _Balance:
             wall_area=np.array([area for _, _, area in walls], dtype=float),
         )
 
-    @property
-    def beyond(self) -> tuple[LimitRow, float] | None:
-        """Range that the last step left, and how far."""
-        k, value = int(self.now.left[0]), float(self.now.left[1])
-        return None if k < 0 else (self.ranges[k], value)
-
     def can_enclose(self, bodies: list[int]) -> bool:
         """Whether fluid in a volume may hold one of these bodies like a spring."""
         nodes = self.network.nodes
         walls = zip(nodes.wall_node, nodes.wall_port, strict=True)
         return any(i < nodes.volumes and self.body_of_port[port] in bodies for i, port in walls)
 
-    def first(self) -> State:
+    def first(self) -> _State:
         """Undeformed bodies, stated or ambient pressures, no flow in columns."""
         z = self.axial * self.lifts[self.of_body]
         y = np.append(self.shapes.T @ z, 0.0)
-        return State(z, y, self.at_first.copy(), np.zeros(len(self.ends)))
+        return _State(z, y, self.at_first.copy(), np.zeros(len(self.ends)))
 
-    def nearby(self, begin: State, near: RestState) -> State:
+    def nearby(self, begin: _State, near: RestState) -> _State:
         """Equilibrium of a similar network, with what is given in this one."""
         state = near._state.copy()
-        state.p[:] += begin.p - near._first  # a volume that nothing fills keeps what it begins with
+        state.p += begin.p - near._first  # a volume that nothing fills keeps what it begins with
         known = np.setdiff1d(np.arange(state.p.size), self.free)
         state.p[known] = begin.p[known]
         return state
 
-    def unbalanced(self, state: State, share: float = _ROUND_OFF) -> NDArray[np.bool_] | None:
+    def unbalanced(self, state: _State, share: float = _ROUND_OFF) -> NDArray[np.bool_] | None:
         """Rigid modes that are free to creep; None in equilibrium.
 
         One with round-off alone, which no force answers, is not.
@@ -523,9 +510,9 @@ class _Balance:
         if not self.evaluate(state):
             raise self.failed()
         ports, y = self.ports + 1, np.abs(state.y[:-1])
-        known = self.now.size + np.abs(self.now.by_port) @ y
-        known += np.abs(self.now.by_pressure) @ state.p[self.free]
-        left = np.abs(self.shapes @ self.now.force[:-1])
+        known = self.size + np.abs(self.by_port) @ y
+        known += np.abs(self.by_pressure) @ state.p[self.free]
+        left = np.abs(self.shapes @ self.force[:-1])
         pushed = left > share * (np.abs(self.shapes) @ known[: ports - 1])
         bent = self._bent(state)
         stretch = y + np.abs(self.compliance) @ known[: ports - 1]
@@ -548,37 +535,57 @@ class _Balance:
 
     def answering(self) -> NDArray[np.bool_]:
         """Rigid modes that move and whose motion a force answers."""
-        answers = np.any(self.shapes @ self.now.by_port[: self.ports] != 0.0, axis=1)
+        answers = np.any(self.shapes @ self.by_port[: self.ports] != 0.0, axis=1)
         return np.asarray(answers & self.moves)
 
     def advance(
         self,
-        start: State,
+        start: _State,
         tau: float,
         open_modes: NDArray[np.bool_],
         mass: Vector | None = None,
-    ) -> State | None:
+    ) -> _State | None:
         """One implicit Euler step of pseudo-time; None if Newton's method fails.
 
         ``mass`` is what the free volumes hold before, in place of that of ``start``.
         """
-        state, self.emptied, done = start.copy(), [], np.array([0.0, np.inf])
-        self.now.left[0] = -1.0
+        state, before, self.beyond, self.emptied = start.copy(), np.inf, None, []
         creep = np.where(open_modes, 0.5 * tau * tau, 0.0)
-        begin = Begin(start.z, creep, self.masses(start) if mass is None else mass, tau)
-        rounds = 1 if self.kept or self.column_wave else _MOST_ROUNDS
-        found = MORE
-        while found == MORE:
-            if not self._prepare(state):
+        mass = self.masses(start) if mass is None else mass
+        for iteration in range(_MOST_NEWTON):
+            if not self.evaluate(state):
                 return None
-            found = newton_steps(self.parts, self.couplings, self.now, begin, state, done, rounds)
-        if found == EMPTIED:
-            self.emptied = self._unstated(state.p < EMPTY)
-            if not self.is_steady:  # else perhaps a shorter step leaves something in it
+            change = self._newton(state, start, creep, mass, tau)
+            # a root-like law about no drop lets Newton's method swing across for ever
+            swings = iteration >= _PLAIN_NEWTON and iteration % 3 == 0
+            share, fall = 0.5 if swings else 1.0, least_share(self.couplings, change, state.p)
+            if np.isnan(fall):
+                return None
+            if fall < _FALL:
+                share = (1.0 - _FALL) / (1.0 - fall)
+            for _halving in range(_HALVINGS):
+                tried = self._moved(state, share * change)
+                if self.answers(tried):
+                    break
+                share *= 0.5
+            else:
+                return None
+            former, state = state, tried
+            last = last_change(self.couplings, change, state.y, state.p, _LENGTH * self.step)
+            if share == 1.0 and last <= _FOUND:
+                return state
+            if share == 1.0 and last <= _STUCK and last >= 0.5 * before:
+                # a valve about to close: from there the step leads back to where it began
+                return state if last <= before else former
+            if np.any(state.p[self.free] < _EMPTY):
+                self.emptied = self._unstated(state.p < _EMPTY)
+                if self.is_steady:  # perhaps a shorter step leaves something in it
+                    return None
                 raise _RunawayError([], self.emptied)
-        return state if found == FOUND else None
+            before = last
+        return None
 
-    def check(self, state: State) -> None:
+    def check(self, state: _State) -> None:
         """Raise :class:`_RunawayError` for what has left all real bounds."""
         volumes = self._unstated(state.p > self.high)
         far = np.flatnonzero(np.abs(state.y[:-1]) > _FAR * self.step)
@@ -589,28 +596,72 @@ class _Balance:
     def _unstated(self, which: NDArray[np.bool_]) -> list[int]:
         return [int(i) for i in self.free if which[i] and not self.given[i]]
 
-    def evaluate(self, state: State) -> bool:
-        """Forces and flows with their slopes, contacts included; False if a part fails."""
-        return self._prepare(state) and self._balances(state)
+    def answers(self, state: _State) -> bool:
+        return (
+            self._in_range(state.y)
+            and self._keep_states(state.y)
+            and bool(
+                at_rest(
+                    *self._rows,
+                    self.h,
+                    state.y,
+                    state.p,
+                    self.force,
+                    self.inflow,
+                    self.size,
+                    self.code,
+                )
+            )
+        )
 
-    def _balances(self, state: State) -> bool:
-        begin = Begin(state.z, state.z, state.z, 0.0)  # of no step
-        given = self.parts, self.couplings, self.now, begin, state, np.zeros(2), 0
-        return bool(newton_steps(*given) != NONE)
+    def evaluate(self, state: _State) -> bool:
+        found = self._keep_states(state.y) and slopes_at_rest(
+            *self._rows,
+            self.h,
+            self.move,
+            state.y,
+            state.p,
+            self.free,
+            self.force,
+            self.inflow,
+            self.size,
+            self.by_port,
+            self.by_pressure,
+            self.code,
+        )
+        if not found:
+            return False
+        self._slopes_of_kept_states(state)
+        self.elements = self.force.copy()
+        for c, (force, slope) in enumerate(self.contacts(state.y)):
+            u, low = self.network.interfaces.upper[c], self.network.interfaces.lower[c]
+            self.contact_force[c] = force
+            for port, sign in ((u, 1.0), (low, -1.0)):
+                if port < self.ports:
+                    self.force[port] += sign * force
+                    self.size[port] += force
+                    for other, side in ((u, 1.0), (low, -1.0)):
+                        if other < self.ports:
+                            self.by_port[port, other] += sign * side * slope
+        return True
 
-    def _prepare(self, state: State) -> bool:
-        """What elements and lines of cells say outside of compiled code; False if one fails."""
-        first, at, now = self.ports + 1, self.couplings, self.now
-        for port, found in zip(at.asked_port, at.asked, strict=True):
-            moved = state.copy()
-            moved.y[port] += self.move
-            found[:] = np.nan
-            if self._keep_states(moved.y) and self._balances(moved):
-                found[:first], found[first:] = now.acting, now.inflow
-        for place, k in enumerate(self.column_wave, self.drop.size - len(self.column_wave)):
-            at_a, flow = float(state.p[self.ends[place, 0]]), float(state.m[place])
-            self.drop[place], self.friction[place] = self.network.rows.waves[k].drop(at_a, flow)
-        return self._keep_states(state.y)
+    def contacts(self, y: Vector) -> list[tuple[float, float]]:
+        interfaces = self.network.interfaces
+        gap = interfaces.gap0 + y[interfaces.upper] - y[interfaces.lower]
+        forces, slopes = contacts_at_rest(
+            interfaces.kind, interfaces.law, interfaces.law0, interfaces.series, gap
+        )
+        return list(zip(forces.tolist(), slopes.tolist(), strict=True))
+
+    def _in_range(self, y: Vector) -> bool:
+        """Whether no armature is beyond its pole or far outside its map."""
+        for limit in self.ranges:
+            moved = sum(factor * y[self.network.port_of[port]] for port, factor in limit.ports)
+            value = limit.start + float(moved)
+            if not limit.valid[0] - limit.slack <= value <= limit.usable[1]:
+                self.beyond = limit, value
+                return False
+        return True
 
     def _keep_states(self, y: Vector) -> bool:
         """Give elements that ask for it the state in which they stay; False if one has none."""
@@ -623,7 +674,7 @@ class _Balance:
                 try:
                     state = state_at(y[ports])
                 except (ConvergenceError, np.linalg.LinAlgError):
-                    self.now.report[:] = 0, k, 1
+                    self.code[:] = 0, k, 1
                     return False
                 if len(self.states) >= _MOST_STATES:
                     self.states.clear()
@@ -631,18 +682,44 @@ class _Balance:
             elements.state[elements.state0[k] : elements.state0[k] + len(state)] = state
         return True
 
-    def _bent(self, state: State) -> Vector:
-        bent = state.y[:-1] - self.shapes.T @ state.z - self.compliance @ self.now.force[:-1]
+    def _slopes_of_kept_states(self, state: _State) -> None:
+        """Repeat the slopes by ports whose motion changes such a state."""
+        elements = self.network.elements
+        if not self.kept:
+            return
+        force, inflow = self.force.copy(), self.inflow.copy()
+        for k, _ in self.kept:
+            for port in elements.ports[elements.port0[k] : elements.port0[k + 1]]:
+                if port == self.ports:
+                    continue
+                moved = state.copy()
+                moved.y[port] += self.move
+                if self.answers(moved):
+                    self.by_port[: self.ports + 1, port] = (self.force - force) / self.move
+                    self.by_port[self.ports + 1 :, port] = (self.inflow - inflow) / self.move
+        self.answers(state)  # what the rows gave out last belongs to the state itself
+
+    def _moved(self, state: _State, change: Vector) -> _State:
+        n, r, f = self.ports, self.of_body.size, self.free.size
+        after = state.copy()
+        after.y[:n] += change[:n]
+        after.z += change[n : n + r]
+        after.p[self.free] += change[n + r : n + r + f]
+        after.m += change[n + r + f :]
+        return after
+
+    def _bent(self, state: _State) -> Vector:
+        bent = state.y[:-1] - self.shapes.T @ state.z - self.compliance @ self.force[:-1]
         return np.asarray(bent - self.shift)
 
-    def _net(self, state: State) -> Vector:
+    def _net(self, state: _State) -> Vector:
         """Mass flow into each free volume [kg/s]; an enclosed one lets none through."""
-        inflow = self.now.inflow.copy()
+        inflow = self.inflow.copy()
         np.add.at(inflow, self.ends[:, 0], -state.m)
         np.add.at(inflow, self.ends[:, 1], state.m)
         return np.where(self.shut, 0.0, inflow[self.free])
 
-    def _columns_left(self, state: State) -> tuple[Vector, Vector]:
+    def _columns_left(self, state: _State) -> tuple[Vector, Vector]:
         """What accelerates each column [J/kg], and the scale of its round-off.
 
         That is the sum of both terms of the difference, and of pressure over density: near ambient
@@ -651,7 +728,11 @@ class _Balance:
         at_ends = state.p[self.ends]
         fluid = self._fluid(at_ends.ravel()).reshape(-1, 2, 3)
         g, size = fluid[:, :, 2], np.abs(fluid[:, :, 2]) + at_ends / fluid[:, :, 0]
-        drop = np.where(np.isnan(self.drop), self.friction * state.m, self.drop)
+        drop = self.friction * state.m
+        first = drop.size - len(self.column_wave)
+        for place, k in enumerate(self.column_wave, first):
+            at_a, flow = float(at_ends[place, 0]), float(state.m[place])
+            drop[place], self.friction[place] = self.network.rows.waves[k].drop(at_a, flow)
         return drop - (g[:, 0] - g[:, 1]), np.abs(drop) + size.sum(axis=1)
 
     def _fluid(self, p: Vector) -> Matrix:
@@ -662,10 +743,16 @@ class _Balance:
             found[:, 2] = np.asarray(fluids_at(nodes.fluid, p))[:, 2]
         return found
 
-    def masses(self, state: State) -> Vector:
-        """Mass in each free volume [kg]."""
+    def masses(self, state: _State) -> Vector:
+        return self._masses(state)[0]
+
+    def _masses(self, state: _State) -> tuple[Vector, Vector, Vector]:
+        """Mass in each free volume [kg], its change with the pressure, and the density."""
         volume = self.volumes(state.y if self.enclosed else np.zeros_like(state.y))[self.free]
-        return np.asarray(volume * self._fluid(state.p[self.free])[:, 0])
+        fluid = self._fluid(state.p[self.free]).T
+        # contiguous whatever their number: compiled code would be made for a view as well
+        density = np.ascontiguousarray(fluid[0])
+        return volume * density, volume * fluid[1], density
 
     def volumes(self, y: Vector) -> Vector:
         nodes = self.network.nodes
@@ -674,9 +761,37 @@ class _Balance:
         np.add.at(volume, nodes.wall_node, nodes.wall_area * y[nodes.wall_port])
         return volume
 
+    def _newton(
+        self, state: _State, start: _State, creep: Vector, mass: Vector, tau: float
+    ) -> Vector:
+        n, f = self.ports, self.free.size
+        force_y, force_p = self.by_port[:n], self.by_pressure[:n, :f]
+        now, by_p, density = self._masses(state)
+        balance = Balance(
+            by_port=self.by_port,
+            by_pressure=self.by_pressure,
+            bent_y=self.compliance @ force_y,
+            bent_p=self.compliance @ force_p,
+            push_y=self.shapes @ force_y,
+            push_p=self.shapes @ force_p,
+            bent=self._bent(state),
+            lag=state.z - start.z - creep * (self.shapes @ self.force[:-1]),
+            filled=now - mass,
+            by_p=by_p,
+            density=density,
+            net=self._net(state),
+            rest=self._columns_left(state)[0],
+        )
+        A, right = newton_system(self.couplings, balance, creep, tau)
+        try:
+            change = np.linalg.solve(A, right)
+        except np.linalg.LinAlgError:
+            change = np.linalg.lstsq(A, right, rcond=None)[0]
+        return np.asarray(change * self.couplings.units)
+
     def failed(self) -> ConvergenceError:
         """Error of the part without an answer at the start."""
-        head, k, status = (int(value) for value in self.now.report)
+        head, k, status = (int(value) for value in self.code)
         rows = self.network.rows
         failed = rows.branches[k] if head else rows.elements[k]
         errors = getattr(failed.step, "errors", [])
@@ -689,7 +804,7 @@ class _Balance:
         )
 
     def left_on_bodies(self) -> dict[str, float]:
-        left = self.shapes @ self.now.force[:-1]
+        left = self.shapes @ self.force[:-1]
         result = {}
         for b, row in enumerate(self.network.rows.bodies):
             mine = left[self.of_body == b]
@@ -697,7 +812,7 @@ class _Balance:
                 result[row.component] = float(mine @ (self.along[b] @ row.body.rigid_axial))
         return result
 
-    def not_found(self, state: State) -> ConvergenceError:
+    def not_found(self, state: _State) -> ConvergenceError:
         if not self.evaluate(state):
             return self.failed()
         if self.beyond is not None:
@@ -720,11 +835,11 @@ class _Balance:
             "start='free' skips the equilibrium."
         )
 
-    def steady_slopes(self, state: State) -> SteadySlopes:
+    def steady_slopes(self, state: _State) -> SteadySlopes:
         """Equations about the state that the network is in."""
         n, network = self.ports, self.network
         place = {int(i): j for j, i in enumerate(self.free)}
-        flow = self.now.by_pressure[n + 1 :]
+        flow = self.by_pressure[n + 1 :]
         names = [network.rows.nodes[handle].component for handle in network.node_order]
         return SteadySlopes(
             shapes=self.shapes.copy(),
@@ -732,9 +847,9 @@ class _Balance:
             body=tuple(network.rows.bodies[b].component for b in self.of_body),
             moves=self.moves.copy(),
             compliance=self.compliance.copy(),
-            force_by_port=self.now.by_port[:n].copy(),
-            force_by_pressure=self.now.by_pressure[:n].copy(),
-            flow_by_port=self.now.by_port[n + 1 :][self.free].copy(),
+            force_by_port=self.by_port[:n].copy(),
+            force_by_pressure=self.by_pressure[:n].copy(),
+            flow_by_port=self.by_port[n + 1 :][self.free].copy(),
             flow_by_pressure=flow[self.free].copy(),
             volumes=tuple(names[i] for i in self.free),
             density=self._fluid(state.p[self.free])[:, 0],
@@ -767,7 +882,7 @@ class _Balance:
             known |= more
 
     def put(
-        self, state: State, notes: tuple[str, ...], *, tells_closed: bool = True
+        self, state: _State, notes: tuple[str, ...], *, tells_closed: bool = True
     ) -> StaticStart:
         """Put the network into this state, and describe it."""
         if not self.evaluate(state):
@@ -779,7 +894,7 @@ class _Balance:
         self._put_interfaces(state)
         return self._told(state, notes, tells_closed=tells_closed)
 
-    def _check_stops(self, state: State) -> None:
+    def _check_stops(self, state: _State) -> None:
         """Reject bodies pressed far deeper into a stop than they can move away."""
         rows, interfaces = self.network.rows, self.network.interfaces
         gap = interfaces.gap0 + state.y[interfaces.upper] - state.y[interfaces.lower]
@@ -798,21 +913,21 @@ class _Balance:
                     "units.",
                 )
 
-    def _put_bodies(self, state: State) -> None:
+    def _put_bodies(self, state: _State) -> None:
         network = self.network
         bodies = network.bodies
         at, ports = bodies.at, self.ports
         for row in (Y0, SEEN):
             at[row : row + ports] = state.y[:-1]
         for row in (LAST, MEAN, BEFORE, BEFORE_2, BEFORE_3):
-            at[row : row + ports] = self.now.acting[:-1]
+            at[row : row + ports] = self.elements[:-1]
         sliders = network.sliders
         network.slider_state.seen[:] = state.y[sliders.upper] - state.y[sliders.lower]
         begin, mode = 0, 0
         for b, body_row in enumerate(network.rows.bodies):
             body, r = body_row.body, body_row.body.rigid_count
             here = slice(begin, begin + len(body_row.ports))
-            q = np.asarray(body.port_shapes) @ self.now.force[:-1][here]
+            q = np.asarray(body.port_shapes) @ self.force[:-1][here]
             q[r:] /= body.omega[r:] ** 2
             directions = self.along[b]
             q[:r] = state.z[mode : mode + len(directions)] @ directions
@@ -822,7 +937,7 @@ class _Balance:
                 bodies.laid_out[place : place + part.size] = part
             begin, mode = here.stop, mode + len(directions)
 
-    def _put_fluid(self, state: State) -> None:
+    def _put_fluid(self, state: _State) -> None:
         network = self.network
         nodes, now, branches = network.nodes, network.node_state, network.branches
         for i, p in enumerate(state.p):
@@ -860,10 +975,10 @@ class _Balance:
             p_a, p_b = (float(now.p[i]) for i in ends[:2])
             start_wave(network.waves, network.rows.waves, k, p_a, p_b, float(flow))
 
-    def _put_interfaces(self, state: State) -> None:
+    def _put_interfaces(self, state: _State) -> None:
         network = self.network
         interfaces, now, rows = network.interfaces, network.interface_state, network.rows
-        now.force[:] = now.force_before[:] = self.now.contact
+        now.force[:] = now.force_before[:] = self.contact_force
         now.gap[:] = interfaces.gap0 + state.y[interfaces.upper] - state.y[interfaces.lower]
         now.rate[:] = 0.0
         now.e[:] = interfaces.series * now.force  # in equilibrium with the contacts
@@ -885,7 +1000,7 @@ class _Balance:
             # 0 would be for "not touched yet"
             now.chi[c] = chi or (_UNDAMPED if damped else 0.0)
 
-    def _told(self, state: State, notes: tuple[str, ...], *, tells_closed: bool) -> StaticStart:
+    def _told(self, state: _State, notes: tuple[str, ...], *, tells_closed: bool) -> StaticStart:
         network = self.network
         nodes, rows = network.nodes, network.rows
         names = [rows.nodes[handle].component for handle in network.node_order]
@@ -920,7 +1035,7 @@ class _Balance:
         first, ambient = self.ports + 1, self.network.rows.ambient.pressure
         told = []
         for j, i in enumerate(self.free):
-            column = self.now.by_pressure[first + i, j] != 0.0 or bool(np.any(self.ends == i))
+            column = self.by_pressure[first + i, j] != 0.0 or bool(np.any(self.ends == i))
             filled = abs(float(p[i]) - ambient) > _FILLED * ambient
             if not (column or filled or self.given[i]):
                 told.append(
