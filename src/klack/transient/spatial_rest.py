@@ -84,25 +84,19 @@ def settle_at_rest(
     left, before, stalled = np.inf, np.inf, 0
     walls = _Walls.none()
     lam = np.zeros(points)
-    answer = soft + np.where(rigid, sigma, 0.0)
-    across = model.traces - np.outer(model.traces @ spin, spin)
-    block = (across * answer) @ across.T
-    block = model.compliance + 0.5 * (block + block.T)
     for _ in range(_MOST):
         walls = walls.carrying(lam[points:])
         active = np.append(lam[:points] > 0.0, np.ones(len(walls.height), dtype=bool))
         walls = walls.with_present(bore, state.q)
-        sides, room, held = _rows(bore, walls)
-        active = np.append(active, np.zeros(points + len(sides) - len(active), dtype=bool))
-        turn = spin * (spin @ state.q)
-        turned = np.concatenate([model.traces @ turn, sides @ turn])
-        rows = np.vstack([across, sides - np.outer(sides @ spin, spin)])
+        rows, gap, local = _rows(model, bore, gaps(), walls)
+        active = np.append(active, np.zeros(len(rows) - len(active), dtype=bool))
+        turned = rows @ (spin * (spin @ state.q))
+        rows -= np.outer(rows @ spin, spin)
         given = soft * force + np.where(rigid, state.q + sigma * force, 0.0)
         seen = rows @ given + turned
-        beside = (rows[points:] * answer) @ rows.T
-        beside[:, points:] = 0.5 * (beside[:, points:] + beside[:, points:].T) + held
-        A = np.block([[block, beside[:, :points].T], [beside]])
-        lam, _, _ = solve_lcp(A, np.concatenate([gaps(), room]) + seen, active)
+        answer = soft + np.where(rigid, sigma, 0.0)
+        A = local + (rows * answer) @ rows.T
+        lam, _, _ = solve_lcp(0.5 * (A + A.T), gap + seen, active)
         push = rows.T @ lam
         state.q[:] = given + answer * push
         left = float(np.linalg.norm((force + push)[rigid])) / scale
@@ -184,12 +178,18 @@ class _Walls:
         return missed
 
 
-def _rows(bore: Guide, walls: _Walls) -> tuple[NDArray[np.float64], Vector, NDArray[np.float64]]:
-    """Traces of walls, their gaps at q = 0 and their compliance."""
+def _rows(
+    model: InterfaceModel, bore: Guide, gap: Vector, walls: _Walls
+) -> tuple[NDArray[np.float64], Vector, NDArray[np.float64]]:
+    """Traces, gaps at q = 0 and local compliance of contact points, then of walls."""
     k, normal = walls.height, walls.normal
-    rows = -np.einsum("wc,wci->wi", normal, bore.traces[k])
+    rows = np.vstack([model.traces, -np.einsum("wc,wci->wi", normal, bore.traces[k])])
     free = bore.clearance[k] - np.einsum("wc,wc->w", normal, bore.offset[k])
     held = np.einsum("wc,wcd,vd->wv", normal, bore.compliance[k], normal)
     held[k[:, None] != k] = 0.0
     held[np.diag_indices(len(k))] *= 1.0 + _SAME
-    return rows, free, 0.5 * (held + held.T)
+    n = model.count
+    local = np.zeros((len(rows), len(rows)))
+    local[:n, :n] = model.compliance
+    local[n:, n:] = held
+    return rows, np.concatenate([gap, free]), local
