@@ -409,14 +409,14 @@ def source_charts(study: NoiseStudy) -> tuple[Chart, ...]:
         chart(
             "free-velocity",
             "Free velocity of the mounts",
-            AxisSpec(label="exposure of one click", unit="dB re (1 nm/s)² s"),
+            AxisSpec(label="exposure", unit="dB re (1 nm/s)² s"),
             velocity,
             "Third octaves of one click, divided by no duration. Rotations re (1 nrad/s)² s.",
         ),
         chart(
             "mount-force",
             "Blocked force of the mounts",
-            AxisSpec(label="exposure of one click", unit="dB re (1 µN)² s"),
+            AxisSpec(label="exposure", unit="dB re (1 µN)² s"),
             force,
             "Third octaves of one click on mounts that are held. Moments re (1 µN m)² s.",
         ),
