@@ -117,18 +117,26 @@ class TestNoise:
         assert record.elasticity("noise.force_level", "delay") is None
 
     def test_noise_of_one_impact_is_predicted(self):
-        """Truth: two strokes of the demo valve with its preload changed by 1 %."""
+        """Truth: a straight line through 17 strokes whose preload changes by up to 3 %.
+
+        Their energies scatter by 0.03 %, as times are found on steps: 1.2 % of the slope.  Farther
+        away the peak is of another swing.
+        """
+        case = klack.load_case("demo-stroke").with_value("run.duration", "0.35 ms")
+        preload, change = "network.components.spring.preload", np.linspace(-0.4, 0.4, 17)  # N
+        measures = [
+            "noise.sound_exposure_level",
+            "noise.peak_level",
+            "noise.injected_energy",
+            "noise.radiated_energy",
+            "noise.support_energy",
+        ]
         record = klack.sensitivities(
-            klack.load_case("demo-stroke").with_value("run.duration", "0.35 ms"),
-            parameters=["network.components.spring.preload"],
-            measures=[
-                "noise.sound_exposure_level",
-                "noise.peak_level",
-                "noise.injected_energy",
-                "noise.radiated_energy",
-                "noise.support_energy",
-            ],
-            variant="wet",
+            case, parameters=[preload], measures=measures, variant="wet", check=False
+        )
+        table = klack.run_many(
+            case, {preload: [f"{12.0 + n} N" for n in change]}, measures, variant="wet"
         )
         for item in record.measures:
-            assert item.deviation < 0.05, item.name  # saw-tooth of the two strokes
+            slope = np.polynomial.Polynomial.fit(change, table[item.name], 1).deriv()(0.0)
+            assert item.slopes[0] == pytest.approx(slope, rel=0.04), item.name

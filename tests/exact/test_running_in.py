@@ -434,15 +434,19 @@ def test_three_impacts_of_a_mass_on_one_point(speed):
 
 
 @pytest.mark.slow
-def test_a_limit_that_is_not_reached_changes_no_bit():
-    """Definition: the same forces as of elastic points."""
+def test_a_limit_that_is_not_reached_changes_nothing():
+    """Definition: the same forces as of elastic points, to the round-off of 1000 steps.
+
+    The two are compiled apart: their products are added in another order.
+    """
     far = PressureLimit(set=np.array([0.0, 1e-6]), pressure=np.array([1e9, 2e9]))
     runs = [
         simulate_interface(one_point(limit), speed=0.3, duration=2e-5, step=20e-9)
         for limit in (far, None)
     ]
 
-    np.testing.assert_array_equal(runs[0].history.force, runs[1].history.force)
+    force = runs[1].history.force
+    np.testing.assert_allclose(runs[0].history.force, force, rtol=0.0, atol=1e-12 * force.max())
     assert not np.any(runs[0].worn)
     assert len(runs[1].worn) == 0
 
