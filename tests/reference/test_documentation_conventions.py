@@ -323,7 +323,7 @@ def run(commands: str, folder: Path) -> subprocess.CompletedProcess[str]:
 @pytest.mark.slow
 def test_the_commands_run_and_give_the_quoted_numbers(tmp_path):
     (tmp_path / "cases").symlink_to(ROOT / "cases")
-    first, own = blocks_start("sh")
+    first, own, _ = blocks_start("sh")
 
     done = run(first, tmp_path)
     assert done.returncode == 0, done.stderr
@@ -331,7 +331,7 @@ def test_the_commands_run_and_give_the_quoted_numbers(tmp_path):
     assert {"report.html", "report.pdf", "result.zarr"} <= {file.name for file in folder.iterdir()}
     which = r"(?: \(contact \d of \d\))?"
     row = rf"^([a-z-]+) +([\d.]+){which} +([\d.]+){which} +([\d.]+) +([\d.]+) "
-    rows = re.findall(row, PAGE, re.MULTILINE)
+    rows = re.findall(row, PAGE.split("\n## ")[2], re.MULTILINE)
     study = IMPACT.load(folder)
     assert {row[0] for row in rows} == set(study.levels)
     for level, peak, time, impulse, restitution in rows:
@@ -355,6 +355,18 @@ def test_the_commands_run_and_give_the_quoted_numbers(tmp_path):
     message = re.search(r"```\n(klack impact: my-valve.*?)```", PAGE, re.DOTALL)
     assert message is not None
     assert message[1].split() == done.stderr.split()
+
+
+@pytest.mark.slow
+def test_the_drawn_valve_of_the_page_gives_what_stands_below_it(tmp_path):
+    (tmp_path / "drawn-valve.yaml").write_text(blocks_start("yaml")[0], encoding="utf-8")
+
+    done = run(blocks_start("sh")[2], tmp_path)
+
+    assert done.returncode == 0, done.stderr
+    assert "Note" not in done.stdout + done.stderr
+    assert "cannot be relied on" not in done.stdout
+    compare(blocks_start("text")[0], done.stdout, "start.md: drawn-valve.yaml")
 
 
 def test_every_command_of_the_page_exists():
