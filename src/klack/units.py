@@ -39,6 +39,7 @@ __all__ = [
     "GasConstant",
     "HeatCapacity",
     "HeatTransfer",
+    "Inertia",
     "Kind",
     "KinematicViscosity",
     "Length",
@@ -169,6 +170,13 @@ VOLUME = Kind(
     "a volume", "m^3", "50 mm^3", ("m^3", "cm^3", "mm^3", "l", "ml"), smallest=1e-36, largest=1e18
 )
 MASS = Kind("a mass", "kg", "3 g", ("kg", "g", "mg"), smallest=1e-21)
+INERTIA = Kind(
+    "a moment of inertia",
+    "kg*m^2",
+    "2 kg*cm^2",
+    ("kg*m^2", "kg*cm^2", "g*mm^2"),
+    smallest=1e-33,
+)
 ACCELERATION = Kind("an acceleration", "m/s^2", "9.81 m/s^2", ("m/s^2",))
 DAMPING = Kind("a damping coefficient", "N*s/m", "0.5 N*s/m", ("N*s/m", "N*s/mm"))
 COMPLIANCE = Kind("a compliance", "m/N", "1 nm/N", ("m/N", "um/N", "nm/N"), smallest=1e-21)
@@ -232,6 +240,7 @@ KINDS = (
     AREA,
     VOLUME,
     MASS,
+    INERTIA,
     ACCELERATION,
     DAMPING,
     COMPLIANCE,
@@ -661,6 +670,7 @@ Rotation = Annotated[float, *typed(ROTATION)]
 Area = Annotated[float, *typed(AREA)]
 Volume = Annotated[float, *typed(VOLUME)]
 Mass = Annotated[float, *typed(MASS)]
+Inertia = Annotated[float, *typed(INERTIA)]
 Acceleration = Annotated[float, *typed(ACCELERATION)]
 DampingCoefficient = Annotated[float, *typed(DAMPING)]
 Compliance = Annotated[float, *typed(COMPLIANCE)]

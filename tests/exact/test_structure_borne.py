@@ -344,15 +344,15 @@ def test_missing_freedoms_are_listed_and_blocked_or_freed_on_demand() -> None:
     receiver = pair.of(pair.Y_R, freedoms_of("a", ("x", "y", "z")))
     with pytest.raises(InputError, match=r"a\.rx, a\.ry, a\.rz") as error:
         couple(pair.source, receiver)
-    assert "block" in error.value.hint
+    assert "blocked" in error.value.hint
     blocked = couple(
-        pair.source, receiver, missing={"a.rx": "block", "a.ry": "block", "a.rz": "block"}
+        pair.source, receiver, missing={"a.rx": "blocked", "a.ry": "blocked", "a.rz": "blocked"}
     )
     Y = pair.Y_R.copy()
     Y[:, 3:6], Y[:, :, 3:6] = 0.0, 0.0
     assert blocked.force == pytest.approx(couple(pair.source, pair.of(Y)).force, rel=1e-9, abs=0)
     assert len(blocked.notes) == 3
-    assert "block" in blocked.notes[0]
+    assert "blocked" in blocked.notes[0]
     freed = couple(pair.source, receiver, missing={"a": "free"})
     assert [str(f) for f in freed.freedoms] == ["a.x", "a.y", "a.z"]
     Y_S = pair.source.mobility[:, :3, :3]

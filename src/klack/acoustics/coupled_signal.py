@@ -50,6 +50,8 @@ class CoupledSignal:
         Time of the first value; the source's spectra count from 0.
     force, velocity (t, n) [N], [m/s]
         On the receiver and of it, by freedom.
+    source_velocity (t, n) [m/s]
+        On the source's side.
     pressure (t, ears) [Pa]
     notes
         What was done to the ends of a measured band.
@@ -60,6 +62,7 @@ class CoupledSignal:
     ears: tuple[str, ...]
     force: Matrix
     velocity: Matrix
+    source_velocity: Matrix
     pressure: Matrix
     notes: tuple[str, ...] = ()
 
@@ -104,6 +107,7 @@ def model_signal(
         ears=joined.ears,
         force=over_time(joined.force),
         velocity=over_time(joined.velocity),
+        source_velocity=over_time(joined.source_velocity),
         pressure=over_time(joined.pressure),
     )
 
@@ -169,6 +173,7 @@ def measured_signal(
         ears=joined.ears,
         force=kept(over_time(joined.force)),
         velocity=kept(velocity),
+        source_velocity=kept(over_time(joined.source_velocity)),
         pressure=kept(pressure),
         notes=notes,
     )

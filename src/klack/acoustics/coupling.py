@@ -44,10 +44,12 @@ __all__ = [
     "Placement",
     "axes_of",
     "couple",
+    "joined",
     "junction",
+    "power_balance",
 ]
 
-Missing = Literal["block", "free"]
+Missing = Literal["blocked", "free"]
 """What a receiver does in a direction in which it is not known."""
 
 _ALONG = 1e-6
@@ -250,7 +252,7 @@ def couple(
     isolators
         Mount -> element below it; a rigid joint without.
     missing
-        ``flange.rx`` or ``flange`` -> what the receiver does where it is not known: ``block`` (it
+        ``flange.rx`` or ``flange`` -> what the receiver does where it is not known: ``blocked`` (it
         does not move) or ``free`` (it takes up no force).
 
     Raises
@@ -259,12 +261,17 @@ def couple(
         For freedoms of the source that the receiver does not have, all of them by name.
     """
     joint = junction(source, receiver, placements=placements, isolators=isolators, missing=missing)
+    return joined(joint, source, receiver.ears)
+
+
+def joined(joint: Junction, source: SourceAtMounts, ears: tuple[str, ...]) -> Coupled:
+    """Solve a junction for its source; ``ears`` are those of its receiver."""
     vf = joint.free_velocity
     F_1, g = (forces[..., 0] for forces in joint.forces(vf[..., None]))
     return Coupled(
         frequency=source.frequency,
         freedoms=joint.freedoms,
-        ears=receiver.ears,
+        ears=ears,
         free_velocity=vf,
         source_force=F_1,
         force=g,
@@ -274,6 +281,33 @@ def couple(
         shift=source.shift,
         notes=joint.notes,
     )
+
+
+def power_balance(joint: Junction, found: Coupled) -> tuple[Vector, Vector]:
+    """What elements lose, and what is left of the sum of all powers, each (k,), of amplitudes.
+
+    Power of the forces inside the source = lost in the source + in elements + into the receiver,
+    each from its own matrix, not as a difference of the others; per line over the largest of them.
+    """
+    F, g, s = found.source_force, found.force, joint.s
+    given = 0.5 * np.real(np.einsum("ki,ki->k", F.conj(), joint.free_velocity))
+    kept = 0.5 * np.real(np.einsum("ki,kij,kj->k", F.conj(), joint.mobility, F))
+    taken = 0.5 * np.real(np.einsum("ki,kij,kj->k", g.conj(), joint.receiver.mobility, g))
+    lost = np.zeros(s.size)
+    for i, freedom in enumerate(joint.freedoms):
+        element, direction = joint.isolators.get(freedom.point), abs(freedom.direction)
+        if element is None or direction not in element.directions:
+            continue
+        k = element.stiffness(direction, s)
+        one, two = found.source_velocity[:, i], found.velocity[:, i]
+        k_11, k_22 = (
+            k.transfer if own is None else own for own in (k.driving, k.receiving)
+        )
+        above, below = (k_11 * one - k.transfer * two) / s, (k.transfer * one - k_22 * two) / s
+        lost += 0.5 * np.real(above.conj() * one - below.conj() * two)
+    size = np.maximum.reduce([np.abs(given), kept, np.abs(lost), taken])
+    rest = np.abs(given - kept - lost - taken) / np.maximum(size, np.finfo(float).tiny)
+    return lost, rest
 
 
 # --------------------------------------------------------------------------- frames
@@ -358,7 +392,7 @@ def _refuse_open(open_ones: list[str], receiver: Receiver) -> None:
         expected="the receiver's mobility at every freedom of the source; it has "
         f"{', '.join(map(str, receiver.freedoms)) or 'none'}",
         hint="measure them, or say for each what the receiver does: missing: "
-        f"{{{open_ones[0]}: block}} (does not move) or free (takes up no force).",
+        f"{{{open_ones[0]}: blocked}} (does not move) or free (takes up no force).",
     )
 
 

@@ -33,6 +33,9 @@ class VirtualTest:
     ----------
     indicators
         m freedoms of the receiver.
+    freedoms
+        n of the interface in which the assembly moves; where the receiver is blocked no indicator
+        tells of a force.
     velocity (k, m) [m/s/Hz]
         Of the indicators in operation.
     assembly (k, m, n) [m/(N s), 1/(N s) per moment]
@@ -48,6 +51,7 @@ class VirtualTest:
     """
 
     indicators: tuple[Freedom, ...]
+    freedoms: tuple[Freedom, ...]
     velocity: Complexes
     assembly: Complexes
     blocked_force: Complexes
@@ -87,14 +91,17 @@ def virtual_test(
     _, driven = joint.forces(joint.mobility)  # by a unit force at each freedom of the interface
     spread = joint.spread[:, chosen]
     velocity, assembly = (spread @ running)[..., 0], spread @ driven
-    scale = _scale(joint.freedoms, length)
-    found, exact = (
-        blocked_force_in_situ(matrix, moved, joint.freedoms, length=length)
-        for matrix, moved in ((assembly, velocity), (joint.mobility, joint.free_velocity))
-    )
+    moved_at = np.any(joint.receiver.mobility != 0.0, axis=(0, 1))
+    known = tuple(f for f, moved in zip(joint.freedoms, moved_at, strict=True) if moved)
+    assembly, scale = assembly[:, :, moved_at], _scale(known, length)
+    found = blocked_force_in_situ(assembly, velocity, known, length=length)
+    exact = blocked_force_in_situ(
+        joint.mobility, joint.free_velocity, joint.freedoms, length=length
+    )[:, moved_at]
     apart, size = (np.linalg.norm(force / scale, axis=1) for force in (found - exact, exact))
     return VirtualTest(
         indicators=tuple(joint.places[i] for i in chosen),
+        freedoms=known,
         velocity=velocity,
         assembly=assembly,
         blocked_force=found,

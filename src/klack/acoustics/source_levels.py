@@ -182,7 +182,7 @@ def single_equivalents(
     )
     points = tuple(InterfacePoint(name=name, position=place) for name, place in places.items())
     lacking = {
-        str(freedom): "free" if freedom.is_rotation and radius == 0.0 else "block"
+        str(freedom): "free" if freedom.is_rotation and radius == 0.0 else "blocked"
         for freedom in source.freedoms
     }
     powers = []

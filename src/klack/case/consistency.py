@@ -6,6 +6,7 @@ import numpy as np
 
 from klack.case.bodies import CaseBody, CaseFile, Reduction, SurfaceName
 from klack.case.impact_sections import ImpactSections
+from klack.case.machine import machine_mounts
 from klack.case.noise import CaseNoise, mounting_places
 from klack.case.outputs import check_outputs
 from klack.case.valve_roles import find_roles
@@ -633,6 +634,7 @@ def check_noise(case: ImpactSections | ValveSections) -> None:
             hint="add 'fixed: [{surface: NAME}]' to the body, or remove its surfaces from 'noise'.",
         )
     _check_mounts(case, noise)
+    _check_machine(case, noise)
     if noise.plate is not None:
         key = ("noise", "plate", "material")
         require_known(key, noise.plate.material, case.materials, "material")
@@ -683,3 +685,62 @@ def _check_mounts(case: ImpactSections | ValveSections, noise: CaseNoise) -> Non
             hint="add a mount, or remove the reactions.",
             on_key=True,
         )
+
+
+def _check_machine(case: ImpactSections | ValveSections, noise: CaseNoise) -> None:
+    """A machine stands below mounts, and there is one only."""
+    without = {
+        "elements": (noise.elements, "mounts", noise.mounts),
+        "receiver": (noise.receiver, "mounts", noise.mounts),
+        "ears": (noise.ears, "receiver", noise.receiver),
+        "indicators": (noise.indicators, "receiver", noise.receiver),
+    }
+    for name, (given, needed, there) in without.items():
+        if given and not there:
+            raise CaseProblem(
+                ("noise", name),
+                got=f"{name} without {needed}",
+                expected=f"noise.{needed}",
+                hint=f"add '{needed}', or remove '{name}'.",
+                on_key=True,
+            )
+    for key, mount in machine_mounts(noise.elements or {}, noise.receiver):
+        require_known(key, mount, noise.mounts or {}, "mount", on_key=True)
+    receiver = noise.receiver
+    if receiver is None:
+        return
+    for name in ("mount", "plate"):
+        if getattr(noise, name) is not None:
+            raise CaseProblem(
+                ("noise", name),
+                got=f"{name} beside a receiver",
+                expected="one machine below the valve",
+                hint=f"remove '{name}'; a spring below a mount is one of 'elements'.",
+                on_key=True,
+            )
+    if receiver.is_plate is not None:
+        kind = "plate" if receiver.plate is not None else "infinite_plate"
+        key = ("noise", "receiver", kind, "material")
+        require_known(key, receiver.is_plate.material, case.materials, "material")
+    body = receiver.body
+    if body is not None and body.inertia is None and len(noise.mounts or {}) > 1:
+        raise CaseProblem(
+            ("noise", "receiver", "body"),
+            got="no inertia of a body below several mounts",
+            expected="inertia: three moments about its centre of mass",
+            hint="add 'inertia: [Ixx, Iyy, Izz]' in kg m^2.",
+        )
+    measured = receiver.file is not None or receiver.pressures is not None
+    for ear, place in (noise.ears or {}).items():
+        if isinstance(place, tuple) == measured or (receiver.is_plate is None and not measured):
+            raise CaseProblem(
+                ("noise", "ears", ear),
+                got="a place" if isinstance(place, tuple) else f"the node '{place}'",
+                expected="a node of a pressure in the file"
+                if measured
+                else "the place [x, y, z] of an ear above a plate, or a file of pressures",
+                hint="write the node of the microphone."
+                if measured
+                else "write [0 m, 0 m, 1 m] for 1 m on the normal of a plate, or add "
+                "receiver.pressures.",
+            )

@@ -6,8 +6,9 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from klack.case.bodies import BodySurface, SurfaceName
+from klack.case.machine import Node, NoiseElement, NoiseReceiver, Place
 from klack.input.problem import CaseProblem, Key
-from klack.input.section import Name, Section
+from klack.input.section import Name, Section, Text
 from klack.units import (
     Area,
     Density,
@@ -131,6 +132,29 @@ class CaseNoise(Section):
         "of a component acts that pushes moving parts alone; 'fluid' of all pressures and flows; "
         "outside: it acts on the valve from outside.",
         examples=[{"magnet": "housing.pole", "spring": "housing.spring_seat"}],
+    )
+    elements: dict[Name, NoiseElement] | None = Field(
+        default=None,
+        min_length=1,
+        description="With mounts: resilient element below a mount; default a rigid joint.",
+        examples=[{"flange": {"stiffness": {"z": "10 N/um"}, "loss_factor": "10 %"}}],
+    )
+    receiver: NoiseReceiver | None = Field(
+        default=None, description="With mounts: the machine that carries the valve."
+    )
+    ears: dict[Name, Node | Place] | None = Field(
+        default=None,
+        min_length=1,
+        description="With a receiver: node of a pressure per force in its file, or of a plate the "
+        "place of the ear from its first mount, far from the plate and near its normal. The first "
+        "ear is what measures of the sound are of.",
+        examples=[{"driver": 9001}],
+    )
+    indicators: tuple[Text, ...] | None = Field(
+        default=None,
+        min_length=1,
+        description="Freedoms of the machine (a.z, as in its file) that a virtual in-situ test "
+        "takes; default all of the receiver.",
     )
     radiation: Literal["piston", "unity", "elements"] = Field(
         default="piston",

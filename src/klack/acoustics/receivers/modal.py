@@ -8,7 +8,7 @@ with what the modes miss of the static compliance, ``R``.  Reciprocal, and passi
 may use it.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,6 +35,8 @@ class ModalReceiver:
     shapes (m, n) [1/sqrt(kg), 1/(m sqrt(kg)) for rotations]
     residual (n, n) [m/N]
         ``R``, in the units of the freedoms.
+    radiated
+        Pressure per velocity of each mode (k, ears, m) at ``s`` (k,).
     """
 
     points: tuple[InterfacePoint, ...]
@@ -44,21 +46,24 @@ class ModalReceiver:
     shapes: Matrix
     residual: Matrix
     ears: tuple[str, ...] = ()
+    radiated: Callable[[Complexes], Complexes] | None = None
 
     def at(self, s: Complexes) -> ReceiverResponse:
-        """Return the mobility; a model of modes alone has no ears."""
+        """Return the mobility, and transfers where there are ears."""
         n = len(self.freedoms)
         rows = max(_BLOCK // max(self.omega.size, 1), 1)
         parts = [np.zeros((0, n, n), dtype=complex)]
+        heard = [np.zeros((0, len(self.ears), n), dtype=complex)]
         for first in range(0, s.size, rows):
             at = s[first : first + rows, None]
             denominator = self.omega**2 + 2.0 * self.damping * self.omega * at + at**2
             parts.append(modal_sum(self.shapes, denominator))
+            if self.radiated is not None:
+                moved = (at / denominator)[:, None, :] * self.radiated(at[:, 0])
+                heard.append(moved @ self.shapes)
         compliance = np.concatenate(parts) + self.residual
-        return ReceiverResponse(
-            mobility=s[:, None, None] * compliance,
-            transfers=np.zeros((s.size, 0, n), dtype=complex),
-        )
+        transfers = np.concatenate(heard) if self.radiated else np.zeros((s.size, 0, n), complex)
+        return ReceiverResponse(mobility=s[:, None, None] * compliance, transfers=transfers)
 
 
 def body_receiver(

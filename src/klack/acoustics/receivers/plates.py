@@ -18,13 +18,25 @@ moment (:math:`K_0` with :math:`I_0, I_1`), and at the foot itself
 
 all at ``ka``.  With ``omega = -i s`` both hold beside the axis of frequency too.
 
+Far above a plate in a rigid wall, at the distance :math:`R` in the direction :math:`n` from its
+first foot, the pressure is the Rayleigh integral
+
+.. math:: p = \frac{\rho s\, e^{-sR/c}}{2\pi R} \int v\, e^{(s/c)\, n\cdot x}\,\mathrm dA
+
+of a mode in closed form, and of a force on an infinite plate, with :math:`\theta` from the normal,
+
+.. math:: \frac pF = \frac{\rho\, e^{-sR/c}}{2\pi R}\,
+          \frac{1}{m'' + D s^2 \sin^4\theta / c^4}
+
+(Junger & Feit 1986, sec. 8.4 and 9.8; Wallace 1972), without the load of the air.
+
 The frame of a plate has z along its normal; it is known along z and about x and y only.  In its
 plane it is stiff.  Thin plates: bending waves longer than six thicknesses.
 """
 
 import warnings
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 import scipy
@@ -36,14 +48,51 @@ from klack.acoustics.interface import (
     ReceiverResponse,
     freedoms_of,
 )
-from klack.acoustics.plate import Plate
+from klack.acoustics.plate import Air, Plate
 from klack.acoustics.receivers.modal import ModalReceiver
 from klack.arrays import Matrix, Vector
 from klack.errors import AccuracyWarning, refuse_if, require_nonnegative, require_positive
 
-__all__ = ["InfinitePlate", "finite_plate"]
+__all__ = ["InfinitePlate", "PlateSound", "finite_plate"]
 
 _THICK = 2.0 * np.pi / 6.0  # k h where a bending wave is six thicknesses long
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PlateSound:
+    """Ears far above a plate in a rigid wall.
+
+    Parameters
+    ----------
+    places
+        Ear -> way from the first foot (3,) [m], z along the normal.
+    air
+    """
+
+    places: Mapping[str, Vector]
+    air: Air = field(default_factory=Air)
+
+    def __post_init__(self) -> None:
+        for name, place in self.places.items():
+            refuse_if(
+                not float(place[2]) > 0.0,
+                f"ear '{name}'",
+                got=f"a height of {place[2]:g} m above the plate",
+                expected="above 0",
+                hint="z counts along the normal of the plate; 1 m is usual.",
+            )
+
+    def spreading(self, s: Complexes, place: Vector) -> Complexes:
+        """``rho s exp(-s R/c) / (2 pi R)``, shape (k,)."""
+        R = float(np.linalg.norm(place))
+        return np.asarray(
+            self.air.density * s * np.exp(-s * R / self.air.sound_speed) / (2.0 * np.pi * R)
+        )
+
+    def trace(self, s: Complexes, place: Vector) -> Complexes:
+        """``(s/c) n`` along x and y of the plate [1/m], shape (k, 2)."""
+        n = np.asarray(place[:2], dtype=float) / np.linalg.norm(place)
+        return np.asarray(s[:, None] / self.air.sound_speed * n)
 
 
 def _warn_thick(wavenumber: float, thickness: float) -> None:
@@ -85,13 +134,15 @@ class InfinitePlate:
         Of the feet; 0 for forces alone.
     ideal
         Thin at every frequency, as a definition and no plate: no warning.
+    sound
+        Ears, if any.
     """
 
     plate: Plate
     points: tuple[InterfacePoint, ...]
     radius: float = 0.0
     ideal: bool = False
-    ears: tuple[str, ...] = ()
+    sound: PlateSound | None = None
 
     def __post_init__(self) -> None:
         require_nonnegative("InfinitePlate.radius", self.radius, "m")
@@ -111,8 +162,13 @@ class InfinitePlate:
         """Along z, and with a radius about x and y."""
         return _plate_freedoms(self.points, self.radius)
 
+    @property
+    def ears(self) -> tuple[str, ...]:
+        """Names of the ears."""
+        return () if self.sound is None else tuple(self.sound.places)
+
     def at(self, s: Complexes) -> ReceiverResponse:
-        """Return the mobility at ``s``."""
+        """Return mobility and transfers at ``s``."""
         omega = -1j * s
         k = np.sqrt(omega) * (self.plate.mass_per_area / self.plate.bending_stiffness) ** 0.25
         if not self.ideal:
@@ -129,9 +185,36 @@ class InfinitePlate:
                 else:
                     Y[:, i, j] = _between_feet(k, self.radius, apart[:2], orders)
         return ReceiverResponse(
-            mobility=(self.plate.mobility * Y).astype(complex),
-            transfers=np.zeros((s.size, 0, len(freedoms)), dtype=complex),
+            mobility=(self.plate.mobility * Y).astype(complex), transfers=self._transfers(s)
         )
+
+    def _transfers(self, s: Complexes) -> Complexes:
+        freedoms, plate = self.freedoms, self.plate
+        H = np.zeros((s.size, len(self.ears), len(freedoms)), dtype=complex)
+        if self.sound is None:
+            return H
+        place = {point.name: point.position - self.points[0].position for point in self.points}
+        for e, (name, ear) in enumerate(self.sound.places.items()):
+            trace = self.sound.trace(s, ear)
+            squared = np.sum(trace**2, axis=1)
+            stiff = plate.bending_stiffness * squared**2 / s**2
+            refuse_if(
+                bool(np.any(np.abs(stiff) >= 0.7 * plate.mass_per_area)),
+                f"ear '{name}'",
+                got=f"{np.degrees(np.arctan2(np.hypot(*ear[:2]), ear[2])):.3g} degrees from the "
+                "normal, where bending waves of the infinite plate are as fast as sound along it",
+                expected=f"a direction nearer to the normal, for {np.abs(s).max() / 2 / np.pi:.4g} "
+                "Hz",
+                hint="put the ear above the mount, or take a plate of finite size.",
+            )
+            point = self.sound.spreading(s, ear) / (s * (plate.mass_per_area + stiff))
+            k_a = 1j * np.sqrt(squared) * self.radius
+            for j, freedom in enumerate(freedoms):
+                axis, sign = _order(freedom)
+                turned = sign * trace[:, axis] if axis >= 0 else 1.0
+                phase = np.exp(trace @ place[freedom.point][:2])
+                H[:, e, j] = point * turned * phase * _foot(k_a, axis >= 0, "propagating")
+        return H
 
 
 Order = tuple[int, float]
@@ -214,6 +297,7 @@ def finite_plate(
     *,
     highest: float,
     radius: float = 0.0,
+    sound: PlateSound | None = None,
 ) -> ModalReceiver:
     r"""Simply supported rectangular plate by its modes.
 
@@ -237,6 +321,8 @@ def finite_plate(
     highest [Hz]
     radius [m]
         Of the feet; moments need one.
+    sound
+        Ears, if any; the static rest does not radiate.
     """
     require_positive("finite_plate: highest", highest, "Hz")
     freedoms = _plate_freedoms(points, radius)
@@ -256,6 +342,13 @@ def finite_plate(
     dynamic = np.hypot(*wave) <= top
     omega = stretch * np.sum(wave**2, axis=0)
     scaled = shapes[~dynamic] / omega[~dynamic, None]
+    moving = wave[:, dynamic]
+
+    def radiated(s: Complexes) -> Complexes:
+        assert sound is not None
+        ears = [_of_modes(sound, s, ear, moving, edges, points[0]) for ear in sound.places.values()]
+        return 2.0 / np.sqrt(plate.mass_per_area * edges[0] * edges[1]) * np.stack(ears, axis=1)
+
     return ModalReceiver(
         points=tuple(points),
         freedoms=freedoms,
@@ -263,7 +356,28 @@ def finite_plate(
         damping=np.full(int(dynamic.sum()), 0.5 * plate.loss_factor),
         shapes=shapes[dynamic],
         residual=scaled.T @ scaled + np.diag(_static_tail(plate, freedoms, 4.0 * top, radius)),
+        ears=() if sound is None else tuple(sound.places),
+        radiated=None if sound is None else radiated,
     )
+
+
+def _of_modes(
+    sound: PlateSound,
+    s: Complexes,
+    ear: Vector,
+    wave: Matrix,
+    edges: Vector,
+    first: InterfacePoint,
+) -> Complexes:
+    """Rayleigh integral of ``sin sin`` of each mode, shape (k, modes)."""
+    trace = sound.trace(s, ear)
+    found = sound.spreading(s, ear) * np.exp(-trace @ first.position[:2])
+    for side in range(2):
+        k, beta = wave[side], trace[:, side, None] * np.ones(wave.shape[1])
+        beta = beta + 1e-9 * k  # where the trace of the sound is that of the mode: 0/0
+        end = np.cos(k * edges[side]) * np.exp(beta * edges[side])
+        found = found.reshape(s.size, -1) * (k * (1.0 - end) / (k**2 + beta**2))
+    return np.asarray(found)
 
 
 def _static_tail(plate: Plate, freedoms: tuple[Freedom, ...], top: float, radius: float) -> Vector:

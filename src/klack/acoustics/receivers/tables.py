@@ -5,7 +5,7 @@ A table has one line for each frequency, and two columns for each response::
     frequency [Hz], 101.z/101.z re [m/s/N], 101.z/101.z im [m/s/N], ear/101.z mag [Pa/N], \
 ear/101.z phase [deg]
 
-Arrays by name are in MATLAB files (up to 7.2), HDF5, netCDF 4 and ``.npz``: ``frequency``, a matrix
+Arrays by name are in MATLAB files (up to 7.2), HDF5, netCDF 3 and 4, and ``.npz``: ``frequency``, a matrix
 over frequency, outputs and inputs called by its quantity (``mobility``, ``accelerance``,
 ``receptance``, ``pressure``) or ``Y`` or ``H`` with a text ``quantity``, and the names ``outputs``
 and ``inputs`` of its channels (``ears`` of a pressure).  Where complex numbers cannot be stored
@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from klack.acoustics.interface import DIRECTIONS, Complexes
@@ -38,7 +39,7 @@ from klack.bodies.model_files.named_arrays import npy_array
 from klack.errors import InputError, foreign_reading, optional_package, refuse_if
 from klack.units import STIFFNESS, parse_quantity
 
-__all__ = ["read_array_responses", "read_isolator", "read_table_responses"]
+__all__ = ["netcdf3_arrays", "read_array_responses", "read_isolator", "read_table_responses"]
 
 _LARGEST = 1 << 30  # bytes
 _PART = r"\s+(?P<part>re|real|im|imag|mag|abs|phase|arg)\b\.?\s*(?:[\[(](?P<unit>.*)[\])])?"
@@ -353,6 +354,8 @@ def _places(path: Path, held: Arrays) -> dict[str, Vector]:
 def _arrays(path: Path) -> Arrays:
     with path.open("rb") as stream:
         head = stream.read(8)
+    if head[:3] == b"CDF":
+        return netcdf3_arrays(path)
     if head[1:4] == b"HDF" or path.suffix.lower() in (".h5", ".hdf5", ".nc"):
         return _hdf5(path)
     if path.suffix.lower() == ".npz":
@@ -376,6 +379,31 @@ def _npz(path: Path) -> Arrays:
                     hint=hint,
                 ),
             )
+    return arrays
+
+
+def netcdf3_arrays(path: Path) -> dict[str, Any]:
+    """Variables and texts of a netCDF 3 file; rows of characters are texts."""
+    refuse_if(
+        not path.is_file() or path.stat().st_size > _LARGEST,
+        str(path),
+        got="no file, or more than 1 GB",
+        expected="a netCDF file",
+        hint="check the path.",
+    )
+    arrays: dict[str, Any] = {}
+    damage = "write it again; it may be truncated, or of netCDF 5."
+    with (
+        foreign_reading(str(path), "a netCDF 3 file", damage),
+        scipy.io.netcdf_file(path, mmap=False) as file,
+    ):
+        for key, value in file._attributes.items():
+            arrays[key] = value
+        for key, variable in file.variables.items():
+            values = np.array(variable[:])
+            if values.dtype.kind == "S" and values.ndim == 2:
+                values = np.array([b"".join(row).rstrip(b"\0 ").decode() for row in values])
+            arrays[key] = values.astype(values.dtype.newbyteorder("=")) if values.ndim else values
     return arrays
 
 

@@ -1,0 +1,222 @@
+"""The machine that carries a valve: elements between, what it is at the mounts, ears."""
+
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, StringConstraints, model_validator
+
+from klack.input.problem import CaseProblem, Key
+from klack.input.section import InputPath, Name, Number, Section, Text
+from klack.units import DampingCoefficient, Frequency, Inertia, Length, Mass, Ratio, Stiffness
+
+__all__ = [
+    "Node",
+    "NoiseElement",
+    "NoiseFinitePlate",
+    "NoiseInfinitePlate",
+    "NoiseReceiver",
+    "NoiseRigidBody",
+    "NoiseVirtualPoint",
+    "Place",
+    "machine_mounts",
+]
+
+Along = Literal["x", "y", "z"]
+Node = Annotated[int, Field(strict=True)] | Text
+"""Node of a file by its number or name."""
+Place = tuple[Length, Length, Length]
+Direction = tuple[Number, Number, Number]
+FreedomText = Annotated[
+    str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_-]*(\.(r?[xyz]))?$", strict=True)
+]
+"""A mount, ``flange``, or one of its directions, ``flange.rx``."""
+
+
+class NoiseElement(Section):
+    """Resilient element below one mount; rigid in the directions that it does not name.
+
+    Directions are those of the drawing and do not couple.
+    """
+
+    stiffness: dict[Along, Annotated[Stiffness, Field(gt=0)]] | None = Field(
+        default=None, min_length=1, description="By direction; an element without mass."
+    )
+    damping: dict[Along, Annotated[DampingCoefficient, Field(ge=0)]] | None = Field(
+        default=None, description="By direction, viscous, beside the stiffness."
+    )
+    loss_factor: Ratio = Field(
+        default=0.0,
+        ge=0,
+        lt=2,
+        description="Imaginary over real stiffness at every frequency, beside the damping.",
+    )
+    file: InputPath | None = Field(
+        default=None,
+        description="Table of the dynamic stiffness over frequency (ISO 10846): k21 alone, or k11, "
+        "k21 and k22 where its mass counts.",
+    )
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        if self._exactly_one(("stiffness", "file"), "how stiff it is") == "file":
+            self._refuse_with(("damping",), "a file", "the file holds the losses")
+        for direction in self.damping or {}:
+            if direction not in (self.stiffness or {}):
+                raise CaseProblem(
+                    ("damping", direction),
+                    got=f"damping along {direction}, in which the element is rigid",
+                    expected="directions of the stiffness",
+                    hint=f"add stiffness: {{{direction}: ...}}, or remove it.",
+                )
+        return self
+
+
+class NoiseInfinitePlate(Section):
+    """Infinite thin plate, z along its normal; known along z and, with feet, about x and y."""
+
+    thickness: Length = Field(gt=0, description="Of the plate.")
+    material: Name = Field(description="Name of a material of the case.")
+    foot_radius: Length = Field(
+        default=0.0, ge=0, description="Of round feet, which carry moments as well; 0: forces alone."
+    )
+
+
+class NoiseFinitePlate(NoiseInfinitePlate):
+    """Simply supported rectangular plate, x and y along its sides, z along its normal."""
+
+    sides: tuple[Annotated[Length, Field(gt=0)], Annotated[Length, Field(gt=0)]] = Field(
+        description="Lengths along x and y."
+    )
+    at: tuple[Length, Length] = Field(
+        description="First mount from a corner; others follow from the drawing."
+    )
+    loss_factor: Ratio = Field(default=0.01, gt=0, lt=1, description="Of the mounted plate.")
+
+
+class NoiseRigidBody(Section):
+    """Free rigid body."""
+
+    mass: Mass = Field(gt=0, description="Of the machine alone, without the valve.")
+    inertia: tuple[Inertia, Inertia, Inertia] | None = Field(
+        default=None,
+        description="Principal moments about x, y, z; without them one mount alone, whose rotations "
+        "are not known.",
+    )
+    centre: Place = Field(
+        default=(0.0, 0.0, 0.0), description="Of mass, in the frame of the machine."
+    )
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        for i, value in enumerate(self.inertia or ()):
+            rest = sum(self.inertia or ()) - value
+            if not 0.0 < value <= rest * (1.0 + 1e-9):
+                raise CaseProblem(
+                    ("inertia", i),
+                    got=f"{value:g} kg m^2 beside a sum of {rest:g} kg m^2 of the others",
+                    expected="above 0, and none larger than the other two together",
+                    hint="a ball of mass m and radius r has 0.4 m r^2 about each axis.",
+                )
+        return self
+
+
+class NoiseVirtualPoint(Section):
+    """A mount between sensors: it moves as one rigid body with the nodes around it."""
+
+    position: Place = Field(description="In the frame of the measurement.")
+    nodes: tuple[Node, ...] = Field(
+        min_length=1, description="Whose sensors and hammer blows count."
+    )
+    freedoms: tuple[Literal["x", "y", "z", "rx", "ry", "rz"], ...] = Field(
+        default=("x", "y", "z", "rx", "ry", "rz"),
+        min_length=1,
+        description="Those to find; fewer where the channels tell no more.",
+    )
+    positions: dict[Text, Place] = Field(
+        default_factory=dict, description="Of nodes, where the file has no coordinates."
+    )
+
+
+class NoiseReceiver(Section):
+    """What carries the valve: measured responses, a plate, a rigid body, or springs to ground."""
+
+    file: InputPath | None = Field(
+        default=None,
+        description="Frequency responses at the mounts: UFF 58, CSV, MAT, HDF5, netCDF or npz.",
+    )
+    quantity: Literal["displacement", "velocity", "acceleration"] | None = Field(
+        default=None, description="Of motions in a universal file that does not say."
+    )
+    infinite_plate: NoiseInfinitePlate | None = Field(default=None, description="Infinite plate.")
+    plate: NoiseFinitePlate | None = Field(default=None, description="Plate of finite size.")
+    body: NoiseRigidBody | None = Field(default=None, description="Free rigid body.")
+    springs: dict[Along, Annotated[Stiffness, Field(gt=0)]] | None = Field(
+        default=None, min_length=1, description="From each mount to the ground, by direction."
+    )
+    points: dict[Name, Node | NoiseVirtualPoint] = Field(
+        default_factory=dict,
+        description="Mount: its node in the file, or a virtual point; default a node of its name.",
+    )
+    axes: tuple[Direction, Direction] | dict[Name, tuple[Direction, Direction]] = Field(
+        default=((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
+        description="x and y of the drawing as directions in the frame of the machine, for all "
+        "mounts or by mount.",
+        examples=[[[1, 0, 0], [0, 0, 1]]],
+    )
+    offset: dict[Name, Place] = Field(
+        default_factory=dict,
+        description="From the point of the machine to the mount, in the frame of the machine: they "
+        "move together as one rigid body.",
+    )
+    missing: dict[FreedomText, Literal["blocked", "free"]] = Field(
+        default_factory=dict,
+        description="Freedom (flange.rx) or mount -> what the machine does where it is not known: "
+        "it does not move, or it takes up no force.",
+    )
+    pressures: InputPath | None = Field(
+        default=None,
+        description="File of the pressures per force at the ears; default that of the responses.",
+    )
+    lowest: Frequency = Field(
+        default=0.0, ge=0, description="Measured responses count from here on; default all."
+    )
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        kinds = ("file", "infinite_plate", "plate", "body", "springs")
+        kind = self._exactly_one(kinds, "what the machine is")
+        if kind != "file":
+            for name in ("points", "quantity", "lowest"):
+                if name in self.model_fields_set and (name != "points" or self.pressures is None):
+                    raise CaseProblem(
+                        (name,),
+                        got=f"{name} together with {kind}",
+                        expected=f"no {name}: it belongs to a file of responses",
+                        hint=f"remove {name}.",
+                        on_key=True,
+                    )
+        return self
+
+    @property
+    def is_plate(self) -> NoiseInfinitePlate | None:
+        """The plate, of either kind."""
+        return self.plate or self.infinite_plate
+
+
+def machine_mounts(
+    elements: Mapping[str, NoiseElement], receiver: NoiseReceiver | None
+) -> Iterator[tuple[Key, str]]:
+    """Names of mounts below elements and receiver, and their keys."""
+    for name in elements:
+        yield ("noise", "elements", name), name
+    if receiver is None:
+        return
+    axes = receiver.axes if isinstance(receiver.axes, dict) else {}
+    for key, named in (
+        ("points", receiver.points),
+        ("axes", axes),
+        ("offset", receiver.offset),
+        ("missing", receiver.missing),
+    ):
+        for name in named:
+            yield ("noise", "receiver", key, name), name.partition(".")[0]
