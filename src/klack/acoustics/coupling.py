@@ -300,9 +300,7 @@ def power_balance(joint: Junction, found: Coupled) -> tuple[Vector, Vector]:
             continue
         k = element.stiffness(direction, s)
         one, two = found.source_velocity[:, i], found.velocity[:, i]
-        k_11, k_22 = (
-            k.transfer if own is None else own for own in (k.driving, k.receiving)
-        )
+        k_11, k_22 = (k.transfer if own is None else own for own in (k.driving, k.receiving))
         above, below = (k_11 * one - k.transfer * two) / s, (k.transfer * one - k_22 * two) / s
         lost += 0.5 * np.real(above.conj() * one - below.conj() * two)
     size = np.maximum.reduce([np.abs(given), kept, np.abs(lost), taken])

@@ -77,12 +77,15 @@ class CaseRecord(Record):
         SHA-256 (first digits) of components that are not klack's, by name.
     case_notes
         Added to the warnings, each once.
+    case_folder
+        Which files of the case are named from; empty in results of former versions.
     """
 
     case: str
     case_text: str
     own_components: Mapping[str, str] = field(default_factory=dict)
     case_notes: InitVar[tuple[str, ...]] = ()
+    case_folder: str = ""
 
     def __post_init__(self, case_notes: tuple[str, ...]) -> None:
         """Add notes of the case to the warnings."""
@@ -109,9 +112,10 @@ def case_fields(case: "AnyCase | CaseRecord", case_text: str | None = None) -> d
     """Fields of a case, or of a record that an analysis starts from."""
     notes: tuple[str, ...]
     if isinstance(case, CaseRecord):
-        name, text, notes = case.case, case.case_text, ()
+        name, text, notes, folder = case.case, case.case_text, (), case.case_folder
     else:
         name, text, notes = case.name, case.source, case.input_notes
+        folder = str(case.folder.absolute())
     return {
         "case": name,
         "title": case.title,
@@ -119,4 +123,5 @@ def case_fields(case: "AnyCase | CaseRecord", case_text: str | None = None) -> d
         "case_text": text if case_text is None else case_text,
         "own_components": case.own_components,
         "case_notes": notes,
+        "case_folder": folder,
     }

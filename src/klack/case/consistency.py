@@ -730,6 +730,16 @@ def _check_machine(case: ImpactSections | ValveSections, noise: CaseNoise) -> No
             expected="inertia: three moments about its centre of mass",
             hint="add 'inertia: [Ixx, Iyy, Izz]' in kg m^2.",
         )
+    for name, place in (noise.indicators or {}).items():
+        if isinstance(place, tuple) == (receiver.file is not None) or name in (noise.mounts or {}):
+            raise CaseProblem(
+                ("noise", "indicators", name),
+                got="a place" if isinstance(place, tuple) else f"the node '{place}'",
+                expected="a node of the file, beside the mounts"
+                if receiver.file is not None
+                else "the place [x, y, z] of a sensor from the first mount, beside the mounts",
+                hint="name it other than a mount; write [10 mm, 0 mm, 0 mm] on a model.",
+            )
     measured = receiver.file is not None or receiver.pressures is not None
     for ear, place in (noise.ears or {}).items():
         if isinstance(place, tuple) == measured or (receiver.is_plate is None and not measured):

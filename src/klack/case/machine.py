@@ -7,7 +7,7 @@ from pydantic import Field, StringConstraints, model_validator
 
 from klack.input.problem import CaseProblem, Key
 from klack.input.section import InputPath, Name, Number, Section, Text
-from klack.units import DampingCoefficient, Frequency, Inertia, Length, Mass, Ratio, Stiffness
+from klack.units import DampingCoefficient, Inertia, Length, Mass, Ratio, Stiffness
 
 __all__ = [
     "Node",
@@ -77,7 +77,9 @@ class NoiseInfinitePlate(Section):
     thickness: Length = Field(gt=0, description="Of the plate.")
     material: Name = Field(description="Name of a material of the case.")
     foot_radius: Length = Field(
-        default=0.0, ge=0, description="Of round feet, which carry moments as well; 0: forces alone."
+        default=0.0,
+        ge=0,
+        description="Of round feet, which carry moments as well; 0: forces alone.",
     )
 
 
@@ -99,8 +101,8 @@ class NoiseRigidBody(Section):
     mass: Mass = Field(gt=0, description="Of the machine alone, without the valve.")
     inertia: tuple[Inertia, Inertia, Inertia] | None = Field(
         default=None,
-        description="Principal moments about x, y, z; without them one mount alone, whose rotations "
-        "are not known.",
+        description="Principal moments about x, y, z; without them one mount alone, whose "
+        "rotations are not known.",
     )
     centre: Place = Field(
         default=(0.0, 0.0, 0.0), description="Of mass, in the frame of the machine."
@@ -165,7 +167,7 @@ class NoiseReceiver(Section):
     )
     offset: dict[Name, Place] = Field(
         default_factory=dict,
-        description="From the point of the machine to the mount, in the frame of the machine: they "
+        description="With a file: from its node to the mount, in the frame of the machine; they "
         "move together as one rigid body.",
     )
     missing: dict[FreedomText, Literal["blocked", "free"]] = Field(
@@ -177,16 +179,13 @@ class NoiseReceiver(Section):
         default=None,
         description="File of the pressures per force at the ears; default that of the responses.",
     )
-    lowest: Frequency = Field(
-        default=0.0, ge=0, description="Measured responses count from here on; default all."
-    )
 
     @model_validator(mode="after")
     def _one(self) -> Self:
         kinds = ("file", "infinite_plate", "plate", "body", "springs")
         kind = self._exactly_one(kinds, "what the machine is")
         if kind != "file":
-            for name in ("points", "quantity", "lowest"):
+            for name in ("points", "quantity", "offset"):
                 if name in self.model_fields_set and (name != "points" or self.pressures is None):
                     raise CaseProblem(
                         (name,),
@@ -195,6 +194,14 @@ class NoiseReceiver(Section):
                         hint=f"remove {name}.",
                         on_key=True,
                     )
+            if isinstance(self.axes, dict):
+                raise CaseProblem(
+                    ("axes",),
+                    got=f"axes by mount together with {kind}",
+                    expected="one pair of directions: the frame of a model is one",
+                    hint="write axes: [[1, 0, 0], [0, 1, 0]].",
+                    on_key=True,
+                )
         return self
 
     @property

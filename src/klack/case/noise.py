@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 from klack.case.bodies import BodySurface, SurfaceName
 from klack.case.machine import Node, NoiseElement, NoiseReceiver, Place
 from klack.input.problem import CaseProblem, Key
-from klack.input.section import Name, Section, Text
+from klack.input.section import Name, Section
 from klack.units import (
     Area,
     Density,
@@ -150,11 +150,13 @@ class CaseNoise(Section):
         "ear is what measures of the sound are of.",
         examples=[{"driver": 9001}],
     )
-    indicators: tuple[Text, ...] | None = Field(
+    indicators: dict[Name, Node | Place] | None = Field(
         default=None,
         min_length=1,
-        description="Freedoms of the machine (a.z, as in its file) that a virtual in-situ test "
-        "takes; default all of the receiver.",
+        description="With a receiver: sensors of a virtual in-situ test (klack noise "
+        "--virtual-test), a node of the file or of a model a place from the first mount; default "
+        "the mounts themselves.",
+        examples=[{"a": 7, "b": 8}],
     )
     radiation: Literal["piston", "unity", "elements"] = Field(
         default="piston",

@@ -235,6 +235,7 @@ def measured_receiver(
     ears: Mapping[str, str | int] | None = None,
     axes: Mapping[str, Matrix] | None = None,
     pressures: FrequencyResponses | None = None,
+    indicators: Mapping[str, str | int] | None = None,
 ) -> MeasuredReceiver:
     """Choose the points and ears of a receiver from measured responses, and check them.
 
@@ -251,6 +252,9 @@ def measured_receiver(
         measurement; those of the frame without.
     pressures
         Pressures per force of another file, on the same points.
+    indicators
+        Name -> node whose motion under forces at the points is known; what it does under forces
+        of its own is not used, and 0.
 
     Raises
     ------
@@ -287,6 +291,19 @@ def measured_receiver(
     check_resolution(name, responses.frequency, Y)
     heard = responses if pressures is None else pressures
     H = _transfers(heard, rows if heard is responses else _again(heard, rows), ears or {})
+    seen = [
+        row for name_, node in (indicators or {}).items() for row in _seen(responses, name_, node)
+    ]
+    if seen:
+        n, k = len(rows), len(seen)
+        moved = np.stack(
+            [[_summed(responses.values, one.outputs, row.sources) for row in rows] for one in seen]
+        ).transpose(2, 0, 1)
+        whole = np.zeros((Y.shape[0], n + k, n + k), dtype=complex)
+        whole[:, :n, :n], whole[:, n:, :n], whole[:, :n, n:] = Y, moved, moved.transpose(0, 2, 1)
+        Y, H = whole, np.concatenate([H, np.zeros((*H.shape[:2], k))], axis=2)
+        freedoms += tuple(row.freedom for row in seen)
+        found += [InterfacePoint(name=name_) for name_ in indicators or {}]
     receiver = MeasuredReceiver(
         name=name,
         points=tuple(found),
@@ -344,6 +361,25 @@ def _node(responses: FrequencyResponses, point: str, node: str) -> list[_Row]:
         got=f"no driving-point response at node '{node}'",
         expected="motion and force at one node in one direction",
         hint="strike the interface where its motion is measured; 'listing' shows what was read.",
+    )
+    return rows
+
+
+def _seen(responses: FrequencyResponses, name: str, node: str | int) -> list[_Row]:
+    """Directions in which a node is seen to move under every force."""
+    rows = [
+        _Row(freedom=Freedom(name, channel.direction), outputs={i: 1.0}, sources=None)
+        for i, channel in enumerate(responses.outputs)
+        if channel.node == str(node)
+        and channel.direction
+        and not np.any(np.isnan(responses.values[0, i]))
+    ]
+    refuse_if(
+        not rows,
+        f"{responses.name}: indicator '{name}'",
+        got=f"no motion of node '{node}' under every force of the file",
+        expected="a sensor that was measured under all hammer blows at the mounts",
+        hint="name a node of the file, or leave the indicator out.",
     )
     return rows
 

@@ -8,18 +8,25 @@ with what the modes miss of the static compliance, ``R``.  Reciprocal, and passi
 may use it.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from klack.acoustics.interface import Complexes, Freedom, InterfacePoint, ReceiverResponse
+from klack.acoustics.interface import (
+    DIRECTIONS,
+    Complexes,
+    Freedom,
+    InterfacePoint,
+    ReceiverResponse,
+    freedoms_of,
+)
 from klack.arrays import Matrix, Vector
 from klack.bodies.reduction.receptance import modal_sum
 from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.errors import refuse_if
 
-__all__ = ["ModalReceiver", "body_receiver"]
+__all__ = ["ModalReceiver", "body_receiver", "grounded", "rigid_receiver"]
 
 _BLOCK = 1 << 21  # denominators at once
 
@@ -60,7 +67,7 @@ class ModalReceiver:
             parts.append(modal_sum(self.shapes, denominator))
             if self.radiated is not None:
                 moved = (at / denominator)[:, None, :] * self.radiated(at[:, 0])
-                heard.append(moved @ self.shapes)
+                heard.append(np.tensordot(moved, self.shapes, axes=(2, 0)))
         compliance = np.concatenate(parts) + self.residual
         transfers = np.concatenate(heard) if self.radiated else np.zeros((s.size, 0, n), complex)
         return ReceiverResponse(mobility=s[:, None, None] * compliance, transfers=transfers)
@@ -96,4 +103,57 @@ def body_receiver(
         damping=body.damping,
         shapes=body.port_shapes[:, columns],
         residual=body.residual_compliance[np.ix_(columns, columns)],
+    )
+
+
+def rigid_receiver(
+    mass: float,
+    inertia: Sequence[float] | None,
+    centre: Vector,
+    points: tuple[InterfacePoint, ...],
+) -> ModalReceiver:
+    r"""Free rigid body, :math:`Y = \tfrac 1s\, R\, \mathrm{diag}(m, m, m, I)^{-1} R^T`.
+
+    Parameters
+    ----------
+    mass [kg]
+    inertia (3,) [kg m^2]
+        Principal, about x, y, z; without it translations of one point alone are known.
+    centre (3,) [m]
+        Of mass.
+    points
+        With the axes of the frame.
+    """
+    names = DIRECTIONS if inertia is not None else DIRECTIONS[:3]
+    freedoms = tuple(freedom for point in points for freedom in freedoms_of(point.name, names))
+    place = {point.name: point.position - centre for point in points}
+    rows = []
+    for freedom in freedoms:
+        axis = np.eye(3)[freedom.index % 3]
+        if freedom.is_rotation:
+            rows.append(np.concatenate([np.zeros(3), axis]))
+        else:  # e . (w x r) = w . (r x e)
+            rows.append(np.concatenate([axis, np.cross(place[freedom.point], axis)]))
+    motions = np.array(rows)[:, : len(names)]
+    weights = np.array([mass, mass, mass, *(inertia or ())])
+    return ModalReceiver(
+        points=points,
+        freedoms=freedoms,
+        omega=np.zeros(len(names)),
+        damping=np.zeros(len(names)),
+        shapes=(motions / np.sqrt(weights)).T,
+        residual=np.zeros((len(rows), len(rows))),
+    )
+
+
+def grounded(stiffness: Mapping[int, float], points: tuple[InterfacePoint, ...]) -> ModalReceiver:
+    """Springs from each point to the ground: direction 1 to 6 -> stiffness [N/m, N m/rad]."""
+    freedoms = tuple(Freedom(point.name, d) for point in points for d in sorted(stiffness))
+    return ModalReceiver(
+        points=points,
+        freedoms=freedoms,
+        omega=np.zeros(0),
+        damping=np.zeros(0),
+        shapes=np.zeros((0, len(freedoms))),
+        residual=np.diag([1.0 / stiffness[freedom.direction] for freedom in freedoms]),
     )

@@ -373,10 +373,10 @@ def _of_modes(
     trace = sound.trace(s, ear)
     found = sound.spreading(s, ear) * np.exp(-trace @ first.position[:2])
     for side in range(2):
-        k, beta = wave[side], trace[:, side, None] * np.ones(wave.shape[1])
-        beta = beta + 1e-9 * k  # where the trace of the sound is that of the mode: 0/0
+        k, place = np.unique(wave[side], return_inverse=True)
+        beta = trace[:, side, None] + 1e-9 * k  # 0/0 where the trace of the sound is the mode's
         end = np.cos(k * edges[side]) * np.exp(beta * edges[side])
-        found = found.reshape(s.size, -1) * (k * (1.0 - end) / (k**2 + beta**2))
+        found = found.reshape(s.size, -1) * (k * (1.0 - end) / (k**2 + beta**2))[:, place]
     return np.asarray(found)
 
 

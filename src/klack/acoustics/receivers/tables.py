@@ -7,8 +7,8 @@ ear/101.z phase [deg]
 
 Arrays by name are in MATLAB files (up to 7.2), HDF5, netCDF 3 and 4, and ``.npz``: ``frequency``, a matrix
 over frequency, outputs and inputs called by its quantity (``mobility``, ``accelerance``,
-``receptance``, ``pressure``) or ``Y`` or ``H`` with a text ``quantity``, and the names ``outputs``
-and ``inputs`` of its channels (``ears`` of a pressure).  Where complex numbers cannot be stored
+``receptance``, ``pressure``) or ``Y`` or ``H`` with a text ``quantity``, and the names
+``outputs`` and ``inputs`` of its channels (``ears`` of a pressure).  Where complex numbers cannot be stored
 they are two arrays, ``mobility_real`` and ``mobility_imag``.
 """
 

@@ -14,7 +14,7 @@ from klack.analyses.noise.record import MountFreedom, MountSource, NoiseStudy
 from klack.arrays import Vector
 from klack.bodies.reduction.structure import Structure
 
-__all__ = ["mount_source", "source_of", "write_sources"]
+__all__ = ["lowest_band", "mount_source", "source_of", "write_sources"]
 
 _HIGHEST = 20e3  # [Hz]
 _APART, _PER_RECORD = 10.0, 8.0  # [Hz] between lines at most, and lines per inverse record
@@ -61,8 +61,10 @@ def mount_source(structures: Sequence[Structure], held: HeldForces) -> MountSour
                 position=position[freedom.point],
                 free_velocity=source.free_velocity[:, i].copy(),
                 blocked_force=source.blocked_force[:, i].copy(),
-                velocity_bands=exposure(frequency, source.free_velocity[:, i], low=_lowest(apart)),
-                force_bands=exposure(frequency, source.blocked_force[:, i], low=_lowest(apart)),
+                velocity_bands=exposure(
+                    frequency, source.free_velocity[:, i], low=lowest_band(apart)
+                ),
+                force_bands=exposure(frequency, source.blocked_force[:, i], low=lowest_band(apart)),
             )
             for i, freedom in enumerate(source.freedoms)
         ),
@@ -72,7 +74,8 @@ def mount_source(structures: Sequence[Structure], held: HeldForces) -> MountSour
     )
 
 
-def _lowest(apart: float) -> float:
+def lowest_band(apart: float) -> float:
+    """Where third octaves begin [Hz]."""
     return max(apart, 15.0)
 
 

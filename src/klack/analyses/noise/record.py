@@ -17,13 +17,18 @@ from klack.signals.sampled import TimeSeries
 __all__ = [
     "BodyNoise",
     "ClickSound",
+    "EarSound",
+    "InMachine",
+    "InterfaceFreedom",
     "MountFreedom",
     "MountSource",
     "NoiseDesign",
     "NoiseSettings",
     "NoiseStudy",
+    "PathSound",
     "StopForce",
     "Surface",
+    "VirtualTestResult",
 ]
 
 Floats = NDArray[np.float64]
@@ -237,6 +242,125 @@ class MountSource:
         )
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class InterfaceFreedom:
+    """One freedom between valve and machine; exposures of one click.
+
+    Parameters
+    ----------
+    name
+        ``flange.z``.
+    force (k,) [N/Hz]
+        On the machine; of rotations N m/Hz.
+    force_bands, blocked_bands [N^2 s]
+        Of that, and of the blocked force on the same lines.
+    energy, energy_bands [J]
+        Into the machine; below 0 where the freedom gives energy back.
+    """
+
+    name: str
+    force: NDArray[np.complex128]
+    force_bands: ThirdOctaves
+    blocked_bands: ThirdOctaves
+    energy: float
+    energy_bands: ThirdOctaves
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PathSound:
+    """What one freedom brings to an ear.
+
+    Parameters
+    ----------
+    bands [Pa^2 s]
+        By itself.
+    exposure_A [Pa^2 s]
+        By itself, A-weighted.
+    share [-]
+        Its part of the A-weighted exposure of all, with phase; all parts make 1.
+    """
+
+    name: str
+    bands: ThirdOctaves
+    exposure_A: float
+    share: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class EarSound:
+    """Sound of one click at one ear, by its spectrum.
+
+    Parameters
+    ----------
+    bands [Pa^2 s]
+    exposure_A [Pa^2 s]
+    sound
+        Over time; None where the responses do not hold the ringing.
+    """
+
+    name: str
+    bands: ThirdOctaves
+    exposure_A: float
+    paths: tuple[PathSound, ...]
+    sound: ClickSound | None = None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class VirtualTestResult:
+    """Blocked forces as a bench would find them in the machine, without noise.
+
+    Parameters
+    ----------
+    found, exact [N^2 s]
+        By freedom.
+    deviation [-]
+        Largest over the lines, moments scaled.
+    condition
+        Largest over the lines.
+    """
+
+    indicators: tuple[str, ...]
+    freedoms: tuple[str, ...]
+    found: tuple[ThirdOctaves, ...]
+    exact: tuple[ThirdOctaves, ...]
+    deviation: float
+    condition: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class InMachine:
+    """The valve in the machine of its case; ``k`` frequencies.
+
+    Parameters
+    ----------
+    receiver, elements
+        In words; without elements joined rigidly.
+    frequency (k,) [Hz]
+    element_loss [J]
+        Lost in the elements.
+    balance [-]
+        Largest sum of all powers over the largest of them.
+    motion [-]
+        Highest velocity of the mounts along z over that of the needle at its fastest impact.
+    """
+
+    receiver: str
+    elements: str
+    frequency: Floats
+    freedoms: tuple[InterfaceFreedom, ...]
+    element_loss: float
+    balance: float
+    motion: float
+    ears: tuple[EarSound, ...]
+    notes: tuple[str, ...]
+    in_situ: VirtualTestResult | None = None
+
+    @property
+    def energy(self) -> float:
+        """Into the machine through all freedoms [J]."""
+        return sum(item.energy for item in self.freedoms)
+
+
 @dataclass(frozen=True, kw_only=True)
 class NoiseSettings:
     """Section ``noise`` of a case, in SI.
@@ -260,6 +384,10 @@ class NoiseSettings:
         Whether the case has such a section.
     background [dB re 20 uPa]
         A-weighted level of steady noise besides, which clicks stand out from.
+    machine
+        In words, with the elements between; empty without.
+    ear
+        Whose sound is that of the design; empty where it is an estimate at the distance.
     """
 
     mount: str
@@ -273,6 +401,8 @@ class NoiseSettings:
     given: bool
     background: float | None = None
     outside: str = ""
+    machine: str = ""
+    ear: str = ""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -299,6 +429,8 @@ class NoiseDesign:
         Elastic held ones; without any there is no sound.
     at_mounts
         If mounts are described.
+    machine
+        If a receiver is described; with ears ``sound`` is that of the first one.
     """
 
     name: str
@@ -318,6 +450,7 @@ class NoiseDesign:
     notes: tuple[str, ...] = ()
     own_components: Mapping[str, str] = field(default_factory=dict)
     at_mounts: MountSource | None = None
+    machine: InMachine | None = None
 
     @property
     def band_middle(self) -> Floats:

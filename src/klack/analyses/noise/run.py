@@ -1,6 +1,7 @@
 """``klack noise``: from stop forces to sound."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from time import perf_counter
 
 import numpy as np
@@ -29,10 +30,12 @@ from klack.analyses.noise.body import (
     net_share,
     port_transfers,
 )
+from klack.analyses.noise.in_machine import in_machine, installed
 from klack.analyses.noise.mount_source import mount_source
 from klack.analyses.noise.record import (
     BodyNoise,
     ClickSound,
+    InMachine,
     NoiseDesign,
     NoiseSettings,
     NoiseStudy,
@@ -60,18 +63,22 @@ def run_noise(
     sources: Sequence[NoiseSource],
     *,
     names: Sequence[str] = (),
+    virtual_test: bool = False,
     progress: Progress = silent,
 ) -> NoiseStudy:
     """Follow the noise of some runs from force to ear, and compare them with the first.
 
-    ``names`` of the designs differ; by default case and run, and a number where they repeat.
+    ``names`` of the designs differ; by default case and run, and a number where they repeat. A
+    ``virtual_test`` finds the blocked forces as a bench would, in the machine of each case.
     """
     begin = perf_counter()
     names = _design_names(sources, names)
     clock = StageClock(progress)
+    if virtual_test:
+        _require_machines(sources)
     with collected_warnings() as caught:
         designs = tuple(
-            _design(source, name, several=len(sources) > 1, clock=clock)
+            _design(source, name, several=len(sources) > 1, clock=clock, in_situ=virtual_test)
             for source, name in zip(sources, names, strict=True)
         )
     notes = dict.fromkeys([*_settings_differ(designs), *_notes(designs), *caught])
@@ -129,7 +136,20 @@ def _design_names(sources: Sequence[NoiseSource], names: Sequence[str]) -> tuple
     return tuple(names)
 
 
-def _design(source: NoiseSource, name: str, *, several: bool, clock: StageClock) -> NoiseDesign:
+def _require_machines(sources: Sequence[NoiseSource]) -> None:
+    for source in sources:
+        if source.noise.receiver is None:
+            raise InputError(
+                f"case {source.case}: noise",
+                got="a virtual test without a machine",
+                expected="noise.mounts and noise.receiver",
+                hint="describe what carries the valve, or leave out --virtual-test.",
+            )
+
+
+def _design(
+    source: NoiseSource, name: str, *, several: bool, clock: StageClock, in_situ: bool = False
+) -> NoiseDesign:
     clock("force spectra", 0.0)
     stops = tuple(_stop_force(stop) for stop in source.stops)
     share = net_share(source.net, [stop.bands for stop in stops])
@@ -142,8 +162,12 @@ def _design(source: NoiseSource, name: str, *, several: bool, clock: StageClock)
     bodies = tuple(body for body in found if body is not None)
     clock("sound", 0.0)
     at_mounts = None if source.held is None else mount_source(source.structures, source.held)
-    pressure = _pressure(source, around, transfers)
-    sound = _heard(pressure, source, clock) if pressure is not None else None
+    machine = _in_machine(source, clock, in_situ)
+    if machine is not None:
+        sound = machine.ears[0].sound if machine.ears else None
+    else:
+        pressure = _pressure(source, around, transfers)
+        sound = _heard(pressure, source, clock) if pressure is not None else None
     return NoiseDesign(
         name=name,
         label=name if several else source.label,
@@ -158,11 +182,30 @@ def _design(source: NoiseSource, name: str, *, several: bool, clock: StageClock)
         net_share=share,
         bodies=bodies,
         sound=sound,
-        settings=_settings(source, elements[0]),
-        notes=(*source.notes, *_design_notes(source, bodies, sound, elements)),
+        settings=_settings(source, elements[0], machine),
+        notes=(
+            *source.notes,
+            *_design_notes(source, bodies, sound, elements),
+            *(machine.notes if machine is not None else ()),
+        ),
         own_components=source.own_components,
         at_mounts=at_mounts,
+        machine=machine,
     )
+
+
+def _in_machine(source: NoiseSource, clock: StageClock, in_situ: bool) -> InMachine | None:
+    """The valve in the machine of its case, with the sound at each ear."""
+    found = installed(source)
+    if found is None:
+        return None
+    record, pressures = in_machine(found, source.speed, in_situ=in_situ)
+    ears = tuple(
+        replace(ear, sound=_heard(pressure, source, clock))
+        for ear, pressure in zip(record.ears, pressures or [None] * len(record.ears), strict=True)
+        if pressure is not None
+    )
+    return replace(record, ears=ears or record.ears)
 
 
 # --------------------------------------------------------------------------- force
@@ -274,7 +317,9 @@ def _material(source: NoiseSource, name: str) -> Material:
     return Material(name=name, young=given.young, poisson=given.poisson, density=given.density)
 
 
-def _settings(source: NoiseSource, elements: Mapping[str, SurfaceRadiation]) -> NoiseSettings:
+def _settings(
+    source: NoiseSource, elements: Mapping[str, SurfaceRadiation], machine: InMachine | None
+) -> NoiseSettings:
     noise = source.noise
     mount, plate = noise.mount, noise.plate
     below, carried, outside = "", "", _outside(elements)
@@ -301,6 +346,10 @@ def _settings(source: NoiseSource, elements: Mapping[str, SurfaceRadiation]) -> 
         duration=noise.drive.duration,
         given=source.given,
         background=noise.background,
+        machine=""
+        if machine is None
+        else "; ".join(filter(None, [machine.receiver, machine.elements])),
+        ear=next(iter(noise.ears or {}), ""),
     )
 
 
@@ -308,6 +357,10 @@ def _settings(source: NoiseSource, elements: Mapping[str, SurfaceRadiation]) -> 
 
 
 def _pressure(source: NoiseSource, around: Surroundings, transfers: Transfers) -> TimeSeries | None:
+    """At the first ear of a machine, or estimated at the distance of the case."""
+    found = installed(source)
+    if found is not None:
+        return next(iter(found.pressures()[0]), None)
     forces = {stop.name: stop.force for stop in source.stops}
     parts = [
         click_pressure(
@@ -372,6 +425,10 @@ def _design_notes(
                 "largest is a sixth of the wavelength; above, the surface is taken to radiate "
                 "plane waves, an estimate."
             )
+    if source.noise.receiver is not None and not source.noise.ears:
+        found.append(
+            "The case names no ears: what the machine makes of the force is known up to its mounts."
+        )
     if bodies and not source.given:
         found.append(
             f"Case {source.case} has no section 'noise': rigid hold, no plate. A small body that "
@@ -414,6 +471,8 @@ def _settings_differ(designs: Sequence[NoiseDesign]) -> list[str]:
         "plate": "the plate",
         "radiation": "how the surface radiates",
         "rate": "the rate of the drive pattern",
+        "machine": "the machine",
+        "ear": "the ear",
     }
     found = [
         word

@@ -3,8 +3,10 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 from ruamel.yaml import YAML
 
 from klack.acoustics.comparison import first_impact
@@ -21,6 +23,7 @@ from klack.analyses.noise.force import (
     interrupted_impact,
     stop_forces,
 )
+from klack.analyses.noise.machine import check_machine
 from klack.analyses.noise.reactions import HeldForces, forces_of_impact, forces_of_stroke
 from klack.analyses.stroke.record import StopSummary, StrokeStudy, StrokeVariant
 from klack.analyses.stroke.run import run_stroke
@@ -33,7 +36,7 @@ from klack.case.noise import CaseNoise
 from klack.case.schema import Case
 from klack.case.valve import ValveCase
 from klack.errors import InputError
-from klack.input.problem import nearest, one_of
+from klack.input.problem import CaseProblem, nearest, one_of
 from klack.machine.progress import Progress, silent
 from klack.signals.sampled import TimeSeries
 from klack.simulation.network_result import ImpactEvent, NetworkResult
@@ -74,6 +77,8 @@ class NoiseSource:
         Variant or level, and in words.
     held
         All forces on held bodies with their reactions, if mounts are described.
+    speed [m/s]
+        Of the fastest impact.
     net [N]
         Mass times acceleration of the needle, means over records: all forces on it. None where it
         is the contact force (a needle that only falls), or unknown.
@@ -97,6 +102,7 @@ class NoiseSource:
     materials: Mapping[str, CaseMaterial]
     net: TimeSeries | None = None
     held: HeldForces | None = None
+    speed: float = 0.0
     notes: tuple[str, ...] = ()
     own_components: Mapping[str, str] = field(default_factory=dict)
 
@@ -144,6 +150,7 @@ def run_sources(
 
     ``names`` are levels, by default ``reduced``, or variants, by default the first.
     """
+    check_machine(case.noise, case.materials)
     if isinstance(case, ValveCase):
         variants = tuple(names) or case.run.variants[:1]
         stroke = run_stroke(case, variants=variants, progress=progress, threads=threads)
@@ -173,7 +180,7 @@ def impact_sources(
     _require_structures(study)
     wanted = tuple(levels) or (study.reference,)
     failed = [f"The impact is incomplete: {note}" for note in failure_notes(study.failures)]
-    noise, given, materials = _noise_of(study.case_text, case)
+    noise, given, materials = _noise_of(study, case)
     found = []
     for name in wanted:
         _require("level", name, study.levels, study.why_missing(name))
@@ -202,6 +209,7 @@ def impact_sources(
                 given=given,
                 materials=materials,
                 held=forces_of_impact(_mounted(study, noise), force) if noise.mounts else None,
+                speed=study.speed,
                 notes=(
                     *failed,
                     *(f"level '{name}': {doubt}" for doubt in result.doubts),
@@ -225,7 +233,7 @@ def stroke_sources(
     """
     _require_structures(study)
     wanted = tuple(variants) or (study.reference.name,)
-    noise, given, materials = _noise_of(study.case_text, case)
+    noise, given, materials = _noise_of(study, case)
     found = []
     for name in wanted:
         _require("variant", name, study.variants)
@@ -251,6 +259,7 @@ def stroke_sources(
                 materials=materials,
                 net=net if net is None else before_impact(net, last),
                 held=_held(study, variant, noise, last),
+                speed=max((event.approach_speed for event in variant.result.events), default=0.0),
                 notes=(
                     *filter(None, [cut]),
                     *_notes(variant, last),
@@ -465,15 +474,34 @@ def _kept_up_to(bodies: Sequence[BodySummary]) -> float:
 
 
 def _noise_of(
-    text: str, case: Case | ValveCase | None
+    study: ImpactStudy | StrokeStudy, case: Case | ValveCase | None
 ) -> tuple[CaseNoise, bool, Mapping[str, CaseMaterial]]:
     if case is not None:
         return case.noise or CaseNoise(), case.noise is not None, case.materials
-    data = YAML(typ="safe").load(text)  # faster than the reader of cases, which knows the lines
+    data = YAML(typ="safe").load(
+        study.case_text
+    )  # faster than the reader of cases, which knows the lines
     given = data.get("noise") is not None
-    noise = CaseNoise.model_validate(data["noise"] if given else {})
+    noise = _section(data["noise"], study) if given else CaseNoise()
     materials = {
         key: CaseMaterial.model_validate(value)
         for key, value in (data.get("materials") or {}).items()
     }
     return noise, given, materials
+
+
+def _section(data: Any, study: ImpactStudy | StrokeStudy) -> CaseNoise:
+    """The section of a stored case; its files lie where they lay."""
+    try:
+        return CaseNoise.model_validate(data, context={"folder": Path(study.case_folder)})
+    except ValidationError as error:
+        problem = error.errors()[0].get("ctx", {}).get("error")
+        if not isinstance(problem, CaseProblem):
+            raise
+        raise InputError(
+            f"result of case {study.case}: noise",
+            got=problem.got,
+            expected=problem.expected,
+            hint="files of the machine lie where they lay when the case ran; run klack noise on "
+            "the case itself.",
+        ) from None
