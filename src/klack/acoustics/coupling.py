@@ -320,7 +320,8 @@ def _transformation(
     """Rows of ``v' = T v``, the freedoms of the source that are kept, and what was assumed."""
     mounts = {point.name: point for point in source.points}
     points = {point.name: point for point in receiver.points}
-    rows, kept, notes, open_ones = [], [], [], []
+    rows, kept, open_ones = [], [], []
+    taken: dict[str, list[str]] = {}
     for i, freedom in enumerate(source.freedoms):
         place = placements.get(freedom.point, Placement())
         name = place.point or freedom.point
@@ -337,7 +338,7 @@ def _transformation(
             if wanted is None:
                 open_ones.append(str(freedom))
                 continue
-            notes.append(f"{freedom}: the receiver is not known there; taken as {wanted}.")
+            taken.setdefault(wanted, []).append(str(freedom))
             if wanted == "free":
                 continue
         rows.append(row)
@@ -350,7 +351,11 @@ def _transformation(
         expected="at least one",
         hint="do not set them all free.",
     )
-    return np.array(rows), kept, tuple(notes)
+    notes = tuple(
+        f"{', '.join(names)}: the receiver is not known there; taken as {wanted}."
+        for wanted, names in taken.items()
+    )
+    return np.array(rows), kept, notes
 
 
 def _row(

@@ -67,8 +67,9 @@ def write_netcdf(path: Path, source: SourceAtMounts, title: str) -> None:
         "mobility": (two, "m/(N s), 1/(N s), 1/(N m s)"),
     }
     with scipy.io.netcdf_file(path, "w") as file:
-        file.title = title
-        file.convention = "exp(+i omega t); amplitudes of the spectrum of one click"
+        setattr(file, "title", title)  # noqa: B010 - a netCDF attribute
+        convention = "exp(+i omega t); amplitudes of the spectrum of one click"
+        setattr(file, "convention", convention)  # noqa: B010
         file.createDimension("axis", 3)
         _names(file, "outputs", "output", freedoms)
         _names(file, "inputs", "input", freedoms)

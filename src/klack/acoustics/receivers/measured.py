@@ -291,19 +291,18 @@ def measured_receiver(
     check_resolution(name, responses.frequency, Y)
     heard = responses if pressures is None else pressures
     H = _transfers(heard, rows if heard is responses else _again(heard, rows), ears or {})
-    seen = [
-        row for name_, node in (indicators or {}).items() for row in _seen(responses, name_, node)
-    ]
+    seen = [row for key, node in (indicators or {}).items() for row in _seen(responses, key, node)]
     if seen:
         n, k = len(rows), len(seen)
-        moved = np.stack(
-            [[_summed(responses.values, one.outputs, row.sources) for row in rows] for one in seen]
-        ).transpose(2, 0, 1)
+        moved = np.empty((Y.shape[0], k, n), dtype=complex)
+        for i, one in enumerate(seen):
+            for j, row in enumerate(rows):
+                moved[:, i, j] = _summed(responses.values, one.outputs, row.sources)
         whole = np.zeros((Y.shape[0], n + k, n + k), dtype=complex)
         whole[:, :n, :n], whole[:, n:, :n], whole[:, :n, n:] = Y, moved, moved.transpose(0, 2, 1)
         Y, H = whole, np.concatenate([H, np.zeros((*H.shape[:2], k))], axis=2)
         freedoms += tuple(row.freedom for row in seen)
-        found += [InterfacePoint(name=name_) for name_ in indicators or {}]
+        found += [InterfacePoint(name=key) for key in indicators or {}]
     receiver = MeasuredReceiver(
         name=name,
         points=tuple(found),

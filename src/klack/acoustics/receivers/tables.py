@@ -5,11 +5,11 @@ A table has one line for each frequency, and two columns for each response::
     frequency [Hz], 101.z/101.z re [m/s/N], 101.z/101.z im [m/s/N], ear/101.z mag [Pa/N], \
 ear/101.z phase [deg]
 
-Arrays by name are in MATLAB files (up to 7.2), HDF5, netCDF 3 and 4, and ``.npz``: ``frequency``, a matrix
-over frequency, outputs and inputs called by its quantity (``mobility``, ``accelerance``,
+Arrays by name are in MATLAB files (up to 7.2), HDF5, netCDF 3 and 4, and ``.npz``: ``frequency``,
+a matrix over frequency, outputs and inputs called by its quantity (``mobility``, ``accelerance``,
 ``receptance``, ``pressure``) or ``Y`` or ``H`` with a text ``quantity``, and the names
-``outputs`` and ``inputs`` of its channels (``ears`` of a pressure).  Where complex numbers cannot be stored
-they are two arrays, ``mobility_real`` and ``mobility_imag``.
+``outputs`` and ``inputs`` of its channels (``ears`` of a pressure).  Where complex numbers cannot
+be stored they are two arrays, ``mobility_real`` and ``mobility_imag``.
 """
 
 import csv
@@ -397,10 +397,9 @@ def netcdf3_arrays(path: Path) -> dict[str, Any]:
         foreign_reading(str(path), "a netCDF 3 file", damage),
         scipy.io.netcdf_file(path, mmap=False) as file,
     ):
-        for key, value in file._attributes.items():
-            arrays[key] = value
+        arrays |= getattr(file, "_attributes", {})
         for key, variable in file.variables.items():
-            values = np.array(variable[:])
+            values: NDArray[Any] = np.array(variable[:])
             if values.dtype.kind == "S" and values.ndim == 2:
                 values = np.array([b"".join(row).rstrip(b"\0 ").decode() for row in values])
             arrays[key] = values.astype(values.dtype.newbyteorder("=")) if values.ndim else values

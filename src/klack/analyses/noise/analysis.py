@@ -10,6 +10,7 @@ from operator import attrgetter, itemgetter
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.acoustics.signal_statistics import PRESSURE_REFERENCE
 from klack.acoustics.source_levels import FORCE_REFERENCE, VELOCITY_REFERENCE
 from klack.acoustics.third_octave import ENERGY_REFERENCE, ThirdOctaves, nominal_label
 from klack.analyses.analysis import Measured, StoredAnalysis
@@ -26,10 +27,14 @@ from klack.analyses.measures import text_table
 from klack.analyses.noise.measures import (
     BODY_MEASURES,
     DESIGN_MEASURES,
+    EAR_MEASURES,
+    IN_SITU_MEASURES,
+    INTERFACE_MEASURES,
     MOUNT_MEASURES,
+    PATH_MEASURES,
     STOP_MEASURES,
 )
-from klack.analyses.noise.record import NoiseDesign, NoiseStudy
+from klack.analyses.noise.record import InMachine, NoiseDesign, NoiseStudy
 from klack.analyses.store import RecordFormat
 from klack.terminal.tables import TextTable
 
@@ -105,6 +110,79 @@ _MOUNTS = JsonForm(
         lambda source: {item.name: item for item in source.freedoms},
     ),
 )
+_INTERFACE = JsonForm(
+    "InterfaceFreedomJson",
+    "One freedom between valve and machine.",
+    *measured_keys(INTERFACE_MEASURES),
+    Key("band_center_Hz", [float], of=lambda item: list(item.force_bands.middle)),
+    Key(
+        "force_dB",
+        [float],
+        "On the machine, third octaves re (1 uN)^2 s; empty where nothing acts.",
+        lambda item: _levels(item.force_bands, FORCE_REFERENCE),
+    ),
+    Key(
+        "energy_J",
+        [float],
+        "Into the machine by band.",
+        lambda item: list(item.energy_bands.energy),
+    ),
+)
+_PATH = JsonForm(
+    "PathJson",
+    "What one freedom brings to an ear.",
+    *measured_keys(PATH_MEASURES),
+    Key(
+        "third_octave_dB",
+        [float],
+        "By itself, re (20 uPa)^2 s; empty where nothing acts.",
+        lambda path: _levels(path.bands, PRESSURE_REFERENCE),
+    ),
+)
+_EAR = JsonForm(
+    "EarJson",
+    "Sound of one click at an ear; what is over time is null where no signal is known.",
+    *measured_keys(EAR_MEASURES),
+    Key("band_center_Hz", [float], of=lambda ear: list(ear.bands.middle)),
+    Key(
+        "third_octave_dB",
+        [float],
+        "re (20 uPa)^2 s.",
+        lambda ear: _levels(ear.bands, PRESSURE_REFERENCE),
+    ),
+    Key("paths", {str: _PATH}, "By freedom.", lambda ear: {x.name: x for x in ear.paths}),
+)
+_IN_SITU_FREEDOM = JsonForm(
+    "InSituFreedomJson", "One freedom of a virtual test.", *measured_keys(IN_SITU_MEASURES)
+)
+_IN_SITU = JsonForm(
+    "InSituJson",
+    "Blocked forces as a bench would find them in the machine, without noise.",
+    Key("indicators", list[str]),
+    Key("deviation", float, "Largest over all lines, relative."),
+    Key("condition", float, "Largest of the mobilities from the interface to the indicators."),
+    Key("freedoms", {str: _IN_SITU_FREEDOM}, of=lambda test: {x.name: x for x in test.freedoms}),
+)
+_MACHINE = JsonForm(
+    "MachineJson",
+    "The valve in the machine of its case.",
+    Key("receiver", str),
+    Key("elements", str, "Empty where all mounts are joined rigidly."),
+    Key("energy_J", float, "Into the machine through all freedoms, of one click.", "energy"),
+    Key("element_loss_J", float, "Lost in the elements.", "element_loss"),
+    Key("balance", float, "Sum of all powers over the largest of them, at the worst line."),
+    Key(
+        "motion_ratio",
+        Real,
+        "Highest velocity of the mounts along z over that of the needle.",
+        "motion",
+    ),
+    Key(
+        "freedoms", {str: _INTERFACE}, "By name.", lambda found: {x.name: x for x in found.freedoms}
+    ),
+    Key("ears", {str: _EAR}, "By name.", lambda found: {x.name: x for x in found.ears}),
+    Key("virtual_test", (_IN_SITU, None), "With --virtual-test.", "in_situ"),
+)
 _DESIGN = JsonForm(
     "DesignNoiseJson",
     "Noise of one design; measures of sound are null where nothing radiates.",
@@ -126,6 +204,7 @@ _DESIGN = JsonForm(
         "The valve as a source at its mounts; empty without noise.mounts.",
         lambda design: {} if design.at_mounts is None else {"source": design.at_mounts},
     ),
+    Key("machine", (_MACHINE, None), "Without noise.receiver null."),
 )
 _STUDY = JsonForm(
     "NoiseJson",
@@ -181,6 +260,47 @@ def _told(study: NoiseStudy) -> Iterator[TextTable | str]:
                 for item in design.at_mounts.freedoms
             ),
         )
+    for design in mounted:
+        if design.machine is not None:
+            whose = f"{design.name}: " if len(study.designs) > 1 else ""
+            yield from _told_of_machine(design.machine, whose)
+
+
+def _told_of_machine(found: InMachine, whose: str) -> Iterator[TextTable | str]:
+    """Freedoms, ears and paths; what is zero is left out."""
+    below = f"{found.receiver}{'; ' if found.elements else ''}{found.elements}"
+    yield text_table(
+        f"{whose}On {below}: {1e6 * found.energy:.4g} uJ of one click",
+        "freedom",
+        INTERFACE_MEASURES,
+        ((item.name, item) for item in found.freedoms if item.force.any()),
+    )
+    if found.ears:
+        yield text_table(
+            f"{whose}Sound of one click at the ears, re 20 uPa",
+            "ear",
+            EAR_MEASURES,
+            ((ear.name, ear) for ear in found.ears),
+        )
+        yield text_table(
+            f"{whose}Paths to the ears",
+            "path",
+            PATH_MEASURES,
+            (
+                (f"{path.name} to {ear.name}", path)
+                for ear in found.ears
+                for path in ear.paths
+                if path.exposure_A > 0.0
+            ),
+        )
+    if found.in_situ is not None:
+        yield text_table(
+            f"{whose}Virtual test by {', '.join(found.in_situ.indicators)}: off by "
+            f"{found.in_situ.deviation:.1g} at most, condition {found.in_situ.condition:.2g}",
+            "freedom",
+            IN_SITU_MEASURES,
+            ((item.name, item) for item in found.in_situ.freedoms),
+        )
 
 
 def _measured(study: NoiseStudy) -> Iterator[Measured]:
@@ -192,6 +312,15 @@ def _measured(study: NoiseStudy) -> Iterator[Measured]:
             yield f"{design.name}, {body.name}", body, BODY_MEASURES
         for freedom in design.at_mounts.freedoms if design.at_mounts else ():
             yield f"{design.name}, {freedom.name}", freedom, MOUNT_MEASURES
+        machine = design.machine
+        for item in machine.freedoms if machine else ():
+            yield f"{design.name}, {item.name} in the machine", item, INTERFACE_MEASURES
+        for ear in machine.ears if machine else ():
+            yield f"{design.name}, {ear.name}", ear, EAR_MEASURES
+            for path in ear.paths:
+                yield f"{design.name}, {path.name} to {ear.name}", path, PATH_MEASURES
+        for found in machine.in_situ.freedoms if machine and machine.in_situ else ():
+            yield f"{design.name}, {found.name} in situ", found, IN_SITU_MEASURES
 
 
 def _difference_row(design: NoiseDesign, first: NoiseDesign) -> tuple[str, ...]:
@@ -230,7 +359,10 @@ NOISE = StoredAnalysis(
             "velocity": "m/s",
             "time": "s",
             "loudness": "sone",
-            "energy": "N^2 s, or Pa^2 s of a sound",
+            "energy": "N^2 s, Pa^2 s of a sound, J into a machine",
+            "force": "N/Hz on a machine, of moments N m/Hz",
+            "exposure_A": "Pa^2 s",
+            "element_loss": "J",
         },
     ),
     page="noise.content:noise_content",
@@ -242,6 +374,10 @@ NOISE = StoredAnalysis(
         "stop and its force": STOP_MEASURES,
         "body that vibrates": BODY_MEASURES,
         "freedom of a mount": MOUNT_MEASURES,
+        "freedom between valve and machine": INTERFACE_MEASURES,
+        "ear in a machine": EAR_MEASURES,
+        "path to an ear": PATH_MEASURES,
+        "freedom of a virtual test": IN_SITU_MEASURES,
     },
     measured=_measured,
 )

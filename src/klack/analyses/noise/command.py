@@ -37,6 +37,14 @@ _Names = Annotated[
         "[default: the first variant, the best level]",
     ),
 ]
+_VirtualTest = Annotated[
+    bool,
+    Parameter(
+        negative="",
+        help="Find the blocked forces as a test on the machine of the case would (ISO 20270), with "
+        "its indicators.",
+    ),
+]
 
 
 def noise(
@@ -45,6 +53,7 @@ def noise(
     /,
     *,
     variant: _Names = None,
+    virtual_test: _VirtualTest = False,
     component: Components = None,
     wanted: WantedResult = WANTED_RESULT,
 ) -> int:
@@ -66,7 +75,12 @@ def noise(
             for path, case in zip(paths, cases, strict=True)
             for source in _sources(path, case, names, progress, wanted.threads)
         ]
-        study = run_noise(sources, names=_names(paths, sources), progress=progress)
+        study = run_noise(
+            sources,
+            names=_names(paths, sources),
+            virtual_test=virtual_test,
+            progress=progress,
+        )
     return ending.end(
         NOISE,
         study,

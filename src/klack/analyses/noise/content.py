@@ -12,6 +12,8 @@ from klack.analyses.noise.figures import (
     blocked_charts,
     click_charts,
     force_chart,
+    heard_words,
+    machine_charts,
     mobility_charts,
     radiation_chart,
     source_charts,
@@ -21,9 +23,13 @@ from klack.analyses.noise.figures import (
 from klack.analyses.noise.measures import (
     BODY_MEASURES,
     DESIGN_MEASURES,
+    EAR_MEASURES,
     EXPOSURE_LEVEL_A,
     FORCE_LEVEL,
+    IN_SITU_MEASURES,
+    INTERFACE_MEASURES,
     MOUNT_MEASURES,
+    PATH_MEASURES,
     STOP_MEASURES,
     strongest,
 )
@@ -54,10 +60,10 @@ def noise_answer(study: NoiseStudy) -> str:
     )
     if first.sound is None:
         return text + "; no surface radiates."
-    heard, distance = first.sound, quantity(first.settings.distance, "m", 3)
+    heard, where = first.sound, heard_words(first)[0]
     peak = fixed(heard.statistics.peak_level, 0, "dB")
     text += (
-        f". At {distance} one click is estimated at {peak} peak and "
+        f". {where[0].upper()}{where[1:]} one click is estimated at {peak} peak and "
         f"{_sone(heard.loudness.maximum)} (loudest moment)."
     )
     for other in study.designs[1:]:
@@ -100,6 +106,7 @@ def noise_content(study: NoiseStudy) -> Content:
         Section(title="Mobility at the contacts", charts=mobility_charts(study)),
         Section(title="Force on the support", charts=blocked_charts(study)),
         *_source_sheet(study),
+        *_machine(study),
         _radiation(study),
         Section(title="How the surfaces move", picture=surface_figure(study)),
         Section(title="The click", charts=click_charts(study)),
@@ -187,6 +194,62 @@ def _source_sheet(study: NoiseStudy) -> tuple[Section, ...]:
     )
 
 
+def _machine(study: NoiseStudy) -> tuple[Section, ...]:
+    """What the machine makes of the source."""
+    rows, ears, tests, words = [], [], [], []
+    for design in study.designs:
+        found, whose = design.machine, f"{design.name}, " if len(study.designs) > 1 else ""
+        if found is None:
+            continue
+        for item in found.freedoms:
+            if item.force.any():
+                rows.append((f"{whose}{item.name}", *page_cells(INTERFACE_MEASURES, item)))
+        for ear in found.ears:
+            ears.append((f"{whose}{ear.name}", *page_cells(EAR_MEASURES, ear), *[_NONE] * 2))
+            blank = [_NONE] * len(page_heads(EAR_MEASURES))
+            for path in ear.paths:
+                if path.exposure_A > 0.0:
+                    cells = page_cells(PATH_MEASURES, path)
+                    ears.append((f"by {path.name}", *blank, *cells))
+        words.append(
+            f"{whose}{design.settings.machine}. {quantity(found.energy, 'J', 3)} of one click go "
+            f"into it, {quantity(found.element_loss, 'J', 3)} are lost in elements; at each line "
+            f"all powers make zero within {found.balance:.1g} of the largest."
+        )
+        if isfinite(found.motion):
+            words.append(
+                f"{whose}the mounts move with up to {share(found.motion)} of the speed of the "
+                "needle."
+            )
+        if found.in_situ is not None:
+            test = found.in_situ
+            words.append(
+                f"{whose}a virtual test by {listed(list(test.indicators))} finds the blocked force "
+                f"within {test.deviation:.1g} (condition {test.condition:.2g}, without noise)."
+            )
+            for one in test.freedoms:
+                tests.append((f"{whose}{one.name}", *page_cells(IN_SITU_MEASURES, one)))
+    if not words:
+        return ()
+    tables = [
+        Table(columns=(head, *(c for m in measures for c in page_heads(m))), rows=tuple(cells))
+        for head, measures, cells in (
+            ("freedom", (INTERFACE_MEASURES,), rows),
+            ("ear", (EAR_MEASURES, PATH_MEASURES), ears),
+            ("freedom", (IN_SITU_MEASURES,), tests),
+        )
+        if cells
+    ]
+    return (
+        Section(
+            title="In the machine",
+            paragraphs=tuple(words),
+            tables=tuple(tables),
+            charts=machine_charts(study),
+        ),
+    )
+
+
 def _listen(study: NoiseStudy) -> Section:
     sounds = study_sounds(study)
     if not sounds:
@@ -198,6 +261,8 @@ def _listen(study: NoiseStudy) -> Section:
         what = "one click"
         if name.startswith("pattern"):
             what = f"{design.settings.rate:.4g} clicks per second"
+        elif name.startswith("click-at-"):
+            what = f"one click {name.removesuffix('.wav').removeprefix('click-').replace('-', ' ')}"
         whose = f"{design.name}, " if len(study.designs) > 1 else ""
         fits = length <= _LONGEST
         players.append(
@@ -324,6 +389,8 @@ def _assumptions(study: NoiseStudy) -> Section:
     for title, text in (
         ("mount", lambda d: d.settings.mount or "rigid"),
         ("plate", lambda d: d.settings.plate or "none"),
+        ("machine", lambda d: d.settings.machine or "none described"),
+        ("sound", lambda d: heard_words(d)[0]),
         ("radiation", lambda d: _EFFICIENCY[d.settings.radiation] + d.settings.outside),
         ("distance", lambda d: quantity(d.settings.distance, "m", 3)),
         (
@@ -397,10 +464,14 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
         "blocked force",
         "Axial force of the body on a rigid support. A softer structure receives less.",
     ),
+    *glossary(INTERFACE_MEASURES),
+    *glossary(EAR_MEASURES),
+    *glossary(PATH_MEASURES),
     (
         "sound pressure",
-        "All radiated power as a monopole in a free field, with minimum phase. Reflections, "
-        "directivity and the travel time are neglected.",
+        "At an ear by the forces on the machine; without ears all radiated power as a monopole in "
+        "a free field, with minimum phase. Reflections, directivity and the travel time are "
+        "neglected.",
     ),
 )
 

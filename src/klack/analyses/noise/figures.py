@@ -14,7 +14,17 @@ from klack.acoustics.signal_statistics import EXPOSURE_REFERENCE
 from klack.acoustics.source_levels import FORCE_REFERENCE, VELOCITY_REFERENCE, drive_lines
 from klack.acoustics.third_octave import ENERGY_REFERENCE, ThirdOctaves
 from klack.analyses.noise.record import BodyNoise, NoiseDesign, NoiseStudy, StopForce
-from klack.report.chart import AxisSpec, Band, Chart, Curve, Mark, Panel
+from klack.report.chart import (
+    AnyChart,
+    AxisSpec,
+    Band,
+    BarChart,
+    BarPart,
+    Chart,
+    Curve,
+    Mark,
+    Panel,
+)
 from klack.report.looks import look_of, thinned
 from klack.report.wording import quantity
 
@@ -23,6 +33,8 @@ __all__ = [
     "blocked_charts",
     "click_charts",
     "force_chart",
+    "heard_words",
+    "machine_charts",
     "mobility_charts",
     "radiation_chart",
     "source_charts",
@@ -437,6 +449,99 @@ def source_charts(study: NoiseStudy) -> tuple[Chart, ...]:
     )
 
 
+def machine_charts(study: NoiseStudy) -> tuple[AnyChart, ...]:
+    """Force on the machine beside the blocked force, energy by freedom, paths to each ear."""
+    mounted = [d for d in study.designs if d.machine is not None]
+    k, force = -1, list[Curve]()
+    energy: list[Curve] = []
+    ears: dict[str, list[Curve]] = {}
+    bars: list[tuple[str, dict[str, float]]] = []
+    for design in mounted:
+        found, whose = design.machine, f"{design.name}, " if len(mounted) > 1 else ""
+        assert found is not None
+        for item in found.freedoms:
+            if not item.force.any():
+                continue
+            k, label = k + 1, f"{whose}{item.name}"
+            level = _level(item.force_bands.energy, FORCE_REFERENCE**2)
+            force.append(_steps(item.force_bands, level, k, label, listed=True))
+            level = _level(item.blocked_bands.energy, FORCE_REFERENCE**2)
+            if item.blocked_bands.energy.any():
+                blocked = _steps(item.blocked_bands, level, k, "")
+                force.append(replace(blocked, width=0.9, style="dotted"))
+            taken = item.energy_bands.energy
+            if np.any(taken > 0.0):
+                level = np.where(taken > 0.0, _level(taken, SOUND_ENERGY_REFERENCE), np.nan)
+                energy.append(_steps(item.energy_bands, level, k, label, listed=True))
+        for ear in found.ears:
+            own = ears.setdefault(ear.name, [])
+            level = _level(ear.bands.energy, EXPOSURE_REFERENCE)
+            whole = _steps(ear.bands, level, len(own), f"{whose}all paths", listed=True)
+            own.append(replace(whole, width=2.6))
+            for path in ear.paths:
+                if path.bands.energy.any():
+                    level = _level(path.bands.energy, EXPOSURE_REFERENCE)
+                    own.append(_steps(path.bands, level, len(own), whose + path.name, listed=True))
+            bars.append((f"{whose}{ear.name}", {path.name: path.share for path in ear.paths}))
+    if not force or not energy:
+        return ()
+    top = max(1e-3 * float(d.machine.frequency[-1]) for d in mounted if d.machine)
+    axis = AxisSpec(label="frequency", unit="kHz", log=True, range=(_FREQUENCY[0], top))
+
+    def chart(name: str, title: str, panel: Panel, note: str) -> Chart:
+        return Chart(name=name, title=title, x=axis, panels=(panel,), note=note)
+
+    return (
+        chart(
+            "machine-force",
+            "Force on the machine",
+            _level_panel("exposure", "dB re (1 µN)² s", force, 80.0),
+            "Third octaves of one click; thin dotted the blocked force, which an immovable machine "
+            "would take up. Moments re (1 µN m)² s.",
+        ),
+        chart(
+            "machine-energy",
+            "Energy into the machine",
+            _level_panel("energy", "dB re 1 pJ", energy, 80.0),
+            "By freedom; gaps where a freedom gives energy back.",
+        ),
+        *(
+            chart(
+                f"paths-{name}",
+                f"Paths to the ear '{name}'",
+                _level_panel("level", "dB re (20 µPa)²s", curves, _SILENCE),
+                "Sound exposure of one click, without weighting. Paths add with their phases.",
+            )
+            for name, curves in ears.items()
+        ),
+        *([] if not bars else [_path_bars(bars)]),
+    )
+
+
+def _path_bars(rows: Sequence[tuple[str, dict[str, float]]]) -> BarChart:
+    """Shares of the paths: what raises the sound, and what lowers it."""
+    paths = dict.fromkeys(path for _, own in rows for path, share in own.items() if share)
+    return BarChart(
+        name="paths",
+        title="Shares of the paths in the sound",
+        x=AxisSpec(label="share of the A-weighted exposure", unit="%"),
+        rows=tuple(f"{name}: {way}" for name, _ in rows for way in ("raise", "lower")),
+        parts=tuple(
+            BarPart(
+                label=path,
+                values=tuple(
+                    100.0 * max(sign * own.get(path, 0.0), 0.0)
+                    for _, own in rows
+                    for sign in (1.0, -1.0)
+                ),
+                colour=look_of(k).colour,
+            )
+            for k, path in enumerate(paths)
+        ),
+        note="Each path with its phase; what raises less what lowers makes 100 %.",
+    )
+
+
 def radiation_chart(study: NoiseStudy) -> Chart | None:
     """Sound energy per band, that at efficiency 1, and the difference of designs."""
     with_bodies = [(i, design) for i, design in _designs(study) if design.bodies]
@@ -470,6 +575,16 @@ def radiation_chart(study: NoiseStudy) -> Chart | None:
 # --------------------------------------------------------------------------- sound
 
 
+def heard_words(design: NoiseDesign) -> tuple[str, str]:
+    """Where the sound of a design is heard, and what it comes from."""
+    if design.settings.ear:
+        return f"at '{design.settings.ear}'", "Forces on the machine by its pressures per force."
+    return (
+        f"at {quantity(design.settings.distance, 'm', 3)}",
+        "Estimate: monopole in a free field with minimum phase; without the travel time.",
+    )
+
+
 def click_charts(study: NoiseStudy) -> tuple[Chart, ...]:
     """Sound pressure of a click, its third octaves, and its loudness."""
     heard = [(i, d, d.sound) for i, d in _designs(study) if d.sound is not None]
@@ -493,24 +608,23 @@ def click_charts(study: NoiseStudy) -> tuple[Chart, ...]:
         if sound is not first:
             apart = level - _level(first.bands.energy, EXPOSURE_REFERENCE)
             differences.append(_steps(sound.bands, apart, i, design.label))
-    distance = quantity(heard[0][1].settings.distance, "m", 3)
+    where, how = heard_words(heard[0][1])
     over_time = Chart(
         name="click",
-        title=f"One click at {distance}: sound pressure and loudness",
+        title=f"One click {where}: sound pressure and loudness",
         x=AxisSpec(label="time", unit="ms", range=window),
         panels=(
             Panel(y=AxisSpec(label="pressure", unit="mPa"), curves=tuple(waves)),
             Panel(y=AxisSpec(label="loudness", unit="sone"), curves=tuple(loud), share=0.6),
         ),
         note=(
-            "Estimate: monopole in a free field with minimum phase; without the travel time. "
-            "Loudness after ISO 532-1 for sounds that vary in time; it decays more slowly than the "
-            "sound, as hearing does."
+            f"{how} Loudness after ISO 532-1 for sounds that vary in time; it decays more slowly "
+            "than the sound, as hearing does."
         ),
     )
     over_bands = Chart(
         name="click-bands",
-        title=f"One click at {distance}, third octaves",
+        title=f"One click {where}, third octaves",
         x=AxisSpec(label="frequency", unit="kHz", log=True, range=(0.02, 20.0)),
         panels=_compared("level", "dB re (20 µPa)²s", bands, _SILENCE, differences),
         note="Sound exposure of one click per band, without weighting. Sound ends at 20 kHz.",

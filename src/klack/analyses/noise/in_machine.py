@@ -18,6 +18,7 @@ from klack.analyses.noise.mount_source import lowest_band, source_of
 from klack.analyses.noise.record import (
     EarSound,
     InMachine,
+    InSituFreedom,
     InterfaceFreedom,
     PathSound,
     VirtualTestResult,
@@ -96,21 +97,21 @@ class Installed:
             return measured_signal(self._heard, self.machine.coupled, frequency, step=1.0 / _RATE)
         apart = 1.0 / max(4.0 * (self.span + _LEAD), 0.1)
         while True:
-            frequency = even_lines((0.0, np.inf, apart), 0.98 * 0.5 * _RATE)
+            frequency = even_lines((0.0, np.inf, apart), 0.98 * 0.5 * _RATE, 8 * _MOST)
             try:
                 return measured_signal(
                     self._heard, self.machine.coupled, frequency, step=1.0 / _RATE
                 )
             except InputError:
                 apart /= 2.0
-                if apart < 0.5 / _LONGEST:
+                if apart < 0.25 / _LONGEST:
                     raise
 
 
-def even_lines(known: tuple[float, float, float], top: float) -> Vector:
+def even_lines(known: tuple[float, float, float], top: float, most: int = _MOST) -> Vector:
     """Lines [Hz] at even distances within a range, at multiples that divide the rate of sound."""
     low, high, apart = known
-    apart = _RATE / np.ceil(_RATE / max(apart, (min(high, top) - low) / _MOST) - 1e-6)
+    apart = _RATE / np.ceil(_RATE / max(apart, (min(high, top) - low) / most) - 1e-6)
     first = max(int(np.ceil(low / apart - 1e-6)), 1)
     last = int(np.floor(min(high, top) / apart + 1e-6))
     return np.clip(apart * np.arange(first, last + 1), low, high)
@@ -286,11 +287,14 @@ def _in_situ(source: SourceAtMounts, joint: Junction) -> VirtualTestResult:
     low = lowest_band(float(f[0]))
     return VirtualTestResult(
         indicators=tuple(map(str, test.indicators)),
-        freedoms=tuple(map(str, test.freedoms)),
-        found=tuple(
-            exposure(f, test.blocked_force[:, i], low=low) for i in range(len(test.freedoms))
+        freedoms=tuple(
+            InSituFreedom(
+                name=str(freedom),
+                found=exposure(f, test.blocked_force[:, i], low=low),
+                exact=exposure(f, test.exact[:, i], low=low),
+            )
+            for i, freedom in enumerate(test.freedoms)
         ),
-        exact=tuple(exposure(f, test.exact[:, i], low=low) for i in range(len(test.freedoms))),
         deviation=float(test.deviation.max()),
         condition=float(test.condition.max()),
     )

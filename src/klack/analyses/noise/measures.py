@@ -5,15 +5,19 @@ from dataclasses import replace
 from math import log10
 from typing import cast
 
-from klack.acoustics.signal_statistics import SoundStatistics
+from klack.acoustics.signal_statistics import PRESSURE_REFERENCE, SoundStatistics
 from klack.acoustics.source_levels import FORCE_REFERENCE, VELOCITY_REFERENCE
 from klack.acoustics.third_octave import ENERGY_REFERENCE
 from klack.analyses.measures import Column, Measure, Value, described_in
 from klack.analyses.noise.record import (
     BodyNoise,
     ClickSound,
+    EarSound,
+    InSituFreedom,
+    InterfaceFreedom,
     MountFreedom,
     NoiseDesign,
+    PathSound,
     StopForce,
 )
 
@@ -21,15 +25,20 @@ __all__ = [
     "BODY_MEASURES",
     "CLICK_MEASURES",
     "DESIGN_MEASURES",
+    "EAR_MEASURES",
     "EXPOSURE_LEVEL_A",
     "FORCE_LEVEL",
+    "INTERFACE_MEASURES",
+    "IN_SITU_MEASURES",
     "MOUNT_MEASURES",
+    "PATH_MEASURES",
     "STOP_MEASURES",
     "strongest",
 ]
 
 _THEORY, _SOUND = "theory/noise", "theory/sound"
 _AUDIBLE = 20e3  # [Hz]
+_NOTHING = 1e-10  # of the square of a reference
 
 
 def strongest(design: NoiseDesign) -> StopForce:
@@ -176,7 +185,8 @@ DESIGN_MEASURES: tuple[Measure[NoiseDesign], ...] = described_in(
         name="energy into mount and plate besides",
         symbol="W_s",
         unit="J",
-        definition="Energy through the held surfaces into mount and plate.",
+        definition="Energy through the held surfaces into mount and plate, or into the machine with "
+        "its elements.",
         note="A valve as a whole passes it on; it comes on top of the injected energy.",
         digits=3,
         column=Column("uJ", 1e6, ".4g", "to mount, plate"),
@@ -447,8 +457,8 @@ BODY_MEASURES: tuple[Measure[BodyNoise], ...] = described_in(
 
 
 def _exposure_level(energy: float, reference: float) -> float | None:
-    """None of what does not move."""
-    return 10.0 * log10(energy / reference**2) if energy > 0.0 else None
+    """None of what does not move, and of its round-off."""
+    return 10.0 * log10(energy / reference**2) if energy > _NOTHING * reference**2 else None
 
 
 MOUNT_MEASURES: tuple[Measure[MountFreedom], ...] = described_in(
@@ -485,3 +495,155 @@ MOUNT_MEASURES: tuple[Measure[MountFreedom], ...] = described_in(
         page=True,
     ),
 )
+
+_COUPLING = "theory/structure-borne-source"
+INTERFACE_MEASURES: tuple[Measure[InterfaceFreedom], ...] = described_in(
+    _COUPLING,
+    Measure(
+        key="force_on_machine_level",
+        name="force on the machine",
+        symbol="L_g",
+        unit="dB",
+        definition="Exposure of one click, ∫ F² dt over the bands that are known, on the machine, "
+        "re (1 µN)² s; of moments re (1 µN m)² s.",
+        read=lambda freedom: _exposure_level(
+            float(freedom.force_bands.energy.sum()), FORCE_REFERENCE
+        ),
+        form="fixed",
+        digits=1,
+        column=Column("dB", 1.0, ".1f"),
+        page=True,
+    ),
+    Measure(
+        key="blocked_force_beside_level",
+        name="blocked force in the same bands",
+        symbol="L_Fbl",
+        unit="dB",
+        definition="Exposure of the blocked force of the same freedom in the same bands: what an "
+        "immovable machine would take up.",
+        read=lambda freedom: _exposure_level(
+            float(freedom.blocked_bands.energy.sum()), FORCE_REFERENCE
+        ),
+        form="fixed",
+        digits=1,
+        column=Column("dB", 1.0, ".1f", "if blocked"),
+        page=True,
+    ),
+    Measure(
+        key="energy_into_machine",
+        name="energy into the machine",
+        symbol="W_i",
+        unit="J",
+        definition="∫ g v dt of one click through one freedom; below 0 where it gives energy back, "
+        "the sum of all is not.",
+        read=lambda freedom: freedom.energy,
+        digits=3,
+        column=Column("uJ", 1e6, ".4g"),
+        deviation="energy",
+        page=True,
+    ),
+)
+"""Of one freedom between valve and machine."""
+
+
+def _at_ear(measure: Measure[SoundStatistics]) -> Measure[EarSound]:
+    def read(ear: EarSound) -> Value:
+        return None if ear.sound is None else measure.read(ear.sound.statistics)
+
+    column = Column(measure.unit, 1.0, ".1f", measure.symbol[2:])
+    return replace(cast(Measure[EarSound], measure), read=read, column=column)
+
+
+EAR_MEASURES: tuple[Measure[EarSound], ...] = described_in(
+    _COUPLING,
+    Measure(
+        key="ear_exposure_level_weighted",
+        json_name="ear_exposure_level_dBA",
+        name="sound exposure level at the ear, A-weighted",
+        symbol="L_AE",
+        unit="dBA",
+        definition="Level of ∫ p_A² dt of one click by its spectrum, in the band that is known, re "
+        "(20 µPa)² s.",
+        read=lambda ear: _exposure_level(ear.exposure_A, PRESSURE_REFERENCE),
+        form="fixed",
+        digits=1,
+        column=Column("dBA", 1.0, ".1f", "SEL"),
+        deviation="difference",
+        page=True,
+    ),
+    *(_at_ear(measure) for measure in CLICK_MEASURES[3:]),
+    Measure(
+        key="loudness_max",
+        name="loudness, loudest moment",
+        symbol="N_max",
+        unit="sone",
+        definition="Loudness of one click at its loudest moment, ISO 532-1, free field.",
+        source=_SOUND,
+        read=lambda ear: None if ear.sound is None else ear.sound.loudness.maximum,
+        digits=3,
+        column=Column("sone", 1.0, ".3g", "loudness"),
+        deviation="factor",
+        page=True,
+    ),
+)
+"""Of one ear in the machine."""
+
+PATH_MEASURES: tuple[Measure[PathSound], ...] = described_in(
+    _COUPLING,
+    Measure(
+        key="path_exposure_level_weighted",
+        json_name="path_exposure_level_dBA",
+        name="level of the path alone",
+        symbol="L_AE,i",
+        unit="dBA",
+        definition="A-weighted sound exposure level of what one freedom alone brings to the ear, "
+        "re (20 µPa)² s.",
+        read=lambda path: _exposure_level(path.exposure_A, PRESSURE_REFERENCE),
+        form="fixed",
+        digits=1,
+        column=Column("dBA", 1.0, ".1f", "alone"),
+        page=True,
+    ),
+    Measure(
+        key="path_share",
+        name="share of the path",
+        symbol="s_i",
+        definition="∫ Re(p* p_i) df over ∫ |p|² df, A-weighted: parts with their phases make "
+        "100 %; below 0 where a path lowers the sound.",
+        read=lambda path: path.share,
+        form="share",
+        column=Column("%", 100.0, ".1f", "share"),
+        page=True,
+    ),
+)
+"""Of one path to an ear."""
+
+IN_SITU_MEASURES: tuple[Measure[InSituFreedom], ...] = described_in(
+    _COUPLING,
+    Measure(
+        key="blocked_force_in_situ_level",
+        name="blocked force, found in situ",
+        symbol="L_Fbl",
+        unit="dB",
+        definition="Exposure of the blocked force that a test on the running machine finds (ISO "
+        "20270), re (1 µN)² s; of moments re (1 µN m)² s.",
+        read=lambda freedom: _exposure_level(float(freedom.found.energy.sum()), FORCE_REFERENCE),
+        form="fixed",
+        digits=1,
+        column=Column("dB", 1.0, ".1f", "found"),
+        page=True,
+    ),
+    Measure(
+        key="blocked_force_of_source_level",
+        name="blocked force of the source",
+        symbol="L_Fbl",
+        unit="dB",
+        definition="The same of the source in the freedoms that the machine takes up.",
+        read=lambda freedom: _exposure_level(float(freedom.exact.energy.sum()), FORCE_REFERENCE),
+        form="fixed",
+        digits=1,
+        column=Column("dB", 1.0, ".1f", "of the source"),
+        page=True,
+    ),
+)
+"""Of one freedom in a virtual test."""

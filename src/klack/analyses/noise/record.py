@@ -19,6 +19,7 @@ __all__ = [
     "ClickSound",
     "EarSound",
     "InMachine",
+    "InSituFreedom",
     "InterfaceFreedom",
     "MountFreedom",
     "MountSource",
@@ -306,13 +307,22 @@ class EarSound:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class InSituFreedom:
+    """Exposure of the blocked force of one freedom [N^2 s]: found, and that of the source."""
+
+    name: str
+    found: ThirdOctaves
+    exact: ThirdOctaves
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class VirtualTestResult:
     """Blocked forces as a bench would find them in the machine, without noise.
 
     Parameters
     ----------
-    found, exact [N^2 s]
-        By freedom.
+    freedoms
+        In which the machine moves.
     deviation [-]
         Largest over the lines, moments scaled.
     condition
@@ -320,9 +330,7 @@ class VirtualTestResult:
     """
 
     indicators: tuple[str, ...]
-    freedoms: tuple[str, ...]
-    found: tuple[ThirdOctaves, ...]
-    exact: tuple[ThirdOctaves, ...]
+    freedoms: tuple[InSituFreedom, ...]
     deviation: float
     condition: float
 
@@ -477,9 +485,13 @@ class NoiseDesign:
     def support_energy(self) -> float:
         """Energy through the held surfaces into mounts and plates [J]; nan without bodies.
 
+        In a machine that into it and its elements.
+
         It does not stand in :attr:`injected_energy`, whose bodies are held rigidly: on a mount a
         body moves as a whole and takes up more.  The radiated energy comes from both.
         """
+        if self.machine is not None:
+            return self.machine.energy + self.machine.element_loss
         return self._over_bodies(lambda body: body.support_energy)
 
     @property

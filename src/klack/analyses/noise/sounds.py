@@ -15,7 +15,7 @@ StudySound = tuple[str, NoiseDesign, TimeSeries]
 
 
 def study_sounds(study: NoiseStudy) -> tuple[StudySound, ...]:
-    """One click of each design, then its drive pattern [Pa]."""
+    """One click of each design, then its drive pattern [Pa]; at further ears clicks."""
     found: list[StudySound] = []
     for design in study.designs:
         if design.sound is None:
@@ -24,6 +24,10 @@ def study_sounds(study: NoiseStudy) -> tuple[StudySound, ...]:
         pattern = drive_pattern(click, settings.rate, settings.duration)
         found.append((_file_name("click", study, design), design, click))
         found.append((_file_name("pattern", study, design), design, pattern))
+        for ear in design.machine.ears[1:] if design.machine else ():
+            if ear.sound is not None:
+                name = _file_name(f"click-at-{ear.name}", study, design)
+                found.append((name, design, ear.sound.pressure))
     return tuple(found)
 
 
