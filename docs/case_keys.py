@@ -201,9 +201,10 @@ def _type(node: Node, schema: Node, found: Mapping[str, _Section]) -> str:
         return f"{each} {_type(named[0], schema, found)}"
     if node.get("type") == "array":
         if "prefixItems" in node:
-            return "list of " + ", ".join(
-                _type(entry, schema, found) for entry in node["prefixItems"]
-            )
+            kinds = [_type(entry, schema, found) for entry in node["prefixItems"]]
+            if len(set(kinds)) == 1:
+                return f"list of {len(kinds)}: {kinds[0]}"
+            return "list of " + ", ".join(kinds)
         return f"list of {_type(node.get('items', {}), schema, found)}"
     kind = _kind(node, schema)
     if kind is not None:

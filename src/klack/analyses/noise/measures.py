@@ -608,7 +608,7 @@ PATH_MEASURES: tuple[Measure[PathSound], ...] = described_in(
         key="path_share",
         name="share of the path",
         symbol="s_i",
-        definition="∫ Re(p* p_i) df over ∫ |p|² df, A-weighted: parts with their phases make "
+        definition="∫ Re(p* p_i) df over ∫ p* p df, A-weighted: parts with their phases make "
         "100 %; below 0 where a path lowers the sound.",
         read=lambda path: path.share,
         form="share",
