@@ -185,7 +185,7 @@ DESIGN_MEASURES: tuple[Measure[NoiseDesign], ...] = described_in(
         name="energy into mount and plate besides",
         symbol="W_s",
         unit="J",
-        definition="Energy through the held surfaces into mount and plate, or into the machine with "
+        definition="Energy through the held surfaces into mount and plate, or into the machine and "
         "its elements.",
         note="A valve as a whole passes it on; it comes on top of the injected energy.",
         digits=3,
