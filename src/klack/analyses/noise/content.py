@@ -243,7 +243,7 @@ def _machine(study: NoiseStudy) -> tuple[Section, ...]:
     return (
         Section(
             title="In the machine",
-            paragraphs=tuple(words),
+            paragraphs=tuple(text[0].upper() + text[1:] for text in words),
             tables=tuple(tables),
             charts=machine_charts(study),
         ),

@@ -612,6 +612,7 @@ PATH_MEASURES: tuple[Measure[PathSound], ...] = described_in(
         "100 %; below 0 where a path lowers the sound.",
         read=lambda path: path.share,
         form="share",
+        digits=3,
         column=Column("%", 100.0, ".1f", "share"),
         page=True,
     ),
