@@ -5,6 +5,10 @@ import pytest
 from draws import each
 from numpy.typing import NDArray
 
+from klack.hydraulics.fluid import Fluid
+from klack.hydraulics.liquid import Murnaghan
+from klack.hydraulics.mixture import Vapour
+from klack.hydraulics.unsteady_drag import UnsteadyDrag
 from klack.mechanics.force import ConstantForce, ForceOverTime
 from klack.mechanics.force_over_stroke import ForceOverStroke
 from klack.mechanics.gravity import Gravity
@@ -42,6 +46,9 @@ PARTS = {
     "elasto-plastic friction": LuGreFriction(
         coulomb=0.5, breakaway=0.8, bristle_stiffness=1e5, elastic_share=0.7
     ),
+    "sphere in a liquid": UnsteadyDrag(shape="sphere", radius=1e-3),
+    "sphere in a flow": UnsteadyDrag(shape="sphere", radius=1e-3, typical_speed=1.0),
+    "layer of liquid": UnsteadyDrag(shape="layer", area=1e-4, height=50e-6),
     "rubber stop": RubberStop(
         gap=-5e-6,
         stiffness=1e6,
@@ -56,13 +63,22 @@ PARTS = {
 }
 
 
+LIQUID = Fluid(
+    name="oil",
+    temperature=293.15,
+    liquid=Murnaghan(density_at_reference=900.0, bulk_modulus_at_reference=1e9),
+    base_viscosity=0.01,
+    vapour=Vapour(pressure=10.0, density=1e-3),
+)
+
+
 def row_of(part: Component) -> ElementRow:
     """Row of a component between a needle and, if it has a second port, a housing."""
     first, *second = part.port_kinds()
     bodies = {"needle": RigidMass(mass=3e-3), "housing": RigidMass(mass=0.1)}
     connections = [["needle.body", f"part.{first}"]]
     connections += [["housing.body", f"part.{port}"] for port in second]
-    return Network({**bodies, "part": part}, connections).rows().elements[0]
+    return Network({**bodies, "part": part}, connections, fluid=LIQUID).rows().elements[0]
 
 
 def balance(

@@ -64,6 +64,7 @@ COMPONENTS = (
     ("seat", "klack.hydraulics.seat.Seat"),
     ("conical-seat", "klack.hydraulics.conical_seat.ConicalSeat"),
     ("annulus", "klack.hydraulics.annulus.Annulus"),
+    ("unsteady-drag", "klack.hydraulics.unsteady_drag.UnsteadyDrag"),
     ("inertance", "klack.hydraulics.inertance.Inertance"),
     ("line", "klack.hydraulics.line.Line"),
     ("junction", "klack.hydraulics.junction.Junction"),

@@ -21,10 +21,12 @@ from klack.verification.half_space import oblique_spheres
 from klack.verification.sphere_in_liquid import (
     GLASS,
     NYLON,
+    REBOUNDS,
     STEEL,
     STOKES_NUMBERS,
     Sphere,
     measured_ratio,
+    rebounds,
     restitution,
 )
 
@@ -105,6 +107,7 @@ def checks() -> list[Check]:
         ),
         *oblique_spheres(),
         *bounces_in_liquid(),
+        *rebounds_in_oil(),
     ]
 
 
@@ -155,6 +158,50 @@ _LEGENDRE = (
 )
 _FREE = "roughness 0.1 um for all, steady drag over half a radius, no history force"
 _STEEP = 30.0  # below it the restitution rises from 0 to 0.3
+
+
+_GONDRET = (
+    "heights over time, Gondret, Lance & Petit 2002, Phys. Fluids 14:643; conditions of Biegert, "
+    "Vowinckel & Meiburg 2017"
+)
+_MEMORY = "one cut-off for both, 5 um; Basset's memory is too strong, pictures are 2 ms apart"
+
+
+def rebounds_in_oil() -> list[Check]:
+    """First rebound of two steel spheres in silicone oil: film, drag, added mass, memory."""
+    found = []
+    for shot in REBOUNDS:
+        course, heights, contacts = rebounds(shot)
+        tops = zip(shot.tops, shot.heights, strict=True)
+        points = sorted([*tops, *((time, 0.0) for time in (0.0, *shot.contacts))])
+        measured = 1e3 * np.array(points).T
+        curve = ComparedCurve(
+            x_label="time since the first contact [ms]",
+            y_label="height [mm]",
+            expected=(measured[0], measured[1]),
+            computed=(1e3 * course[0, ::20], 1e3 * course[1, ::20]),
+        )
+        found += [
+            check(
+                f"steel in silicone oil, St {shot.stokes:g}: first rebound over the measured "
+                f"{1e3 * shot.heights[0]:g} mm [-]",
+                expected=1.0,
+                computed=heights[0] / shot.heights[0],
+                tolerance=0.1,
+                source=_GONDRET,
+                reason=_MEMORY,
+                curve=curve,
+            ),
+            check(
+                f"steel in silicone oil, St {shot.stokes:g}: second contact [ms]",
+                expected=1e3 * shot.contacts[0],
+                computed=1e3 * contacts[0],
+                tolerance=0.1,
+                source=_GONDRET,
+                reason=_MEMORY,
+            ),
+        ]
+    return found
 
 
 def bounces_in_liquid() -> list[Check]:
