@@ -2,7 +2,7 @@
 
 From the six shots of the case ``struck-bar``, with and without the dome on the striker's end, come
 struck-bar.svg and struck-bar-ends.svg; alumina.svg from the oblique impacts of spheres;
-bounce-in-liquid.svg from bounces of spheres on a wall in a liquid.
+bounce-in-liquid.svg and rebounds-in-oil.svg from bounces of spheres on a wall in a liquid.
 """
 
 from pathlib import Path
@@ -18,11 +18,13 @@ from klack.verification.measured import SHOTS, struck_bar
 from klack.verification.sphere_in_liquid import (
     GLASS,
     NYLON,
+    REBOUNDS,
     ROUGHNESS,
     STEEL,
     STOKES_NUMBERS,
     film_alone,
     measured_ratio,
+    rebounds,
     restitution,
 )
 
@@ -68,6 +70,7 @@ def figures() -> dict[str, Figure]:
         "struck-bar-ends.svg": near,
         "alumina.svg": alumina(),
         "bounce-in-liquid.svg": bounce_in_liquid(),
+        "rebounds-in-oil.svg": rebounds_in_oil(),
     }
 
 
@@ -101,6 +104,33 @@ def bounce_in_liquid() -> Figure:
     axes.set(xlabel="Stokes number", ylabel="restitution, wet over dry", ylim=(-0.03, 1.03))
     axes.grid(visible=True, which="both", color="#dddddd", lw=0.5)
     axes.legend(loc="lower right", fontsize=8)
+    return figure
+
+
+def rebounds_in_oil() -> Figure:
+    """Height over time of two spheres that bounce in silicone oil."""
+    figure = Figure(figsize=(9.0, 3.4), layout="constrained")
+    kinds = (
+        ("without memory", {"memory": False}, "orange", ":"),
+        ("memory of Mei and Adrian", {"typical_speed": 0.5}, "green", "-."),
+        ("memory of Basset", {}, "black", "--"),
+    )
+    for k, shot in enumerate(REBOUNDS):
+        axes = figure.add_subplot(1, 2, k + 1)
+        for label, keys, colour, line in kinds:
+            course, _, _ = rebounds(shot, **keys)
+            axes.plot(1e3 * course[0], 1e3 * course[1], line, color=COLOURS[colour], lw=1.2,
+                      label=f"computed, {label}")  # fmt: skip
+        time, height = (*shot.tops, 0.0, *shot.contacts), shot.heights
+        height = (*height, *[0.0] * (1 + len(shot.contacts)))
+        axes.plot(1e3 * np.array(time), 1e3 * np.array(height), "o", color=COLOURS["blue"],
+                  ms=5, label="measured")  # fmt: skip
+        end = 1.3e3 * shot.contacts[-1]
+        axes.set(xlabel="time since the first contact [ms]", xlim=(-3.0, end), ylim=(-0.3, None),
+                 title=f"Stokes number {shot.stokes:g}")  # fmt: skip
+        axes.grid(visible=True, color="#dddddd", lw=0.5)
+    figure.axes[0].set_ylabel("height [mm]")
+    figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
     return figure
 
 

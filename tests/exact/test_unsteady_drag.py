@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from draws import each
 
+from klack.errors import InputError
 from klack.hydraulics.fluid import Fluid
 from klack.hydraulics.liquid import Murnaghan
 from klack.hydraulics.mixture import Vapour
@@ -195,3 +196,24 @@ def test_times_of_the_memory_reach_from_impacts_to_flights():
     _, time = UnsteadyDrag(shape="sphere", radius=RADIUS).layers(DENSITY, 0.01)
     assert time.min() < SHORTEST_MEMORY < LONGEST_MEMORY < time.max()
     assert len(time) < 40
+
+
+@each(("keys", "named"), [
+    ({"shape": "sphere"}, "radius"),
+    ({"shape": "layer", "area": 1e-4}, "height"),
+    ({"shape": "layer", "area": 1e-4, "height": 1e-4, "radius": 1e-3}, "radius"),
+    ({"shape": "layer", "area": 1e-4, "height": 1e-4, "typical_speed": 1.0}, "typical_speed"),
+    ({"shape": "sphere", "radius": 1e-3, "area": 1e-4}, "area"),
+])  # fmt: skip
+def test_keys_belong_to_a_shape(keys, named):
+    with pytest.raises(InputError, match=named):
+        UnsteadyDrag(**keys)
+
+
+def test_added_mass_moves_with_the_body_as_a_whole():
+    """Definition: of a rigid mode; elastic modes, and a body that is held, keep theirs."""
+    drag = UnsteadyDrag(shape="layer", area=1e-4, height=1e-4, added_mass=3e-3)
+    body = falling(drag, 0.01, 1e-3, 0.0).bodies[0].body
+    assert body.mass == pytest.approx(4e-3)
+    assert body.port_shapes[0, 0] == pytest.approx(1.0 / sqrt(4e-3))
+    assert body.rigid_axial[0] == pytest.approx(sqrt(4e-3))

@@ -153,7 +153,7 @@ class UnsteadyDrag(Component):
     Limits: the liquid is at rest elsewhere, the law of the drag holds to Re = 800, added mass grows
     by up to 60 % towards a wall (a film at an end stop does not contain that), and after a reversal
     the body meets its own wake: measured rebounds lie between the two kernels
-    (:doc:`/reference/measured`).  In three dimensions it is not available.
+    (:doc:`/reference/measured`).  In three dimensions it acts along the axis, without added mass.
     """
 
     type: ClassVar[str] = "unsteady-drag"
@@ -225,7 +225,7 @@ class UnsteadyDrag(Component):
             flow = pi * self.typical_speed**3 / (2.0 * a * nu * f**3)
             unit = ((pi * nu / a**2) ** 0.25 / sqrt(flow)) ** (4.0 / 3.0)
             size *= sqrt(a**2 / (pi * nu * unit))
-            kernel, last = mei_adrian, 100.0 * max(unit, SHORTEST_MEMORY)
+            kernel, last = mei_adrian, min(100.0 * max(unit, SHORTEST_MEMORY), LONGEST_MEMORY)
         weights, times = decaying_sum(kernel, SHORTEST_MEMORY / unit, last / unit)
         return weights * size, times * unit
 
