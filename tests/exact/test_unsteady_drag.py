@@ -25,7 +25,7 @@ from klack.mechanics.rigid_mass import RigidMass
 from klack.network.network import Network
 from klack.network.step_function import evaluate
 from klack.simulation.network_run import simulate_network
-from klack.verification.sphere_in_liquid import settling
+from klack.verification.sphere_in_liquid import settling_error
 
 pytestmark = pytest.mark.filterwarnings("ignore::klack.network.checks.LooseBodyWarning")
 
@@ -124,24 +124,8 @@ def test_slow_and_fast_limits_of_the_kernel_of_mei_and_adrian():
 
 @pytest.mark.slow
 def test_a_sphere_settles_as_basset_boussinesq_and_oseen_found():
-    """Exact: at a Reynolds number of 1e-3, where steady drag is 0.13 % above Stokes'."""
-    mu, mass = 1.0, 8.0 * DENSITY * 4.0 / 3.0 * pi * RADIUS**3
-    drag = UnsteadyDrag(shape="sphere", radius=RADIUS)
-    force = 6.0 * pi * mu * RADIUS * 3.6e-4
-    rows = falling(drag, mu, mass, force)
-    run = simulate_network(rows, duration=0.05, step=1e-6, record=5e-5, start="free")
-    speed = run.channels["sphere.body velocity"].values
-    exact = settling(
-        run.time[1:],
-        mass=mass + drag.added(DENSITY),
-        force=force,
-        radius=RADIUS,
-        density=DENSITY,
-        viscosity=mu,
-    )
-    assert np.abs(speed[1:] - exact).max() < 3e-3 * exact[-1]
-    assert exact[-1] < 0.97 * force / (6.0 * pi * mu * RADIUS)  # memory is felt
-    assert abs(run.books.relative_residual) < 1e-12
+    """Exact: at a Reynolds number of 1e-3; without memory it is 14 % faster at the end."""
+    assert settling_error() < 3e-3
 
 
 @pytest.mark.slow

@@ -146,7 +146,7 @@ class UnsteadyDrag(Component):
     dampers drag along.  Their kinetic energy is stored, the rest of the work is heat, never
     negative on any way.  Steps of constant speed are exact.
 
-    The liquid moved at the starting speed of the body for ever before the start.  Added mass
+    Before the start the body has moved at its starting speed long since.  Added mass
     belongs to the inertia of the body as a whole; ``gravity`` does not weigh it, nor does it know
     of buoyancy: give it ``g (1 - rho_f/rho_b)``.
 

@@ -24,6 +24,7 @@ from klack.verification.sphere_in_liquid import (
     film_alone,
     on_compliance,
     restitution,
+    settling_error,
 )
 
 __all__ = ["checks"]
@@ -363,6 +364,14 @@ def _spheres() -> list[Check]:
             computed=rough,
             tolerance=5e-3,
             source="ln(x_0/h_r): the roughness, 10 x_r, acts first",
+        ),
+        check(
+            "sphere that settles from rest, drag with memory: largest error of its speed [-]",
+            expected=0.0,
+            computed=settling_error(),
+            tolerance=3e-3,
+            source="Basset, Boussinesq and Oseen, closed form",
+            reason="the kernel as a sum of exponentials, right to 0.3 %; Re = 1e-3",
         ),
     ]
 
