@@ -211,6 +211,9 @@ def test_a_valve_that_is_held_open_stays_as_its_first_record_says():
     for name in ("coil flux", "coil.armature force", "stop contact force", "stop peak force"):
         assert result.channels[name].values[0] > 0.0, name
     for name, channel in result.channels.items():
+        if channel.unit == "N s":  # impulses grow: their forces stay
+            assert np.diff(channel.values, 2) == pytest.approx(0.0, abs=1e-15), name
+            continue
         np.testing.assert_allclose(
             channel.values, channel.values[0], rtol=1e-9, atol=1e-12, err_msg=name
         )

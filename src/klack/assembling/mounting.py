@@ -23,8 +23,8 @@ from klack.bodies.reduction.craig_bampton import (
 from klack.bodies.reduction.damping import Damping, ModalDamping
 from klack.bodies.reduction.mounting import MountingSurface, interface_of, mounting_surface
 from klack.bodies.reduction.ports import Port, surface_port
-from klack.case.bodies import CaseFile, SurfaceName
-from klack.case.noise import CaseNoise
+from klack.case.bodies import CaseFile
+from klack.case.noise import CaseNoise, mounting_places
 from klack.errors import AccuracyWarning
 
 __all__ = ["ASSUMED_DAMPING", "at_mounts", "mount_references"]
@@ -121,7 +121,7 @@ def _held_at(case: CaseFile, body: ElasticBody, own: Sequence[str]) -> Ints:
 def _reaction_ports(noise: CaseNoise, body: ElasticBody, ports: Sequence[Port]) -> list[Port]:
     """Uniform loads along z on surfaces that are no ports yet."""
     known = {port.name for port in ports}
-    places = [place for place in (noise.reactions or {}).values() if isinstance(place, SurfaceName)]
+    places = [place for key, place in mounting_places(noise) if key[1] != "mounts"]
     wanted = dict.fromkeys(place.surface for place in places if place.body == body.name)
     return [surface_port(body.mesh, name, "z", name=name) for name in wanted if name not in known]
 

@@ -677,14 +677,18 @@ def _check_mounts(case: ImpactSections | ValveSections, noise: CaseNoise) -> Non
     for name in noise.reactions or {}:
         key = ("noise", "reactions", name)
         require_known(key, name, [*components, "fluid"], "component of the network")
-    if noise.reactions and not noise.mounts:
-        raise CaseProblem(
-            ("noise", "reactions"),
-            got="reactions without mounts",
-            expected="noise.mounts",
-            hint="add a mount, or remove the reactions.",
-            on_key=True,
-        )
+    for name in noise.passages or {}:
+        key = ("noise", "passages", name)
+        require_known(key, name, components, "component of the network")
+    for word in ("reactions", "passages"):
+        if getattr(noise, word) and not noise.mounts:
+            raise CaseProblem(
+                ("noise", word),
+                got=f"{word} without mounts",
+                expected="noise.mounts",
+                hint=f"add a mount, or remove the {word}.",
+                on_key=True,
+            )
 
 
 def _check_machine(case: ImpactSections | ValveSections, noise: CaseNoise) -> None:

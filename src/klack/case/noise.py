@@ -28,6 +28,7 @@ __all__ = [
     "NoiseDrive",
     "NoiseInterface",
     "NoiseMount",
+    "NoisePassage",
     "NoisePlate",
     "mounting_places",
 ]
@@ -76,6 +77,26 @@ class NoiseInterface(Section):
     def surfaces(self) -> tuple[SurfaceName, ...]:
         """All of them."""
         return (self.surface,) if isinstance(self.surface, SurfaceName) else self.surface
+
+
+class NoisePassage(Section):
+    """A line, an inertance, or a way of the fluid into the valve, as it lies in it."""
+
+    direction: Literal["opening", "closing", "across"] = Field(
+        description="From a to b along the axis, the way the valve opens or closes; across pushes "
+        "nothing along it."
+    )
+    area: Area | None = Field(
+        default=None,
+        gt=0,
+        description="Cross-section of the fluid at the mouth, of an orifice that of its jet; "
+        "default the bore of a line or inertance.",
+    )
+    surface: BodySurface | None = Field(
+        default=None,
+        description="Of a held body that it pushes, as body.surface; default that of 'fluid' in "
+        "reactions.",
+    )
 
 
 class NoiseDrive(Section):
@@ -158,6 +179,12 @@ class CaseNoise(Section):
         "the mounts themselves.",
         examples=[{"a": 7, "b": 8}],
     )
+    passages: dict[Name, NoisePassage] | None = Field(
+        default=None,
+        description="With mounts: lines, inertances, and what joins the valve with sources of "
+        "pressure and the surroundings, by the name of the component.",
+        examples=[{"feed": {"direction": "closing"}}],
+    )
     radiation: Literal["piston", "unity", "elements"] = Field(
         default="piston",
         description="How the bodies radiate: estimated with the efficiency of a piston of the same "
@@ -199,3 +226,6 @@ def mounting_places(noise: CaseNoise) -> Iterator[tuple[Key, SurfaceName]]:
     for name, place in (noise.reactions or {}).items():
         if isinstance(place, SurfaceName):
             yield ("noise", "reactions", name), place
+    for name, passage in (noise.passages or {}).items():
+        if passage.surface is not None:
+            yield ("noise", "passages", name, "surface"), passage.surface

@@ -532,6 +532,11 @@ class Rows:
     # electric node -> element of its coil, and where in its parameters the place of the program is
     coils: dict[int, tuple[int, int]] = field(default_factory=dict)
 
+    @property
+    def in_fluid(self) -> set[int]:
+        """Ports that pressures and flows push."""
+        return {wall.port for wall in self.walls} | {p for row in self.branches for p in row.ports}
+
     def port(self, name: str) -> int:
         """Handle of the node at the port ``name`` of the present component.
 

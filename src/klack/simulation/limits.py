@@ -31,7 +31,6 @@ class Limits:
     def __init__(self, network: CompiledNetwork, columns: list[str]) -> None:
         self._told: set[str] = set()
         ports = len(network.ports)
-        pressures = 2 * ports + sum(row.body.rigid_count > 0 for row in network.rows.bodies)
         self._limits = limits_of(network.rows)
         self._weights = np.zeros((len(self._limits), len(columns)))
         for limit, weights in zip(self._limits, self._weights, strict=True):
@@ -40,7 +39,8 @@ class Limits:
                 if place < ports:  # the last one is the ground
                     weights[place] += factor
             if limit.node is not None:
-                weights[pressures + network.node_order.index(limit.node)] = 1.0
+                component = network.rows.nodes[limit.node].component
+                weights[columns.index(f"{component} pressure")] = 1.0
             if limit.channel:
                 weights[columns.index(limit.channel)] = 1.0
         self._start = np.array([limit.start for limit in self._limits])

@@ -21,6 +21,7 @@ __all__ = [
     "CUT",
     "EXCESS",
     "FINE",
+    "FLUID_IMPULSE",
     "FORCE",
     "FREE",
     "GUESS",
@@ -36,6 +37,7 @@ __all__ = [
     "PENDING",
     "PENDING_BEGIN",
     "PORTS",
+    "REPAID",
     "RISE",
     "RISE_MISSED",
     "ROWS_AT",
@@ -115,7 +117,9 @@ RISE_MISSED = 20 * PORTS  # what is missing of it
 MEAN = 21 * PORTS  # LAST, with what acts at once since then
 TURN = 22 * PORTS  # change of all forces over a sub-step with a swinging contact
 AVERAGE = 23 * PORTS  # mean displacements over it without its forces
-ROWS_AT = 24
+REPAID = 24 * PORTS  # impulse [N s] so far of the force that takes back EXCESS
+FLUID_IMPULSE = 25 * PORTS  # ... of pressures and flows
+ROWS_AT = 26
 
 
 class Bodies(NamedTuple):
@@ -476,6 +480,7 @@ class Recording(NamedTuple):
     cm_block1: Index
     port_block0: Index
     port_block1: Index
+    fluid_ports: Index  # that pressures and flows push
     port_row: Index
     parting: Index  # (interfaces, 4): blocks of the upper and the lower body, none if it is held
     fine: Cube  # (interfaces, most, 6): start, step, contact force, film force, gap, opening

@@ -549,7 +549,7 @@ def _end_step(step: Step, level: int, whole: bool, loop: Any, longest: float) ->
         end_nodes(fluid, H, accounts)
     end_far_films(loop.contacts, step, accounts, loop.recording, _interface_sums(loop), loop.peaks)
     if step.level != FINE:  # fine steps owe nothing but round-off
-        repay(bodies, shift(bodies.G, step.level * PORTS * PORTS))
+        repay(bodies, shift(bodies.G, step.level * PORTS * PORTS), H)
     catch_up(bodies, level, step.level, whole)
     bodies.at[EXCESS] += end_macro_interfaces(loop.contacts, bodies.at, step, longest)
     bodies.at[EXCESS] += end_macro_sliders(loop.sliding, bodies.at)

@@ -40,6 +40,7 @@ from klack.simulation.network_arrays import (
     PENDING,
     PENDING_BEGIN,
     PORTS,
+    REPAID,
     RISE,
     RISE_MISSED,
     SEEN,
@@ -456,7 +457,7 @@ def finite(bodies: Any) -> bool:
 
 
 @phase
-def repay(bodies: Any, G: Any) -> None:
+def repay(bodies: Any, G: Any, H: float) -> None:
     """Take back the energy that bodies got beyond what was given to them, by a minute force.
 
     Elements, fluid and interfaces see what was missed a step late, at the forces of that step.  The
@@ -477,6 +478,7 @@ def repay(bodies: Any, G: Any) -> None:
         force = -S[EXCESS] / way
         force = min(max(force, -most), most)
         S[MISSED + port] += force
+        S[REPAID + port] += H * force
         for i in range(bodies.first[port], bodies.last[port]):
             S[AHEAD + i] += G[i * PORTS + port] * force
         S[EXCESS] += force * (S[Y1 + port] + S[AHEAD + port] - S[BEGIN + port])

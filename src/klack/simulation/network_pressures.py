@@ -8,7 +8,16 @@ from klack.hydraulics.fluid_table import fluid_at, pressure_at
 from klack.hydraulics.mass_balance import clear_links, solve_mass_balance
 from klack.machine.compiling.jit import inner, njit
 from klack.network.step_function import shift
-from klack.simulation.network_arrays import ANSWER, AT_ONCE, FINE, SEEN, STORE, Y1, Step
+from klack.simulation.network_arrays import (
+    ANSWER,
+    AT_ONCE,
+    FINE,
+    FLUID_IMPULSE,
+    SEEN,
+    STORE,
+    Y1,
+    Step,
+)
 from klack.simulation.network_gas import (
     begin_gas,
     end_energy,
@@ -525,6 +534,7 @@ def end_branches(fluid: Any, S: Any, H: float, accounts: Any, kind: Any, sums: A
         for j in range(q0, branches.port0[k + 1]):
             port = branches.ports[j]
             power -= branches.outputs[o0 + j - q0] * (S[Y1 + port] - S[SEEN + port])
+            S[FLUID_IMPULSE + port] += H * branches.outputs[o0 + j - q0]
         o0 = take_states(branches, k)
         for j in range(branches.accounts[k]):
             account, value = branches.account0[k] + j, branches.outputs[o0 + j]
@@ -538,9 +548,10 @@ def end_branches(fluid: Any, S: Any, H: float, accounts: Any, kind: Any, sums: A
     nodes = fluid.nodes
     for w in range(nodes.walls):
         i, port = nodes.wall_node[w], nodes.wall_port[w]
+        force = nodes.wall_area[w] * (trial.p[i] - nodes.ambient)
+        S[FLUID_IMPULSE + port] += H * force
         if i >= nodes.volumes:  # a source fills the room behind a wall
-            work = nodes.wall_area[w] * (trial.p[i] - nodes.ambient)
-            accounts.supply[i - nodes.volumes] += work * (S[Y1 + port] - S[SEEN + port])
+            accounts.supply[i - nodes.volumes] += force * (S[Y1 + port] - S[SEEN + port])
 
 
 @phase

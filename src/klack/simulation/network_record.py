@@ -7,7 +7,7 @@ import numpy as np
 from klack.arrays import Matrix, Vector
 from klack.machine.compiling.jit import njit
 from klack.network.step_function import pointers
-from klack.simulation.network_arrays import FINE, NetworkArrays, Recording
+from klack.simulation.network_arrays import FINE, FLUID_IMPULSE, REPAID, NetworkArrays, Recording
 from klack.simulation.network_ports import drive_force, port_speed
 from klack.simulation.phase import phase
 
@@ -65,7 +65,7 @@ def record_means(recording: Recording, record: int, duration: float, sums: Any, 
 
 @phase
 def record_points(recording: Recording, record: int, level: int, now: Moment) -> None:
-    """Columns of ports, centres of mass, pressures, shares of free gas, states, gaps, drives.
+    """Columns of ports, bodies, impulses, pressures, free gas, states, gaps, drives.
 
     The modes are those of step size ``level``, with no force pending.
     """
@@ -80,6 +80,15 @@ def record_points(recording: Recording, record: int, level: int, now: Moment) ->
             bodies, level, recording.cm_block0[b], recording.cm_block1[b], -1
         )
     place += recording.cm_block0.size
+    for b in range(recording.cm_block0.size):
+        block, repaid = recording.cm_block0[b], 0.0
+        for p in range(bodies.port0[block], bodies.port1[block]):
+            repaid += bodies.at[REPAID + p]
+        out[place + b] = repaid
+    place += recording.cm_block0.size
+    for i in range(recording.fluid_ports.size):
+        out[place + i] = bodies.at[FLUID_IMPULSE + recording.fluid_ports[i]]
+    place += recording.fluid_ports.size
     for i in range(now.nodes):
         out[place + i] = now.pressures[i]
     place += now.nodes

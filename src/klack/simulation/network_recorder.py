@@ -97,12 +97,15 @@ class Recorder:
             ),
         ]
         ports = [f"{name.component}.{name.port}" for name in network.ports]
+        fluid_ports = sorted({network.port_of[handle] for handle in rows.in_fluid} - {len(ports)})
         nodes = [rows.nodes[handle].component for handle in network.node_order]
         slow = network.nodes.volumes * network.nodes.slow_gas
         self.points = [
             *(_Column(f"{port} displacement", "m") for port in ports),
             *(_Column(f"{port} velocity", "m/s") for port in ports),
             *(_Column(f"{rows.bodies[b].component} velocity", "m/s") for b in free),
+            *(_Column(f"{rows.bodies[b].component} repaid impulse", "N s") for b in free),
+            *(_Column(f"{ports[p]} fluid impulse", "N s") for p in fluid_ports),
             *(_Column(f"{node} pressure", "Pa") for node in nodes),
             *(_Column(f"{node} free gas", "-") for node in nodes[:slow]),
             *(_Column(name, unit) for _, name, unit in states + branch_states),
@@ -123,6 +126,7 @@ class Recorder:
             branch_states=np.array([index for index, _, _ in branch_states], dtype=np.int64),
             cm_block0=blocks[free].astype(np.int64),
             cm_block1=blocks[[b + 1 for b in free]].astype(np.int64),
+            fluid_ports=np.array(fluid_ports, dtype=np.int64),
             port_block0=blocks[owner].astype(np.int64),
             port_block1=blocks[[b + 1 for b in owner]].astype(np.int64),
             port_row=np.array([FIXED_ROWS + i for i in place], dtype=np.int64),
@@ -297,6 +301,7 @@ def recorded_columns(rows: Rows) -> int:
     states += sum(len(row.channels) for row in rows.branches)
     forces = sum(len(row.names) for row in rows.elements) + len(rows.branches)
     forces += 2 * len(rows.sliders)
+    free += free + len(rows.in_fluid)  # impulses
     free += sum(1 for row in rows.bodies if row.course is not None)
     if isinstance(rows.fluid, Fluid) and rows.fluid.has_release_times:
         free += sum(1 for node in rows.nodes.values() if node.volume > 0.0)

@@ -145,7 +145,7 @@ def answer_step(
             report[0], report[2] = moved, t
             return STATUS_REPEAT
     if not fine:
-        repay(bodies, G)
+        repay(bodies, G, H)
     return STATUS_DONE
 
 

@@ -96,7 +96,14 @@ _MOUNTS = JsonForm(
     Key(
         "balance",
         Real,
-        "Sum of forces and momentum over the largest force; null if closed by momentum.",
+        "Sum of forces and momentum, less what enters, over the largest force; null of an impact.",
+    ),
+    Key("repaid", float, "Force that takes back energy of macro steps, over the largest force."),
+    Key(
+        "entering_N",
+        float,
+        "Largest change of the force by columns of fluid, mouths and from outside.",
+        attrgetter("entering"),
     ),
     Key(
         "band_center_Hz",

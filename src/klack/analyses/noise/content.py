@@ -169,9 +169,11 @@ def _source_sheet(study: NoiseStudy) -> tuple[Section, ...]:
             place = ", ".join(f"{1e3 * x:.4g}" for x in item.position)
             rows.append((f"{whose}{item.name}", place, *page_cells(MOUNT_MEASURES, item)))
         balance = (
-            "forces of the fluid close the sum by momentum"
+            "the contact force alone acts"
             if np.isnan(source.balance)
-            else f"all forces and m a leave {source.balance:.1g} of the largest force"
+            else f"all forces and m a leave {source.balance:.1g} of the largest force, without "
+            f"{source.repaid:.1g} that took back energy of the time steps; fluid and surroundings "
+            f"bring in {quantity(source.entering, 'N', 2)} at most"
         )
         words.append(f"{whose}{quantity(source.mass, 'kg', 3)} of held bodies; {balance}.")
     return (

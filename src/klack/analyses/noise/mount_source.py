@@ -71,6 +71,8 @@ def mount_source(structures: Sequence[Structure], held: HeldForces) -> MountSour
         mobility=source.mobility,
         mass=float(sum(item.mass for item in structures)),
         balance=held.unbalanced / max(held.largest, 1e-300),
+        repaid=held.repaid / max(held.largest, 1e-300),
+        entering=held.entering,
     )
 
 

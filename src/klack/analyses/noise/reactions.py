@@ -1,14 +1,20 @@
 """All forces on the held bodies of a stroke, each with its reaction: sign, place and balance.
 
 Within the valve forces cancel, so what the held bodies get in all is minus the momentum of what
-moves,
+moves, and what enters by the fluid,
 
-    sum f_held = - sum m a   (- what acts from outside).
+    sum f_held = - sum m a - d/dt int rho u dV + sum_ports n ((p - p_ambient) A + Q^2 rho / A)
+                 (+ what acts from outside),
 
-A component that pushes moving parts and a held body alike needs no more than its recorded forces.
-Where it leaves a sum, its reaction acts on the surface that ``noise.reactions`` names.  Forces of
-the fluid have no channels: on each body they are what is left of its mass times acceleration, so
-their reaction closes the sum by momentum.
+with ``n`` into the valve.  A component that pushes moving parts and a held body alike needs no more
+than its recorded forces.  Where it leaves a sum, its reaction acts on the surface that
+``noise.reactions`` names; that of ``fluid`` is the sum of all pressures and flows on ports.
+
+**Fluid that carries momentum.**  In a straight column from a to b ``d/dt int rho u dV`` is ``(p_a -
+p_b) A`` less its friction.  So a column pushes held bodies by ``n p A`` at each end that lies in
+the valve, away from it, no matter whether the rest of it belongs to the valve; a way in or out by
+pressure and momentum flux at its mouth.  Neglected are the friction of columns, the steady momentum
+flux at their ends, and the motion of fluid within volumes, which the network has not either.
 """
 
 from collections import defaultdict
@@ -17,21 +23,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from klack.analyses.stroke.acting import ActingForce, MovingBody
+from klack.analyses.stroke.acting import FLUID, ActingForce, FluidPassage
+from klack.analyses.stroke.record import StrokeVariant
 from klack.arrays import Matrix, Vector
 from klack.bodies.reduction.structure import Structure
 from klack.case.bodies import SurfaceName
-from klack.case.noise import CaseNoise
+from klack.case.noise import CaseNoise, NoisePassage
 from klack.errors import InputError
 from klack.input.problem import one_of
 from klack.signals.sampled import TimeSeries
 from klack.simulation.network_result import NetworkResult
 
-__all__ = ["FLUID", "HeldForces", "forces_of_impact", "forces_of_stroke"]
+__all__ = ["HeldForces", "forces_of_impact", "forces_of_stroke"]
 
-FLUID = "fluid"
-"""Name of all pressures and flows among the reactions."""
-_OUTSIDE = "outside"
 _NOTHING = 1e-9  # of the largest force
 _LAST, _FADED = 0.01, 0.1  # of the record: mean at its end; fade where it is cut off
 
@@ -46,12 +50,16 @@ class HeldForces:
     forces (t, p) [N]
         By body; columns are the ports of its first part at the mounts.
     ends (p,) each [N]
-        By body, what has always acted before, and what acts ever after: in sum nothing.
+        By body, what has always acted before, and what acts ever after: in sum what acts from
+        outside.
     largest [N]
         Of all forces.
     unbalanced [N]
-        Largest value of the sum of all forces and of m a of what moves, where nothing is closed
-        by momentum; nan else.
+        Largest value of the sum of all forces, less m a of what moves; nan where it is not known.
+    repaid [N]
+        Largest force that took back energy of macro steps, without a reaction.
+    entering [N]
+        Largest sum of what fluid brings in by columns and mouths, and of what acts from outside.
     """
 
     step: float
@@ -59,6 +67,8 @@ class HeldForces:
     ends: Mapping[str, tuple[Vector, Vector]]
     largest: float
     unbalanced: float
+    repaid: float = 0.0
+    entering: float = 0.0
 
 
 class _Sum:
@@ -95,9 +105,7 @@ def forces_of_impact(structures: Sequence[Structure], force: TimeSeries) -> Held
 
 def forces_of_stroke(
     structures: Sequence[Structure],
-    result: NetworkResult,
-    acting: Sequence[ActingForce],
-    moving: Sequence[MovingBody],
+    variant: StrokeVariant,
     noise: CaseNoise,
     *,
     until: float | None = None,
@@ -114,7 +122,53 @@ def forces_of_stroke(
     InputError
         For components whose reaction has no place, all of them by name.
     """
-    if not acting:
+    result, moving = variant.result, variant.moving
+    _require_forces(variant)
+    whole = _Sum(structures, result.time.size)
+    free = {body.body: np.zeros(result.time.size) for body in moving}
+    nets: dict[str, Vector] = defaultdict(lambda: np.zeros(result.time.size))
+    stops: dict[str, tuple[str, str, float]] = {
+        stop: (item.name, port, float(sign))
+        for item in structures
+        for port, stop, sign in zip(item.port_names, item.port_stops, item.port_signs, strict=True)
+        if stop
+    }
+    largest = 0.0
+    for part in variant.acting:
+        force = part.sign * _force_of(result, part)
+        largest = max(largest, float(np.abs(force).max()))
+        body, port = part.body, part.port
+        if not body and part.component in stops and stops[part.component][2] == part.sign:
+            body, port, _ = stops[part.component]  # a rigid run: the stop stands on the ground
+        if body in free:
+            free[body] += force
+        elif whole.knows(body, port):
+            whole.add(body, port, force)
+        else:
+            continue
+        nets[part.component] += force
+    outside = _react(whole, nets, noise.reactions or {}, _NOTHING * largest)
+    outside = outside + _enter(whole, result, variant.passages, noise)
+    nothing = np.zeros(result.time.size)
+    repaid = sum((_rate(result, body.repaid) for body in moving if body.repaid), nothing)
+    moved = sum((body.mass * _rate(result, body.velocity) for body in moving), nothing)
+    error = np.abs(whole.total() + moved - repaid - outside)[1:]
+    forces, ends = _ended(whole.values, outside, result.time, until)
+    return HeldForces(
+        step=float(result.time[1] - result.time[0]),
+        forces=forces,
+        ends=ends,
+        largest=largest,
+        unbalanced=float(error.max()),
+        repaid=float(np.abs(repaid).max()),
+        entering=float(np.abs(outside - outside[0]).max()),
+    )
+
+
+def _require_forces(variant: StrokeVariant) -> None:
+    acting, moving = variant.acting, variant.moving
+    known = {part.body for part in acting if part.component == FLUID}
+    if not acting or any(body.in_fluid and body.body not in known for body in moving):
         raise InputError(
             "noise.mounts",
             got="a result of a former version, without the places of its forces",
@@ -129,60 +183,96 @@ def forces_of_stroke(
             expected="bodies that forces move",
             hint="leave out 'mounts' for this case.",
         )
-    reactions = noise.reactions or {}
-    whole = _Sum(structures, result.time.size)
-    free = {body.body: np.zeros(result.time.size) for body in moving}
-    nets: dict[str, Vector] = defaultdict(lambda: np.zeros(result.time.size))
-    stops: dict[str, tuple[str, str, float]] = {
-        stop: (item.name, port, float(sign))
-        for item in structures
-        for port, stop, sign in zip(item.port_names, item.port_stops, item.port_signs, strict=True)
-        if stop
-    }
-    largest = 0.0
-    for part in acting:
-        force = part.sign * result.channels[part.channel].values
-        largest = max(largest, float(np.abs(force).max()))
-        body, port = part.body, part.port
-        if not body and part.component in stops and stops[part.component][2] == part.sign:
-            body, port, _ = stops[part.component]  # a rigid run: the stop stands on the ground
-        if body in free:
-            free[body] += force
-        elif whole.knows(body, port):
-            whole.add(body, port, force)
-        else:
+
+
+def _force_of(result: NetworkResult, part: ActingForce) -> Vector:
+    """Means over records; of an impulse the first one acts at the start as well."""
+    if not part.impulse:
+        return result.channels[part.channel].values
+    force = _rate(result, part.channel)
+    force[0] = force[1]
+    return force
+
+
+def _rate(result: NetworkResult, channel: str) -> Vector:
+    """Mean rate of change over records; 0 before the first."""
+    change = np.diff(result.channels[channel].values) / float(result.time[1] - result.time[0])
+    return np.concatenate([[0.0], change])
+
+
+def _enter(
+    whole: "_Sum", result: NetworkResult, passages: Sequence[FluidPassage], noise: CaseNoise
+) -> Vector:
+    """Add what columns of fluid and its ways in and out do; return their sum."""
+    given, total = noise.passages or {}, np.zeros(result.time.size)
+    without = [item.component for item in passages if item.component not in given]
+    if without:
+        raise InputError(
+            "noise.passages",
+            got=f"no direction of {one_of(without)}, whose fluid carries momentum into the valve",
+            expected="one for each line, inertance and way in or out",
+            hint=f"add, for example, noise.passages: {{{without[0]}: {{direction: across}}}}; or "
+            "closing, opening: from a to b along the axis.",
+        )
+    for item in passages:
+        own = given[item.component]
+        place = own.surface or (noise.reactions or {}).get(FLUID)
+        if own.direction == "across":
             continue
-        nets[part.component] += force
-    for item in moving:
-        if item.in_fluid:
-            missing = _momentum(result, item) - free[item.body]
-            free[item.body] += missing
-            nets[FLUID] += missing
-    outside = _react(whole, nets, reactions, _NOTHING * largest)
-    moved = sum((_momentum(result, body) for body in moving), np.zeros(result.time.size))
-    error = np.abs(whole.total() + moved - outside)[1:]
-    closed = any(body.in_fluid for body in moving)
-    forces, ends = _ended(whole.values, result.time, until)
-    return HeldForces(
-        step=float(result.time[1] - result.time[0]),
-        forces=forces,
-        ends=ends,
-        largest=largest,
-        unbalanced=float("nan") if closed else float(error.max()),
-    )
+        if not isinstance(place, SurfaceName):
+            raise InputError(
+                f"noise.passages.{item.component}",
+                got="no surface that it pushes",
+                expected="a surface of a held body",
+                hint=f"add, for example, surface: BODY.SURFACE, or reactions: {{{FLUID}: "
+                "BODY.SURFACE}.",
+            )
+        force = _passage_force(result, item, own)
+        whole.add(place.body, place.surface, force)
+        total += force
+    return total
+
+
+def _passage_force(result: NetworkResult, item: FluidPassage, own: NoisePassage) -> Vector:
+    """Along +z on held bodies [N]; pressures as means of the ends of records."""
+    area, along = own.area or item.area, 1.0 if own.direction == "opening" else -1.0
+    missing = "" if area > 0.0 else "area" if item.density > 0.0 or not item.flows else "density"
+    if item.flows and item.density <= 0.0:
+        missing = "density"
+    if missing:
+        raise InputError(
+            f"noise.passages.{item.component}",
+            got=f"no {missing} of its mouth",
+            expected="the cross-section of the fluid there, and a liquid",
+            hint=f"add {item.component}: {{area: 1 mm^2}}."
+            if missing == "area"
+            else "direction: across leaves it out.",
+        )
+    force = np.zeros(result.time.size)
+    flow = sum((result.channels[name].values for name in item.flows), np.zeros(force.size))
+    for end, sign in ((0, -1.0), (1, 1.0)):
+        # of a column the ends in the valve, of a mouth those outside, where its jet begins or ends
+        if item.inside[end] != bool(item.flows) and item.pressures[end]:
+            now = result.channels[item.pressures[end]].values - item.ambient
+            mean = np.concatenate([now[:1], 0.5 * (now[1:] + now[:-1])])
+            force += (-sign if item.flows else sign) * area * mean
+        if item.flows and not item.inside[end]:
+            force += -sign * flow**2 / (item.density * area)
+    return np.asarray(along * force)
 
 
 def _ended(
-    values: Mapping[str, Matrix], time: Vector, until: float | None
+    values: Mapping[str, Matrix], outside: Vector, time: Vector, until: float | None
 ) -> tuple[dict[str, Matrix], dict[str, tuple[Vector, Vector]]]:
     """Forces after the start, and what acts before and after them, where all is at rest."""
     count = time.size if until is None else max(int(np.searchsorted(time, until)), 3)
     mean = max(round(_LAST * count), 1)
     before = {name: own[0] for name, own in values.items()}
     after = {name: own[count - mean : count].mean(axis=0) for name, own in values.items()}
-    for ends in (before, after):
+    entered = float(outside[0]), float(outside[count - mean : count].mean())
+    for ends, held in zip((before, after), entered, strict=True):
         # the largest force takes what is left of the motion
-        left = sum(float(own.sum()) for own in ends.values())
+        left = sum(float(own.sum()) for own in ends.values()) - held
         body = max(ends, key=lambda name: float(np.abs(ends[name]).max(initial=0.0)))
         rest = ends[body].copy()
         rest[int(np.argmax(np.abs(rest)))] -= left
@@ -224,10 +314,3 @@ def _react(
             "for what acts on the valve from outside, such as gravity.",
         )
     return outside
-
-
-def _momentum(result: NetworkResult, body: MovingBody) -> Vector:
-    """Mass times acceleration of the centre of mass, means over records; 0 before the first."""
-    speed = result.channels[body.velocity].values
-    step = float(result.time[1] - result.time[0])
-    return np.concatenate([[0.0], body.mass * np.diff(speed) / step])

@@ -216,8 +216,11 @@ class MountSource:
     mass [kg]
         Of the held bodies.
     balance [-]
-        Largest value of the sum of all forces on held bodies and of m a of what moves, over the
-        largest force; nan where forces of a fluid close the sum by momentum.
+        Largest value of the sum of all forces on held bodies and of m a of what moves, less what
+        enters, over the largest force; nan where it is not known.
+    repaid, entering [-], [N]
+        Largest force that took back energy of macro steps, over the largest force; and largest
+        change of what enters by columns of fluid, mouths and from outside.
     """
 
     frequency: Floats
@@ -225,6 +228,8 @@ class MountSource:
     mobility: NDArray[np.complex128]
     mass: float
     balance: float
+    repaid: float = 0.0
+    entering: float = 0.0
 
     def source(self) -> SourceAtMounts:
         """As what couples with a receiver."""

@@ -279,9 +279,7 @@ def _held(
     structures = _mounted(study, noise)
     return forces_of_stroke(
         structures,
-        variant.result,
-        variant.acting,
-        variant.moving,
+        variant,
         noise,
         until=None if last is None else last.time,
     )

@@ -1,13 +1,31 @@
-"""Which recorded channel is a force on which port of which body, of the rows of one run."""
+"""Which recorded channel is a force on which port of which body, of the rows of one run.
+
+Forces of all pressures and flows on a port are one, called ``fluid``, and recorded by its impulse.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import pi
 
+from klack.hydraulics.inertance import Inertance
+from klack.hydraulics.line import Line
 from klack.mechanics.flexible_body import FlexibleBody
 from klack.network.network import Network
-from klack.network.rows import Rows
+from klack.network.rows import AMBIENT, GROUND, LineRow, Rows, WaveRow
+from klack.simulation.flow_channels import flow_label
 
-__all__ = ["ActingForce", "MovingBody", "acting_forces", "moving_bodies"]
+__all__ = [
+    "FLUID",
+    "ActingForce",
+    "FluidPassage",
+    "MovingBody",
+    "acting_forces",
+    "fluid_passages",
+    "moving_bodies",
+]
+
+FLUID = "fluid"
+"""What acts with all pressures and flows."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -17,13 +35,15 @@ class ActingForce:
     Parameters
     ----------
     component
-        That acts; an end stop with contact and film.
+        That acts; an end stop with contact and film, or ``fluid``.
     channel
-        Of the result; means over records.
+        Of the result; means over records, or the impulse so far.
     body, port
         That it acts on: a body of the case, or a component that moves; both empty for the ground.
     sign [-]
         Of the force along +z.
+    impulse
+        Whether the channel is an impulse.
     """
 
     component: str
@@ -31,6 +51,34 @@ class ActingForce:
     body: str
     port: str
     sign: float
+    impulse: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class FluidPassage:
+    """A column of fluid, or a way into the valve, along which fluid carries momentum.
+
+    Parameters
+    ----------
+    pressures
+        Channels at ends a and b; empty for the surroundings.
+    inside
+        Whether each end lies in the valve.
+    flows [kg/s]
+        Channels of the flow from a to b, means over records; none of a column.
+    area [m^2]
+        Of a column; 0 else.
+    density [kg/m^3], ambient [Pa]
+        In the surroundings; a density of 0 of a gas.
+    """
+
+    component: str
+    pressures: tuple[str, str]
+    inside: tuple[bool, bool]
+    flows: tuple[str, ...]
+    area: float
+    density: float
+    ambient: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,6 +94,8 @@ class MovingBody:
         Whether a fluid pushes it, whose forces have no channels of their own.
     driven
         Whether it follows a given motion.
+    repaid
+        Channel of the impulse of the force that takes back energy of macro steps.
     """
 
     body: str
@@ -53,11 +103,13 @@ class MovingBody:
     mass: float
     in_fluid: bool
     driven: bool
+    repaid: str = ""
 
 
 def acting_forces(rows: Rows, network: Network) -> tuple[ActingForce, ...]:
     """All recorded forces of elements, end stops and friction."""
     places = dict(_places(rows, network))
+    names = {handle: row.component for row in rows.bodies for handle in row.ports}
 
     def acting(component: str, channel: str, handle: int, sign: float) -> ActingForce:
         body, port = places.get(handle, ("", ""))
@@ -79,20 +131,71 @@ def acting_forces(rows: Rows, network: Network) -> tuple[ActingForce, ...]:
             for handle, sign in ((stop.upper, 1.0), (stop.lower, -1.0)):
                 channel = f"{stop.component} {kind} force"
                 found.append(acting(stop.component, channel, handle, sign))
+    for handle in sorted(rows.in_fluid - {GROUND}):
+        body, port = places[handle]
+        channel = f"{names[handle]}.{port} fluid impulse"
+        found.append(
+            ActingForce(
+                component=FLUID, channel=channel, body=body, port=port, sign=1.0, impulse=True
+            )
+        )
     return tuple(found)
+
+
+def fluid_passages(rows: Rows, network: Network) -> tuple[FluidPassage, ...]:
+    """Columns of fluid, and branches between the valve and what is outside."""
+    ends: dict[str, tuple[int, int]] = {}
+    columns: list[LineRow | WaveRow] = [*rows.lines, *rows.waves]
+    for column in columns:  # pieces of a line follow each other
+        ends[column.component] = (ends.get(column.component, (column.a, 0))[0], column.b)
+    flows: dict[str, tuple[str, ...]] = dict.fromkeys(ends, ())
+    for row in rows.branches:
+        if row.column is not None:
+            ends[row.component], flows[row.component] = (row.a, row.b), ()
+        elif _outside(rows, row.a) or _outside(rows, row.b):
+            ends[row.component] = (row.a, row.b)
+            name = " ".join(filter(None, (row.component, row.label, flow_label(row))))
+            flows[row.component] = (*flows.get(row.component, ()), name)
+    density = 0.0 if rows.fluid is None else float(rows.fluid.density(rows.ambient.pressure))
+    return tuple(
+        FluidPassage(
+            component=name,
+            pressures=(_pressure(rows, a), _pressure(rows, b)),
+            inside=(not _outside(rows, a), not _outside(rows, b)),
+            flows=flows[name],
+            area=_area(network, name) if not flows[name] else 0.0,
+            density=density,
+            ambient=rows.ambient.pressure,
+        )
+        for name, (a, b) in ends.items()
+    )
+
+
+def _outside(rows: Rows, node: int) -> bool:
+    return node == AMBIENT or rows.nodes[node].prescribed
+
+
+def _pressure(rows: Rows, node: int) -> str:
+    return "" if node == AMBIENT else f"{rows.nodes[node].component} pressure"
+
+
+def _area(network: Network, component: str) -> float:
+    part = network.components.get(component)
+    if isinstance(part, Inertance):
+        return part.channel_area
+    return 0.25 * pi * part.diameter**2 if isinstance(part, Line) else 0.0
 
 
 def moving_bodies(rows: Rows, network: Network) -> tuple[MovingBody, ...]:
     """Bodies that nothing holds."""
-    pushed = {wall.port for wall in rows.walls}
-    pushed |= {handle for branch in rows.branches for handle in branch.ports}
     return tuple(
         MovingBody(
             body=_body(row.component, network),
             velocity=f"{row.component} velocity",
             mass=float(row.body.mass),
-            in_fluid=bool(pushed & set(row.ports)),
+            in_fluid=bool(rows.in_fluid & set(row.ports)),
             driven=row.course is not None,
+            repaid=f"{row.component} repaid impulse",
         )
         for row in rows.bodies
         if row.body.rigid_count > 0

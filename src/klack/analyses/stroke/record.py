@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.analyses.record import CaseRecord
-from klack.analyses.stroke.acting import ActingForce, MovingBody
+from klack.analyses.stroke.acting import ActingForce, FluidPassage, MovingBody
 from klack.analyses.stroke.step_check import ImpactChange
 from klack.analyses.stroke.times import LiftTimes, Passage
 from klack.assembling.body_summary import BodySummary
@@ -183,8 +183,9 @@ class StrokeVariant:
         Of each impact when all steps are doubled, if asked for.
     halvings
         Of all steps, by their check.
-    acting, moving
-        Recorded forces and where they act, and what moves; empty in results of former versions.
+    acting, moving, passages
+        Recorded forces and where they act, what moves, and the fluid's columns and ways in and out;
+        empty in results of former versions.
     """
 
     name: str
@@ -201,6 +202,7 @@ class StrokeVariant:
     halvings: int = 0
     acting: tuple[ActingForce, ...] = ()
     moving: tuple[MovingBody, ...] = ()
+    passages: tuple[FluidPassage, ...] = ()
 
     @property
     def needle_times(self) -> LiftTimes:

@@ -13,7 +13,7 @@ import numpy as np
 
 from klack.analyses.impact.contact_check import check_contact
 from klack.analyses.record import case_fields, run_fields
-from klack.analyses.stroke.acting import acting_forces, moving_bodies
+from klack.analyses.stroke.acting import acting_forces, fluid_passages, moving_bodies
 from klack.analyses.stroke.controllers import controller_notes
 from klack.analyses.stroke.missing import cut_records, missing_notes, rest_note
 from klack.analyses.stroke.record import (
@@ -484,6 +484,7 @@ def variant_of(
         setup_time=setup_time,
         acting=acting_forces(rows, valve.network),
         moving=moving_bodies(rows, valve.network),
+        passages=fluid_passages(rows, valve.network),
     )
 
 
