@@ -11,8 +11,11 @@ import pytest
 import scipy
 
 from klack.acoustics.force_bands import force_bands
+from klack.acoustics.mount import Mount, support_mobility
+from klack.acoustics.plate import Air, Plate
 from klack.acoustics.receivers.uff import read_uff_responses
-from klack.analyses.noise.mount_source import write_netcdf, write_uff
+from klack.acoustics.source_files import read_source, write_netcdf, write_uff
+from klack.acoustics.spectrum import force_spectrum
 from klack.analyses.noise.record import NoiseDesign
 from klack.analyses.noise.run import run_noise
 from klack.analyses.noise.source import NoiseSource, stroke_sources
@@ -24,6 +27,7 @@ from klack.case.noise import NoiseInterface, NoisePassage
 from klack.case.reader import find_case
 from klack.case.valve import ValveCase
 from klack.errors import InputError
+from klack.materials.material import Material
 from klack.signals.sampled import TimeSeries
 
 pytestmark = pytest.mark.slow
@@ -218,4 +222,46 @@ def test_files_of_a_source_hold_its_numbers(design, tmp_path):
             file.variables["blocked_force_real"][:] + 1j * file.variables["blocked_force_imag"][:]
         )
         assert np.array_equal(force, source.blocked_force)
-        assert file.freedoms.decode().startswith("flange.x, flange.y")
+    assert read_source(tmp_path / "source.nc").freedoms == source.freedoms
+
+
+def test_the_support_gets_all_forces_with_their_signs(source, design):
+    """Below its modes a valve on a mount is a mass that m a of the needle pushes.
+
+    Truth: ``|m a| / |1 + i w M Y|`` on the bending power of the plate, by third octave.
+    """
+    own, held = source.noise, source.held
+    assert held is not None
+    total = sum(values.sum(axis=1) for values in held.forces.values())
+    moved = TimeSeries(step=held.step, values=np.pad(total, 1), unit="N")
+    spectrum = force_spectrum(moved, high=1000.0, resolution=0.2)
+    f, force = spectrum.frequency[1:], spectrum.values[1:]
+    mount = Mount(
+        stiffness=own.mount.stiffness, loss_factor=own.mount.loss_factor, mass=own.mount.mass
+    )
+    steel = source.materials["steel"]
+    material = Material(
+        name="steel", young=steel.young, poisson=steel.poisson, density=steel.density
+    )
+    plate = Plate(
+        thickness=own.plate.thickness,
+        area=own.plate.area,
+        material=material,
+        loss_factor=own.plate.loss_factor,
+    )
+    below = support_mobility(f, mount, plate)
+    carried = force / (1.0 + 2j * np.pi * f * mount.mass * below)
+    density = plate.mobility * 2.0 * np.abs(carried) ** 2 * plate.radiated_share(f, Air())
+    bands = design.stops[0].bands
+    shown = (bands.low > 220.0) & (bands.high < 1000.0)
+    truth = [
+        float(density[(f >= low) & (f < high)].sum() * spectrum.resolution)
+        for low, high in zip(bands.low[shown], bands.high[shown], strict=True)
+    ]
+    (radiated,) = [
+        body.radiated[body.groups.index("plate")]
+        for body in design.bodies
+        if "plate" in body.groups
+    ]
+    # the bodies give way below their modes, by (f/f_1)^2
+    assert radiated[shown] == pytest.approx(truth, rel=0.02)

@@ -23,7 +23,10 @@ from klack.acoustics.plate import Plate
 from klack.bodies.reduction.structure import Structure
 from klack.errors import InputError
 
-__all__ = ["HarmonicResponse", "harmonic_response", "response_axis"]
+__all__ = ["SUPPORT", "HarmonicResponse", "harmonic_response", "response_axis"]
+
+SUPPORT = "support"
+"""Port of a force on the held surfaces themselves, as of other bodies on the same mount."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -55,7 +58,7 @@ def harmonic_response(
     mount: Mount | None = None,
     plate: Plate | None = None,
 ) -> HarmonicResponse:
-    """Velocities of modes, static rest and support under 1 N along +z at a port.
+    """Velocities of modes, static rest and support under 1 N along +z at a port or the support.
 
     Parameters
     ----------
@@ -64,16 +67,19 @@ def harmonic_response(
     mount, plate
         Below the held surfaces.
     """
-    f, at = response_axis(frequency), structure.port_index(port)
+    f, carried = response_axis(frequency), port == SUPPORT
+    at = 0 if carried else structure.port_index(port)
     m, count = len(structure.omega), len(structure.port_names)
     omega = 2.0 * np.pi * f[:, None]
     w, zeta = structure.omega, structure.damping
     receptance = 1.0 / (w**2 - omega**2 + 2j * zeta * w * omega)
-    phi, p = structure.port_shapes[:, at], structure.participation
+    phi, p = structure.port_shapes[:, at] * (not carried), structure.participation
     omega, s = omega[:, 0], laplace(f)
-    driven_port = np.zeros((f.size, count), dtype=complex)
-    driven_port[:, at] = 1.0
-    force = blocked_force(axial_freedom(structure, structure.mass), driven_port, s)[:, 0]
+    force = np.ones(f.size, dtype=complex)
+    if not carried:
+        driven_port = np.zeros((f.size, count), dtype=complex)
+        driven_port[:, at] = 1.0
+        force = blocked_force(axial_freedom(structure, structure.mass), driven_port, s)[:, 0]
     velocity = np.zeros(f.size, dtype=complex)
     if mount is not None or plate is not None:
         own = mount_impedance(axial_freedom(structure, moved_mass(structure, mount)), s)[:, 0, 0]
@@ -83,7 +89,8 @@ def harmonic_response(
     fields = np.zeros((f.size, m + count + 1), dtype=complex)
     driven = phi - 1j * (omega * velocity)[:, None] * p
     fields[:, :m] = 1j * omega[:, None] * receptance * driven
-    fields[:, m + at] = 1j * omega
+    if not carried:
+        fields[:, m + at] = 1j * omega
     fields[:, -1] = velocity
     return HarmonicResponse(
         frequency=f, fields=fields, support_velocity=velocity, support_force=force

@@ -9,7 +9,7 @@ gives the squared normal velocity of a face over time, :math:`\phi^T C \phi`, an
 :math:`\rho c\, \mathrm{tr}(G C)` that a group with the Gram matrix ``G`` radiates at efficiency 1.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from klack.acoustics.boundary.over_frequency import SurfaceRadiation
 from klack.acoustics.force_response import aligned_forces
-from klack.acoustics.harmonic import harmonic_response
+from klack.acoustics.harmonic import SUPPORT, harmonic_response
 from klack.acoustics.mount import Mount, support_mobility
 from klack.acoustics.plate import Air, Plate
 from klack.acoustics.radiation import PLATE, Efficiency, surface_efficiency
@@ -27,6 +27,7 @@ from klack.errors import InputError, require_positive
 from klack.signals.sampled import TimeSeries
 
 __all__ = [
+    "Pushed",
     "RadiatedBands",
     "SurfaceSpectra",
     "face_band_velocity",
@@ -36,6 +37,9 @@ __all__ = [
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
+
+Pushed = tuple[Structure, Mapping[str, TimeSeries]]
+"""A body and the forces at its ports."""
 
 _DECADE = 12.6  # eleven third octaves
 _LEAST, _MOST = 8.0, 400.0  # frequencies in the lowest band of a decade
@@ -161,6 +165,7 @@ def surface_spectra(
     *,
     mount: Mount | None = None,
     plate: Plate | None = None,
+    others: Sequence[Pushed] = (),
 ) -> SurfaceSpectra:
     """Velocity spectra of the surface under all forces.
 
@@ -172,10 +177,12 @@ def surface_spectra(
         Edges, ascending.
     mount, plate
         Below the held surfaces.
+    others
+        Bodies on the same mount, which push it by their blocked forces; their mass is part of it.
     """
     aligned_forces(structure, forces)
     edges = _edges(bands, forces)
-    parts = tuple(_decades(structure, forces, edges, mount, plate))
+    parts = tuple(_decades((structure, forces), others, edges, mount, plate))
     return SurfaceSpectra(structure=structure, mount=mount, plate=plate, bands=edges, parts=parts)
 
 
@@ -216,8 +223,8 @@ def radiated_bands(
 
 
 def _decades(
-    structure: Structure,
-    forces: Mapping[str, TimeSeries],
+    pushed: Pushed,
+    others: Sequence[Pushed],
     edges: Floats,
     mount: Mount | None,
     plate: Plate | None,
@@ -227,29 +234,43 @@ def _decades(
     while first < len(edges):
         within = edges[first:, 1] <= max(_DECADE * edges[first, 0], edges[first, 1]) * 1.0001
         last = first + (len(edges) - first if within.all() else int(np.argmin(within)))
-        yield _decade(structure, forces, edges[first:last], mount, plate)
+        yield _decade(pushed, others, edges[first:last], mount, plate)
         first = last
 
 
 def _decade(
-    structure: Structure,
-    forces: Mapping[str, TimeSeries],
+    pushed: Pushed,
+    others: Sequence[Pushed],
     edges: Floats,
     mount: Mount | None,
     plate: Plate | None,
 ) -> _Decade:
+    structure, forces = pushed
     length = max(force.values.size * force.step for force in forces.values())
     spacing = _spacing(structure, edges, mount, length)
     fields: Complexes | float = 0.0
     support: Complexes | float = 0.0
-    for port, force in forces.items():
+    carried: Complexes | float = 0.0
+
+    def spectrum_of(force: TimeSeries) -> tuple[Floats, Complexes, float]:
         spectrum = force_spectrum(force, high=float(edges[-1, 1]), resolution=spacing)
         df = spectrum.resolution
         first = max(int(edges[0, 0] / df), 1)  # not 0 Hz, where a force that stays has no spectrum
-        frequency, own = spectrum.frequency[first:], spectrum.values[first:]
+        return spectrum.frequency[first:], spectrum.values[first:], df
+
+    for port, force in forces.items():
+        frequency, own, df = spectrum_of(force)
         answer = harmonic_response(structure, frequency, port, mount=mount, plate=plate)
         fields = fields + answer.fields * own[:, None]
         support = support + answer.support_force * own
+    for other, its_forces in others:
+        for port, force in its_forces.items():
+            blocked = harmonic_response(other, frequency, port).support_force
+            carried = carried + blocked * spectrum_of(force)[1]
+    if others:
+        answer = harmonic_response(structure, frequency, SUPPORT, mount=mount, plate=plate)
+        fields = fields + answer.fields * np.asarray(carried)[:, None]
+        support = support + answer.support_force * carried
     low = np.maximum(frequency - df / 2, edges[:, :1])
     high = np.minimum(frequency + df / 2, edges[:, 1:])
     return _Decade(

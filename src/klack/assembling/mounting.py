@@ -27,7 +27,7 @@ from klack.case.bodies import CaseFile
 from klack.case.noise import CaseNoise, mounting_places
 from klack.errors import AccuracyWarning
 
-__all__ = ["ASSUMED_DAMPING", "at_mounts", "mount_references"]
+__all__ = ["ASSUMED_DAMPING", "at_mounts", "mount_references", "reaction_ports"]
 
 ASSUMED_DAMPING = 0.005
 """Damping ratio of modes at mounts where the case gives none."""
@@ -65,13 +65,14 @@ def at_mounts(
     ----------
     modes, flexibility
         Of the body with all of its supports held.
+    ports
+        With those of reactions.
     references (3,) [m]
         Of each mount.
     """
     surfaces = _surfaces(case, noise, body, references)
     if noise is None or not surfaces:
         return ()
-    ports = [*ports, *_reaction_ports(noise, body, ports)]
     damping = damping_of(case.bodies[body.name].damping)
     if not damping.ratios([1.0])[0] > 0.0:
         damping = ModalDamping(ratio=ASSUMED_DAMPING)
@@ -118,8 +119,10 @@ def _held_at(case: CaseFile, body: ElasticBody, own: Sequence[str]) -> Ints:
     return held_nodes(given.model_copy(update={"fixed": kept}), body.mesh)
 
 
-def _reaction_ports(noise: CaseNoise, body: ElasticBody, ports: Sequence[Port]) -> list[Port]:
-    """Uniform loads along z on surfaces that are no ports yet."""
+def reaction_ports(noise: CaseNoise | None, body: ElasticBody, ports: Sequence[Port]) -> list[Port]:
+    """Uniform loads along z on surfaces of reactions that are no ports yet."""
+    if noise is None:
+        return []
     known = {port.name for port in ports}
     places = [place for key, place in mounting_places(noise) if key[1] != "mounts"]
     wanted = dict.fromkeys(place.surface for place in places if place.body == body.name)

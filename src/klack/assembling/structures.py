@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.assembling.modes import damping_of, selection_of
-from klack.assembling.mounting import at_mounts, mount_references
+from klack.assembling.mounting import at_mounts, mount_references, reaction_ports
 from klack.assembling.problem import ContactProblem
 from klack.assembling.reduced_pair import ReducedPair
 from klack.assembling.stops import StopContact
@@ -74,7 +74,11 @@ def impact_structures(
             case,
             body,
             [StructurePort(port=port, stop=IMPACT_STOP, sign=sign)],
-            pools[body.name],
+            kept_modes(
+                selection_of(case.reduction.choice(body.name)),
+                pools[body.name],
+                port.pattern[:, None],
+            ),
             static(flexibility, port, reduced),
             radiating_surfaces(case.noise, body, held, _contact_names(case, body.name)),
             (flexibility, references),
@@ -95,13 +99,19 @@ def valve_structures(
     """Structures of the held bodies of a valve; mappings by body, contacts by stop."""
     held = [name for name, body in bodies.items() if body.is_fixed]
     references = mount_references(case.noise, bodies)
+    every = {
+        name: [*ports[name], *reaction_ports(case.noise, bodies[name], ports[name])]
+        for name in held
+    }
     return tuple(
         _structure(
             case,
             bodies[name],
-            [_pushed(port, name, contacts) for port in ports[name]],
-            pools[name],
-            flexibilities[name].deflections(_patterns(ports[name])),
+            [_pushed(port, name, contacts) for port in every[name]],
+            kept_modes(
+                selection_of(case.reduction.choice(name)), pools[name], _patterns(ports[name])
+            ),
+            flexibilities[name].deflections(_patterns(every[name])),
             radiating_surfaces(case.noise, bodies[name], held, _stop_names(case, name)),
             (flexibilities[name], references),
         )
@@ -145,14 +155,13 @@ def _structure(
     case: Case | ValveCase,
     body: ElasticBody,
     ports: Sequence[StructurePort],
-    pool: Modes,
+    modes: Modes,
     deflections: NDArray[np.float64],
     surfaces: tuple[tuple[str, ...], tuple[str, ...]],
     mounts: tuple[Flexibility, Mapping[str, NDArray[np.float64]]],
 ) -> Structure:
     """``mounts``: factors of the body, and the reference point of each mount."""
     plain = [item.port for item in ports]
-    modes = kept_modes(selection_of(case.reduction.choice(body.name)), pool, _patterns(plain))
     structure = build_structure(
         body,
         modes=modes,

@@ -12,7 +12,8 @@ no noise.  The share of the energy that is left per band,
 
 .. math:: s_b = \min\left(1, \frac{\int_b |m \ddot x|^2}{\sum_s \int_b |F_s|^2}\right),
 
-is taken on all ways from the force to the ear.
+is taken on all ways from the force to the ear, where nothing says on which surfaces the others act.
+With ``noise.mounts`` all forces act at their places, with their signs, and no share is needed.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -30,7 +31,7 @@ from klack.acoustics.mobility import transfer_mobility
 from klack.acoustics.mount import Mount, mounted
 from klack.acoustics.plate import Air, Plate
 from klack.acoustics.radiation import Efficiency, power_transfer
-from klack.acoustics.surface_bands import surface_spectra
+from klack.acoustics.surface_bands import Pushed, surface_spectra
 from klack.acoustics.third_octave import ThirdOctaves
 from klack.analyses.noise.record import BodyNoise, Surface
 from klack.bodies.reduction.structure import Structure
@@ -106,8 +107,8 @@ _LONGEST = 4_000_000  # values of a spectrum that resolves every resonance
 class Surroundings:
     """What is below a held body, and the air.
 
-    ``period`` [s] is from click to click, ``share`` (b,) [-] that of :func:`net_share`; bodies in
-    ``elements`` radiate by those.
+    ``period`` [s] is from click to click, ``share`` (b,) [-] that of :func:`net_share`, 1 where all
+    forces act at their places; bodies in ``elements`` radiate by those.
     """
 
     mount: Mount | None
@@ -128,10 +129,16 @@ def body_noise(
     structure: Structure,
     stop_forces: Mapping[str, TimeSeries],
     around: Surroundings,
+    acting: Mapping[str, TimeSeries] | None = None,
+    *,
+    others: Sequence[Pushed] = (),
+    alone: bool = True,
 ) -> BodyNoise | None:
     """Vibration and radiation of one body, if a stop pushes it.
 
-    It is rigidly held, as the forces [N] of the stops were computed.
+    It is rigidly held, as the forces [N] of the stops were computed.  Its surface moves under those
+    ``acting`` at its ports, and under ``others`` on the same mount; without them under those of the
+    stops.  What mount and plate take counts only where it stands ``alone`` on them, or for all.
     """
     forces = port_forces(structure, stop_forces)
     if not forces:
@@ -140,9 +147,17 @@ def body_noise(
     sounding = damped(structure)
     bands = np.column_stack([around.octaves.low, around.octaves.high])
     frequency = frequency_lines(structure, None, _LOWEST, _HIGHEST)
-    spectra = surface_spectra(sounding, forces, bands, mount=around.mount, plate=around.plate)
-    estimate = spectra.radiated(efficiency=around.radiation_of(structure), air=around.air)
-    equivalent = spectra.radiated(efficiency="unity", air=around.air)
+    spectra = surface_spectra(
+        sounding,
+        acting or forces,
+        bands,
+        mount=around.mount,
+        plate=around.plate,
+        others=[item for item in others if item[1]],
+    )
+    plain = spectra if alone else replace(spectra, plate=None)
+    estimate = plain.radiated(efficiency=around.radiation_of(structure), air=around.air)
+    equivalent = plain.radiated(efficiency="unity", air=around.air)
     velocity = spectra.face_velocity(period=around.period)
     area = list(structure.group_area) + [np.nan] * (len(estimate.names) - len(structure.group_area))
     ports = tuple(forces)
@@ -172,7 +187,7 @@ def body_noise(
         area=np.array(area),
         radiated=estimate.energy * around.share,
         upper_bound=equivalent.energy * around.share,
-        support_energy=float(spectra.support_energy() @ around.share),
+        support_energy=float(spectra.support_energy() @ around.share) if alone else 0.0,
         surface=Surface(
             points=structure.points,
             faces=structure.faces,
@@ -226,13 +241,13 @@ class Transfers:
 
 def port_transfers(
     structure: Structure,
-    stop_forces: Mapping[str, TimeSeries],
+    forces: Mapping[str, TimeSeries],
     around: Surroundings,
     transfers: Transfers,
 ) -> list[tuple[TimeSeries, Floats, Floats]]:
-    """Force [N], audible frequencies [Hz] and radiated power [W/N^2] of every hit port."""
+    """Force [N], audible frequencies [Hz] and radiated power [W/N^2] of every pushed port."""
     found = []
-    for port, force in port_forces(structure, stop_forces).items():
+    for port, force in forces.items():
         frequency, transfer = transfers.of(structure, port, around)
         left = share_at(frequency, around.octaves, around.share)
         found.append((force, frequency, transfer * left))

@@ -499,8 +499,9 @@ def _limits(study: NoiseStudy) -> tuple[tuple[str, str], ...]:
         ),
         (
             "Force",
-            "Of the rigidly held bodies; the mount does not act back on the impact. Magnetic and "
-            "pressure forces on the housing are left out, and so is sound through the fluid.",
+            "Of the rigidly held bodies; the mount does not act back on the impact. Without "
+            "noise.mounts magnetic and pressure forces on the housing are left out; sound through "
+            "the fluid always is.",
         ),
         (
             "Direction",

@@ -59,7 +59,8 @@ FORCE_LEVEL = Measure[NoiseDesign](
     "steady force with the same energy in one second.",
     note="Springs, magnet and fluid push the needle from the housing that it hits; below about one "
     "over the time of flight they balance the contact forces. The rest is mass times "
-    "acceleration of the needle. Sound and surface motion include this share of every band; "
+    "acceleration of the needle. Sound and surface motion include this share of every band, "
+    "or with noise.mounts all forces; "
     "injected energy, mobility and blocked force the contact forces alone. Third octaves are "
     "those of IEC 61260-1 (base ten); the force is held at its first and last value outside the "
     "record.",

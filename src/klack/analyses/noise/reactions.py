@@ -19,10 +19,11 @@ flux at their ends, and the motion of fluid within volumes, which the network ha
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from klack.acoustics.force_response import port_forces
 from klack.analyses.stroke.acting import FLUID, ActingForce, FluidPassage
 from klack.analyses.stroke.record import StrokeVariant
 from klack.arrays import Matrix, Vector
@@ -34,7 +35,7 @@ from klack.input.problem import one_of
 from klack.signals.sampled import TimeSeries
 from klack.simulation.network_result import NetworkResult
 
-__all__ = ["HeldForces", "forces_of_impact", "forces_of_stroke"]
+__all__ = ["HeldForces", "acting_forces", "forces_of_impact", "forces_of_stroke"]
 
 _NOTHING = 1e-9  # of the largest force
 _LAST, _FADED = 0.01, 0.1  # of the record: mean at its end; fade where it is cut off
@@ -163,6 +164,34 @@ def forces_of_stroke(
         repaid=float(np.abs(repaid).max()),
         entering=float(np.abs(outside - outside[0]).max()),
     )
+
+
+def acting_forces(
+    structure: Structure, held: HeldForces, stop_forces: Mapping[str, TimeSeries]
+) -> dict[str, TimeSeries]:
+    """All forces on a held body by port [N], in the fine steps of its stops.
+
+    Those of the stops are known so finely; of the others each record has its mean.  A record before
+    and one after them have what acts at rest.
+    """
+    stops = port_forces(structure, stop_forces)
+    grid = next(iter(stop_forces.values()))
+    size = max(round(held.step / grid.step), 1)
+    found = {}
+    before, after = held.ends[structure.name]
+    for k, port in enumerate(structure.at_mounts[0].port_names):
+        own, fine = held.forces[structure.name][:, k], stops.get(port)
+        count = min(own.size, grid.values.size // size)
+        values = np.zeros(grid.values.size) if fine is None else fine.values
+        means = values[: count * size].reshape(count, size).mean(axis=1)
+        slow = np.repeat(own[:count] - means, size)
+        values = values + np.pad(slow, (0, values.size - slow.size), mode="edge")
+        values = np.pad(values, size, constant_values=(before[k], after[k]))
+        if np.ptp(values) > 0.0:
+            start = grid.start - size * grid.step
+            name = f"{structure.name}.{port}"
+            found[port] = replace(grid, values=values, start=start, name=name)
+    return found
 
 
 def _require_forces(variant: StrokeVariant) -> None:

@@ -436,8 +436,9 @@ class NoiseDesign:
         One over the record, 0 if every force ends as it began; lowest of the bodies' highest kept
         modes, nan without any.
     net_share (b,) [-]
-        See :mod:`klack.analyses.noise.body`; a factor of radiated energy, surface velocity and
-        sound.
+        Of the energy of the contact forces, what the others do not balance. See
+        :mod:`klack.analyses.noise.body`; without mounts a factor of radiated energy, surface
+        velocity and sound.
     bodies
         Elastic held ones; without any there is no sound.
     at_mounts

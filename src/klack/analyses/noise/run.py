@@ -1,6 +1,6 @@
 """``klack noise``: from stop forces to sound."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from time import perf_counter
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from klack.acoustics.boundary.over_frequency import SurfaceRadiation, surface_radiation
 from klack.acoustics.drive_pattern import drive_pattern
 from klack.acoustics.force_bands import force_bands
+from klack.acoustics.force_response import port_forces
 from klack.acoustics.impulsive import impulsive_prominence
 from klack.acoustics.loudness import time_varying_loudness
 from klack.acoustics.mount import Mount
@@ -27,11 +28,13 @@ from klack.analyses.noise.body import (
     Surroundings,
     Transfers,
     body_noise,
+    damped,
     net_share,
     port_transfers,
 )
 from klack.analyses.noise.in_machine import in_machine, installed
 from klack.analyses.noise.mount_source import mount_source
+from klack.analyses.noise.reactions import acting_forces
 from klack.analyses.noise.record import (
     BodyNoise,
     ClickSound,
@@ -104,7 +107,7 @@ def click_sound(
     around = _surroundings(
         source, net_share(source.net, bands), bands[0], _boundary_elements(source, transfers)
     )
-    return _pressure(source, around, transfers)
+    return _pressure(source, _acting(source), around, transfers)
 
 
 def noise_design(source: NoiseSource) -> NoiseDesign:
@@ -156,17 +159,16 @@ def _design(
     transfers = Transfers()
     elements = _boundary_elements(source, transfers)
     around = _surroundings(source, share, stops[0].bands, elements)
-    forces = {stop.name: stop.force for stop in source.stops}
     clock("vibration and radiation", 0.0)
-    found = [body_noise(structure, forces, around) for structure in source.structures]
-    bodies = tuple(body for body in found if body is not None)
+    acting = _acting(source)
+    bodies = tuple(_bodies(source, acting, around))
     clock("sound", 0.0)
     at_mounts = None if source.held is None else mount_source(source.structures, source.held)
     machine = _in_machine(source, clock, in_situ)
     if machine is not None:
         sound = machine.ears[0].sound if machine.ears else None
     else:
-        pressure = _pressure(source, around, transfers)
+        pressure = _pressure(source, acting, around, transfers)
         sound = _heard(pressure, source, clock) if pressure is not None else None
     return NoiseDesign(
         name=name,
@@ -274,7 +276,7 @@ def _surroundings(
         efficiency="piston" if noise.radiation == "elements" else noise.radiation,
         elements=elements[0],
         period=1.0 / noise.drive.rate,
-        share=share,
+        share=share if source.held is None else np.ones_like(share),
         octaves=octaves,
     )
 
@@ -356,12 +358,49 @@ def _settings(
 # --------------------------------------------------------------------------- sound
 
 
-def _pressure(source: NoiseSource, around: Surroundings, transfers: Transfers) -> TimeSeries | None:
+def _acting(source: NoiseSource) -> dict[str, dict[str, TimeSeries]]:
+    """Forces by body and port: with mounts all of them, else those of the stops."""
+    forces = {stop.name: stop.force for stop in source.stops}
+    return {
+        own.name: port_forces(own, forces)
+        if source.held is None
+        else acting_forces(own, source.held, forces)
+        for own in source.structures
+    }
+
+
+def _bodies(
+    source: NoiseSource, acting: Mapping[str, Mapping[str, TimeSeries]], around: Surroundings
+) -> Iterator[BodyNoise]:
+    """Of each body that a stop pushes; with mounts all move on one support, under all forces."""
+    forces = {stop.name: stop.force for stop in source.stops}
+    together = source.held is not None
+    carried = False
+    for own in source.structures:
+        others = [(damped(x), acting[x.name]) for x in source.structures if x is not own]
+        found = body_noise(
+            own,
+            forces,
+            around,
+            acting[own.name],
+            others=others if together else (),
+            alone=not (together and carried),
+        )
+        if found is not None:
+            carried = True
+            yield found
+
+
+def _pressure(
+    source: NoiseSource,
+    acting: Mapping[str, Mapping[str, TimeSeries]],
+    around: Surroundings,
+    transfers: Transfers,
+) -> TimeSeries | None:
     """At the first ear of a machine, or estimated at the distance of the case."""
     found = installed(source)
     if found is not None:
         return next(iter(found.pressures()[0]), None)
-    forces = {stop.name: stop.force for stop in source.stops}
     parts = [
         click_pressure(
             force,
@@ -372,7 +411,9 @@ def _pressure(source: NoiseSource, around: Surroundings, transfers: Transfers) -
             sound_speed=source.noise.sound_speed,
         )
         for structure in source.structures
-        for force, frequency, transfer in port_transfers(structure, forces, around, transfers)
+        for force, frequency, transfer in port_transfers(
+            structure, acting[structure.name], around, transfers
+        )
         if np.any(transfer > 0.0)
     ]
     if not parts:

@@ -299,6 +299,13 @@ def _mounted(study: ImpactStudy | StrokeStudy, noise: CaseNoise) -> tuple[Struct
             if found
             else "run the case again with these mounts, then klack noise.",
         )
+    if any(set(item.at_mounts[0].port_names) - set(item.port_names) for item in found):
+        raise InputError(
+            f"result of case {study.case}: noise.mounts",
+            got="bodies of a former version, without the places of reactions",
+            expected="bodies that hold them",
+            hint="run the case again, then klack noise.",
+        )
     joined = {found[0].name}
     mounts = {item.name: set(item.at_mounts[0].mounts) for item in found}
     for _ in found:

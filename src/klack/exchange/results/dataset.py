@@ -59,7 +59,10 @@ def noise_variables(design: NoiseDesign) -> tuple[dict[str, Variable], dict[str,
         "net_share": Variable(
             ("band",),
             design.net_share,
-            {"units": "1", "long_name": "share of the energy of the forces not balanced within"},
+            {
+                "units": "1",
+                "long_name": "share of the energy of the contact forces that others do not balance",
+            },
         )
     }
 
