@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.acoustics.coupling import Placement, couple
+from klack.acoustics.coupling import Missing, Placement, couple
 from klack.acoustics.interface import Complexes, InterfacePoint, SourceAtMounts
 from klack.acoustics.plate import Plate
 from klack.acoustics.receivers.plates import InfinitePlate
@@ -181,7 +181,7 @@ def single_equivalents(
         hint="give axes: the drawing's x, y, z in the frame of the plate.",
     )
     points = tuple(InterfacePoint(name=name, position=place) for name, place in places.items())
-    lacking = {
+    lacking: dict[str, Missing] = {
         str(freedom): "free" if freedom.is_rotation and radius == 0.0 else "blocked"
         for freedom in source.freedoms
     }
@@ -191,7 +191,7 @@ def single_equivalents(
             source,
             InfinitePlate(plate=plate, points=points, radius=radius, ideal=True),
             placements={name: Placement(axes=turned) for name in places},
-            missing=lacking,  # type: ignore[arg-type]
+            missing=lacking,
         )
         powers.append(np.maximum(joined.power.sum(axis=1), 0.0))
     return SingleEquivalents(

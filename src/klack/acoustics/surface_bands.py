@@ -256,7 +256,7 @@ def _decade(
         spectrum = force_spectrum(force, high=float(edges[-1, 1]), resolution=spacing)
         df = spectrum.resolution
         first = max(int(edges[0, 0] / df), 1)  # not 0 Hz, where a force that stays has no spectrum
-        return spectrum.frequency[first:], spectrum.values[first:], df
+        return spectrum.frequency[first:], np.asarray(spectrum.values[first:], dtype=complex), df
 
     for port, force in forces.items():
         frequency, own, df = spectrum_of(force)

@@ -6,7 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from klack.acoustics.coupling import Coupled, Junction, Placement, axes_of, joined, junction
+from klack.acoustics.coupling import (
+    Coupled,
+    Junction,
+    Missing,
+    Placement,
+    axes_of,
+    joined,
+    junction,
+)
 from klack.acoustics.interface import (
     InterfacePoint,
     Receiver,
@@ -59,7 +67,7 @@ class Machine:
     receiver: Receiver
     placements: Mapping[str, Placement]
     isolators: Mapping[str, Isolator]
-    missing: Mapping[str, str]
+    missing: Mapping[str, Missing]
     words: tuple[str, str]
     known: tuple[float, float, float] | None
     causal: bool
@@ -71,7 +79,7 @@ class Machine:
             self.receiver,
             placements=self.placements,
             isolators=self.isolators,
-            missing=self.missing,  # type: ignore[arg-type]
+            missing=self.missing,
         )
 
     def coupled(self, source: SourceAtMounts) -> Coupled:

@@ -35,7 +35,7 @@ def inner(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     return _marked(function, _inner, options)
 
 
-def of_one_kind(function: Callable[..., Any]) -> Callable[..., Any]:
+def of_one_kind(function: Marked) -> Callable[..., Any]:
     """Return a compiled function for one caller, whose arguments never change their types.
 
     It looks at them in the first call only: bundles of two hundred arrays cost 3 us a call then
@@ -45,7 +45,7 @@ def of_one_kind(function: Callable[..., Any]) -> Callable[..., Any]:
 
     def call(*arguments: Any) -> Any:
         if not code:
-            made = function.made  # type: ignore[attr-defined]
+            made = function.made
             code.append(made.compile(tuple(map(made.typeof_pyval, arguments))))
         return code[0](*arguments)
 
