@@ -607,7 +607,7 @@ def run_shots(
         raise InputError(
             "run_shots: variants",
             got=f"'{variants[0]}' for drops of two bodies",
-            expected="none: variants are those of whole strokes",
+            expected="none: only whole strokes have variants",
             hint="leave them out.",
         )
     record = run(

@@ -360,7 +360,7 @@ def test_a_coarse_full_order_measures_nobody():
     assert best_level(results) == "reduced"
     notes = trust_notes(results, "reduced", deviations(results, "reduced"))
     assert any(
-        "the answer is that of level 'reduced'; level 'full' is not a reference" in n for n in notes
+        "the answer is from level 'reduced'; level 'full' is not a reference" in n for n in notes
     )
     assert best_level({"full": coarse, "lumped": fine}) == "full"
     assert deviations({"full": coarse, "lumped": fine}, "full") == {}

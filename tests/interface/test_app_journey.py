@@ -136,7 +136,7 @@ def begin_with_an_empty_folder(walk: Walk, folder: Path) -> None:
     walk.finds((folder / VALVE).is_file(), "the case lies in the folder")
     walk.presses("New case", "Copies a case that comes with klack")
     walk.types("Name", "valve", "Copies a case", key="Tab")
-    walk.presses("Make", "a file that is there already")
+    walk.presses("Make", "a file that already exists")
     walk.presses("Cancel", f"impact, {VALVE}")
 
 
@@ -318,7 +318,7 @@ def move_pin_hear(walk: Walk, folder: Path) -> None:
     walk.finds(written == pytest.approx(value, rel=1e-6), f"{written} is that of the slider")
     walk.goes(f"/sliders?path={COPY}", "peak force")
     page.wait_for_selector(".k-badge.good")
-    walk.presses("Edit the case with these values", "Replace what is not saved?")
+    walk.presses("Edit the case with these values", "Replace unsaved changes?")
     walk.presses("Cancel", "peak force")
     walk.goes(f"/case?path={COPY}", "valid impact, not saved")
     kept = speed_in(page.get_by_label("case file, YAML").input_value())
@@ -418,7 +418,7 @@ def look_around(walk: Walk) -> None:
     walk.goes("/case?path=none.yaml", "No such file")
     walk.goes("/sliders?path=none.yaml", "No such file")
     walk.page.get_by_role("link", name="klack", exact=True).click()
-    walk.sees("Everything below the folder that klack app opened.")
+    walk.sees("Everything below the folder opened by klack app.")
     walk.page.evaluate("document.activeElement.blur()")
     walk.keys("Tab")
     walk.finds(walk.focused() == "Skip to the content", f"first is the jump, {walk.focused()}")

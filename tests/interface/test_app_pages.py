@@ -168,7 +168,7 @@ def test_what_is_gone_is_told_once_with_the_way_back(page, server, address, word
     assert body.locator("button, input, select, textarea, audio").count() == 0
     assert page.get_by_text(words).count() == 1
     body.get_by_role("link", name="Back to cases and results").click()
-    page.wait_for_selector("text=Everything below the folder that klack app opened.")
+    page.wait_for_selector("text=Everything below the folder opened by klack app.")
 
 
 def test_sliders_that_cannot_open_tell_why_with_the_way_back(page, server, folder):
@@ -179,7 +179,7 @@ def test_sliders_that_cannot_open_tell_why_with_the_way_back(page, server, folde
 
     assert page.locator("#k-body [role=status]").count() == 0
     page.locator("#k-body").get_by_role("link", name="Back to cases and results").click()
-    page.wait_for_selector("text=Everything below the folder that klack app opened.")
+    page.wait_for_selector("text=Everything below the folder opened by klack app.")
     broken.unlink()
 
 

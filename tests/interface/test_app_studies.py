@@ -169,7 +169,7 @@ def test_a_point_is_heard_and_its_case_written(page, server, folder):
     page.wait_for_selector(".kp-point")
     page.get_by_role("button", name="point 2", exact=True).click()
     page.get_by_role("button", name="Hear it").click()
-    words = page.locator("text=Both to one scale")
+    words = page.locator("text=Both at the same scale")
     words.wait_for()
     columns = told(page)["study"]["columns"]
     level = next(column for column in columns if column["name"].startswith("noise"))

@@ -152,7 +152,7 @@ def test_the_run_behind_the_estimate_is_the_answer_where_it_is_better():
     assert study.ordered[0].level == "interface"
     assert abs(study.deviations["reduced"].peak_force) > 0.1
     assert any(
-        "The answer is that of level 'interface', not that of level 'reduced'" in note
+        "The answer is from level 'interface', not from level 'reduced'" in note
         for note in study.warnings
     )
     found = study.levels["interface"].measures

@@ -477,7 +477,7 @@ class Explorer:
             if slider is None or slider.needs_mesh:
                 raise InputError(
                     key,
-                    got="a key that does not move here",
+                    got="a key without a slider",
                     expected="one of the sliders",
                     hint="change it in the case, and open that.",
                 )

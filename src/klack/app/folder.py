@@ -35,7 +35,7 @@ LARGEST_FILE = 256 * 2**20  # [byte] of a report or a sound
 _DEEPEST, _MOST = 5, 20_000  # levels, and entries that are looked at
 _LEFT_OUT = ("node_modules", "__pycache__", "site-packages")
 _CASE_ENDINGS = (".yaml", ".yml")
-_CHOOSE = "choose one in the list of cases and results; what was there may be moved or removed."
+_CHOOSE = "choose one in the list of cases and results; the file may have been moved or removed."
 _RENAME = "take another name."
 _NOT_OURS = "remove or rename it: klack app makes a folder of this name of its own."
 _NO_WRITING = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO)
@@ -181,13 +181,13 @@ class OpenFolder:
             with self._parent(parent) as (held, name):
                 held.make(name)
         if self.exists(relative):
-            raise _refused(relative, "a file that is there already", _RENAME)
+            raise _refused(relative, "a file that already exists", _RENAME)
         self.write(relative, text)
 
     def make_folder(self, name: str, files: Mapping[str, bytes]) -> None:
         """Make a new folder with files, all or nothing."""
         if self.exists(name):
-            raise _refused(name, "a file or folder that is there already", _RENAME)
+            raise _refused(name, "a file or folder that already exists", _RENAME)
         new = f".klack-{secrets.token_hex(8)}"
         with self._parent(name) as (held, last):
             held.make(new)
@@ -280,7 +280,7 @@ class OpenFolder:
                 got="nothing there any more",
                 expected="the folder that klack app has opened",
                 hint="give it its former name, or start klack app with its new one. This page "
-                "keeps what is typed in it.",
+                "keeps what you type in it.",
             )
 
 

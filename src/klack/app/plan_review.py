@@ -1,6 +1,6 @@
 """Checks of a new valve before anything is solved, in words, and the case that follows from it.
 
-The forces and widths here are estimates from above, for element sizes and for words.  A needle of
+The forces and widths here are upper limits, for element sizes and for messages.  A needle of
 mass m and length L that hits with v is stopped as a rod, F = v sqrt(m E V) / L, and the contact is
 that of Hertz under this force.
 """
@@ -433,7 +433,7 @@ def _placing(
 def _first_touch(meeting: _Meeting) -> Finding:
     if meeting.sharp:
         advice = "draw its real radius, an arc of 10 to 100 um, and choose that face."
-        words = f"on a sharp edge, {meeting.sharp}: its pressure is that of the mesh"
+        words = f"on a sharp edge, {meeting.sharp}: its pressure depends on the mesh"
         return _doubt("first touch", words, advice, _FACES)
     if not meeting.touch.lower:
         advice = "give one face its crown if it has one; docs/how-to/flat-faces.md."
@@ -447,7 +447,7 @@ def _first_touch(meeting: _Meeting) -> Finding:
     if len(meeting.touch.lower) in range(2, 40):
         words = f"{len(meeting.touch.lower)} places at a mean radius of "
         words += f"{1e3 * meeting.radius:.3g} mm, {where}"
-        return _doubt("first touch", words, "a ring would go all round: look at it.", _FACES)
+        return _doubt("first touch", words, "a ring would go all round: check the picture.", _FACES)
     return _good("first touch", f"a ring of radius {1e3 * meeting.radius:.3g} mm at {where}")
 
 

@@ -379,11 +379,11 @@ def _silent(asked: AskedPoints, point: int) -> InputError:
     with Builds() as builds:
         row = compute_alone(asked, builds)[0]
     words: Sequence[str] = [row.failure] if row.failure else row.notes
-    which = "the case as it is" if point == _CASE else f"point {point}"
+    which = "today's case" if point == _CASE else f"point {point}"
     reason = " ".join(words).replace("\n", " ") or "nothing that radiates"
     return InputError(
         f"click of {which}",
         got=reason.rstrip("."),
         expected="a section 'noise', and bodies with surfaces",
-        hint="klack noise tells what is missing.",
+        hint="klack noise says what is missing.",
     )

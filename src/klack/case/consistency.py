@@ -513,7 +513,7 @@ def _check_nodes(case: ImpactSections) -> None:
                 key,
                 got=f"{len(place)} coordinates",
                 expected=f"[{', '.join(axes)}] of '{name}'",
-                hint="coordinates are those of the drawing.",
+                hint="give coordinates as in the drawing.",
             )
 
 

@@ -112,7 +112,7 @@ def check_outputs(
                 ("outputs", i, "name"),
                 got=f"'{output.name}' twice",
                 expected="a name of its own for each output",
-                hint="names are those of channels in the results.",
+                hint="use names of channels in the results.",
             )
         names.add(output.name)
         dimension = dimensions[output.body]
@@ -136,7 +136,7 @@ def check_outputs(
                 ("outputs", i, "at"),
                 got=f"{len(output.at)} coordinates",
                 expected=f"[{', '.join(axes)}] of '{output.body}'",
-                hint="coordinates are those of the drawing.",
+                hint="give coordinates as in the drawing.",
             )
         if not fits:
             raise CaseProblem(

@@ -134,7 +134,7 @@ class StudyLimit(Section):
 
     most: Written | None = Field(
         default=None,
-        description="Largest allowed value, with its unit; or by the case as it is: today + 2 %.",
+        description="Largest allowed value, with its unit; or relative to the case: today + 2 %.",
     )
     least: Written | None = Field(default=None, description="Smallest allowed value.")
 

@@ -67,7 +67,7 @@ def app(
         bool, Parameter(name="--open", help="Open the address in the browser.")
     ] = True,
 ) -> int:
-    """Show cases, runs and results of a folder in the browser, with sliders that answer.
+    """Show cases, runs and results of a folder in the browser, with live sliders.
 
     Serves this machine alone, at an address with a random token. Runs continue when it is stopped.
     """

@@ -192,7 +192,7 @@ class SpoolEdge(OpeningComponent):
                 ("notches",),
                 got=f"notches of {1e3 * wide:g} mm in all",
                 expected=f"at most the {1e3 * around:g} mm of the edge",
-                hint="check count and width; width is that of one notch.",
+                hint="check count and width; width is the width of one notch.",
             )
         return self
 

@@ -58,7 +58,7 @@ Threads = Annotated[
 ]
 StudyPath = Annotated[
     Path | None,
-    Parameter(name="--study", help="File with a section 'study'. [default: that of the case]"),
+    Parameter(name="--study", help="File with a section 'study'. [default: the one of the case]"),
 ]
 CheckSteps = Annotated[
     bool | None,
@@ -66,7 +66,7 @@ CheckSteps = Annotated[
         name="--check-steps",
         help="Run strokes again with all steps twice as long; halve them where that changes first "
         "impacts by more than half of what the accuracy promises. [default: as in the case, or "
-        "yes; of a search its front alone; in three dimensions compared only]",
+        "yes; in a search only for its front; in three dimensions only compared]",
     ),
 ]
 Components = Annotated[

@@ -190,7 +190,7 @@ def require_within(body: str, surface: str, height: float, z: NDArray[np.float64
             got=f"z = {height * 1e3:.4g} mm",
             expected=f"between {z.min() * 1e3:.4g} and {z.max() * 1e3:.4g} mm, where surface "
             f"'{surface}' is",
-            hint="heights are those of the placed body.",
+            hint="give heights in the placed body.",
         )
 
 

@@ -52,7 +52,7 @@ def view_of_case(case: Case | ValveCase, progress: Progress = silent) -> View:
             f"{case.path or 'case'}: bodies",
             got="reduced models, or nodes without elements",
             expected="bodies with surfaces",
-            hint="klack inspect tells what is in such a case.",
+            hint="klack inspect lists what is in such a case.",
         )
     placed = place_meshes(case, progress)
     moving, stop = case.contact.moving, case.contact.stop
@@ -87,7 +87,7 @@ def _valve_view(case: ValveCase, view: View, progress: Progress) -> View:
             names = (str(stop.upper), str(stop.lower))
             contacts.append(_contact(name, sides[0], sides[1], names, gap))
     if drawn:
-        notes.append("Bodies stand as drawn; gaps of the stops are those of the network.")
+        notes.append("Bodies stand as drawn; gaps of the stops come from the network.")
     return replace(
         view,
         bodies=_bodies(case, drawn),
@@ -242,7 +242,7 @@ def _impact_view(study: ImpactStudy, folder: Path, progress: Progress) -> View:
     if any(one.stress.size for one in study.pictures):
         level = "full" if "full" in study.levels else "reduced"
         notes.append(
-            f"The stress at the highest force is that of the level {level}, at the nodes of the "
+            f"The stress at the highest force comes from the level {level}, at the nodes of the "
             "surface."
         )
     return replace(

@@ -92,7 +92,7 @@ def read_isolator(path: Path) -> MeasuredIsolator:
             where,
             got=f"a loss factor of {k[0].imag / k[0].real:.3g} at {f[0]:.4g} Hz",
             expected="0 or more: an element loses energy",
-            hint="the phase is that of exp(-i w t): turn its sign.",
+            hint="the phase has the sign of exp(-i w t): reverse it.",
         )
         values.setdefault(direction, {})[block.lower()] = k
     for direction, blocks in values.items():

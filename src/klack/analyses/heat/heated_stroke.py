@@ -301,7 +301,7 @@ def _uncommanded(way: str, delay: float, commands: Sequence[float]) -> tuple[str
         return ()
     return (
         f"no driver says when its command for {way} is: the {way} delay counts from the start of "
-        "the stroke. Its changes with temperature are those of the valve all the same.",
+        "the stroke. Its changes with temperature still describe the valve.",
     )
 
 

@@ -383,7 +383,7 @@ def _corner(
         return (
             f"contact: more than half of the force acts on a sharp edge of '{body.name}' "
             f"({body.name}.{surface.name}, at {_at(edges, nearest)}, {angle:.0f} deg). Such a "
-            "contact is as narrow as its elements: its width and pressure are those of the mesh, "
+            "contact is as narrow as its elements: its width and pressure depend on the mesh, "
             "its force and time may be off by 7 %. Try: give the edge its real radius (an arc or "
             "fillet; 10 to 100 um for most turned or ground parts), with five elements along it."
         )

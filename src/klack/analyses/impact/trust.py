@@ -97,8 +97,7 @@ def trust_notes(
         notes.append("no level can be a reference: no deviations are given.")
     elif finer:
         notes.append(
-            f"the answer is that of level '{answer}'; {_named(finer)} is not a reference, see "
-            "above."
+            f"the answer is from level '{answer}'; {_named(finer)} is not a reference, see above."
         )
     others = {name: result for name, result in results.items() if name != answer}
     second = best_level(others) if others else answer
@@ -124,8 +123,8 @@ def _verdict(name: str, apart: Deviation, answer: str, best: LevelResult) -> str
     return (
         f"level '{name}' is off by {100 * apart.peak_force:+.1f} % in peak force, "
         f"{100 * apart.contact_time:+.1f} % in contact time and {apart.restitution:+.4f} in "
-        f"restitution from level '{answer}' ({best.label}). The answer is that of level "
-        f"'{answer}', not that of level '{name}'."
+        f"restitution from level '{answer}' ({best.label}). The answer is from level "
+        f"'{answer}', not from level '{name}'."
     )
 
 

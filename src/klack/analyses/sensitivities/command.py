@@ -24,7 +24,7 @@ _Names = Annotated[
         consume_multiple=True,
         negative="",
         help="Keys of the case, network.components.spring.preload, or parameters of the study. "
-        "[default: those of the study]",
+        "[default: as in the study]",
     ),
 ]
 _Measures = Annotated[
@@ -33,7 +33,7 @@ _Measures = Annotated[
         name="--measure",
         consume_multiple=True,
         negative="",
-        help="closing_time, seat.peak_force, ... [default: those of the study, or the main ones]",
+        help="closing_time, seat.peak_force, ... [default: as in the study, or the main ones]",
     ),
 ]
 _Variant = Annotated[

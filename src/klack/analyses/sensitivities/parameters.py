@@ -214,7 +214,7 @@ def _reason(case: AnyCase, item: VariedKey, linked: Sequence[Linked]) -> tuple[s
 
 def _reason_at(case: AnyCase, place: Key) -> tuple[str, str] | None:
     if place[0] == "run":
-        return "a setting of the run", "klack advise tells what its steps change."
+        return "a setting of the run", "klack advise shows what its steps change."
     if not isinstance(case, ValveCase):
         return None
     if place[0] != "network" or STROKES.makes_bodies(case, place):

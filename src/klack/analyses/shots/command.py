@@ -140,6 +140,6 @@ def _refuse_variants(variants: list[str] | None) -> None:
         raise InputError(
             "--variant",
             got=f"'{variants[0]}' for drops of two bodies",
-            expected="no variant: they are those of whole strokes",
+            expected="no variant: only whole strokes have variants",
             hint="leave it out, or give the case of a valve with motion: three-dimensional.",
         )

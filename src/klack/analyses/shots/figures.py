@@ -227,7 +227,7 @@ def peak_chart(study: ShotsStudy) -> Chart:
         panels=(
             Panel(y=AxisSpec(label=time.label, unit=time.unit), curves=_dots(study, force, time)),
         ),
-        note="Of the first impact of every shot. The contact time is that of its first contact.",
+        note="Of the first impact of every shot. The contact time belongs to its first contact.",
     )
 
 

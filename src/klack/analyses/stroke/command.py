@@ -42,7 +42,7 @@ _Step = Annotated[
     _Text,
     Parameter(
         name="--step",
-        help='Fine time step, "20 ns", in place of that of the accuracy. [default: as in the case]',
+        help='Fine time step, "20 ns"; overrides the accuracy. [default: as in the case]',
     ),
 ]
 _Accuracy = Annotated[
@@ -65,7 +65,7 @@ _Controllers = Annotated[
         name="--controller",
         negative="",
         help="NAME=FILE.fmu: an FMU as the controller of the component NAME; its inputs are called "
-        "as the sensors. Its binary runs with your rights; several are allowed.",
+        "like the sensors. Its binary runs with your rights; several are allowed.",
     ),
 ]
 

@@ -50,7 +50,7 @@ class StudyColumnJson(TypedDict):
 
     unit: Annotated[str, Field(description="SI; 1 for a pure number, empty for words.")]
     spread: Annotated[str, Field(description="How it varies, or its expression.")]
-    today: Annotated[Real, Field(description="In the case as it is.")]
+    today: Annotated[Real, Field(description="In the case without changes.")]
     values: Annotated[list[Real | str], Field(description="One for each point.")]
 
 

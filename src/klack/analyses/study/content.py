@@ -178,7 +178,7 @@ def _best_answer(record: StudyRecord, labels: dict[str, str]) -> str:
     if not found.feasible:
         start = f"No point keeps all bounds. Nearest to them of {count(record.count)} points is"
         start += f" point {found.best}"
-    return f"{start}: {', '.join(parts)}. In brackets: against the case as it is."
+    return f"{start}: {', '.join(parts)}. In brackets: against today's case."
 
 
 def _optimum_sections(record: StudyRecord, labels: dict[str, str]) -> tuple[Section, ...]:
@@ -328,7 +328,7 @@ def _sensitivity_section(record: StudyRecord, labels: dict[str, str]) -> Section
         )
     told += [
         f"{labels[item.measure]}: {count(item.discarded)} base points were left out, because one "
-        "of their points has no value: the shares are those of the rest."
+        "of their points has no value: the shares cover the rest."
         for item in record.sensitivities
         if item.discarded
     ]
@@ -465,7 +465,7 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
     (
         "front",
         "Points that no other computed point beats in every objective at once; points that miss a "
-        "bound are beaten by all that keep them (Deb's rule).",
+        "bound are dominated by all that keep them (Deb's rule).",
     ),
     (
         "recommended point",
@@ -483,7 +483,7 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
         "surrogate",
         "A function of the parameters, fitted to the computed points of one measure: polynomial "
         "chaos (Blatman and Sudret 2011) or Gaussian process (Rasmussen and Williams 2006). Its "
-        "leave-one-out error is that of each point, predicted by a fit to all others. Below Q2 = "
+        "leave-one-out error belongs to each point, predicted by a fit to all others. Below Q2 = "
         "0.9, or with too few points, nothing is derived from it. Intervals of its shares are the "
         "largest change that an error of this root mean square can make.",
     ),

@@ -106,7 +106,7 @@ def scatter_chart(
         title=f"{labels[measure.name]} over {labels[first.name]}",
         x=x,
         panels=(Panel(y=y, curves=tuple(curves), marks=marks),),
-        note="Every dot is a point of the study; dashed: the case as it is.",
+        note="Every dot is a point of the study; dashed: today's case.",
     )
 
 
@@ -174,7 +174,7 @@ def _points(
 
 
 def _today(x: float, y: float) -> Curve:
-    return dots(x, y, "today", "black", 3.0, ["the case as it is"])
+    return dots(x, y, "today", "black", 3.0, ["today's case"])
 
 
 def effect_bars(measure: StudyColumn, item: Screening, labels: Mapping[str, str]) -> BarChart:

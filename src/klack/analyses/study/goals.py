@@ -142,7 +142,7 @@ def _bound(where: str, written: Written, unit: str, today: float) -> float:
     refuse_if(
         not np.isfinite(today),
         where,
-        got=f"'{written}', but the case as it is has no value of this measure",
+        got=f"'{written}', but today's case has no value of this measure",
         expected="a bound with its unit",
         hint="write a number, or make the case compute it.",
     )

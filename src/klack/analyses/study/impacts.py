@@ -271,6 +271,6 @@ def _other_answer(study: ImpactStudy, level: str) -> str:
     if study.reference == level:
         return ""
     return (
-        f"the numbers of this point are those of level '{level}', the answer of a single impact "
-        f"would be that of level '{study.reference}'. Try: level: {study.reference} in the study."
+        f"the numbers of this point are from level '{level}', the answer of a single impact "
+        f"would be from level '{study.reference}'. Try: level: {study.reference} in the study."
     )

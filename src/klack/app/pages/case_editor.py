@@ -35,14 +35,14 @@ _REST = 0.4  # [s] without a key until the text is checked
 
 
 _OTHERS = (
-    "Another page holds a text of this case that is not saved. Yours is kept in this page alone, "
-    "until you save it."
+    "Another page holds unsaved text of this case. Your text is kept only on this page until "
+    "you save it."
 )
 _TOO_LONG = (
-    f"The text has more than {_LONGEST} characters, the most that this page takes. It is neither "
-    "checked nor kept: make it shorter, or edit the file itself."
+    f"The text has more than {_LONGEST} characters, the limit of this page. It is neither "
+    "checked nor kept: shorten it, or edit the file itself."
 )
-_PAGE_ALONE = "What is not saved is kept in this page alone: do not close or reload it."
+_PAGE_ALONE = "Unsaved text is kept only on this page: do not close or reload it."
 
 
 async def case_editor_page(state: State, given: Mapping[str, str]) -> None:
@@ -367,7 +367,7 @@ class _Editor:
                 await self._start(text)
 
         with asking("Not saved", "Save and run", save_and_run) as dialog:
-            plain("A run takes the file, and the file does not have this text yet.", "p")
+            plain("A run uses the file, which does not contain this text yet.", "p")
 
     async def _start(self, text: str) -> None:
         try:

@@ -236,7 +236,7 @@ def _show(state: State, ghost: Answer, now: Answer, names: tuple[str, str]) -> N
                         src = state.sounds.add(wav)
                         player(name, src=src, aria_label=f"click of {name}").style("width:100%")
             plain(
-                f"Both to one scale: {now.scale}." if now.scale else "Nothing radiates.", "p"
+                f"Both at the same scale: {now.scale}." if now.scale else "Nothing radiates.", "p"
             ).classes("k-note")
     for name, answer in ((names[1], ghost), (names[0], now)):
         if answer.doubts:

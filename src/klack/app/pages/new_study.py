@@ -66,13 +66,13 @@ class _NewStudy:
         with ui.element("section").classes("k-section"):
             heading("What varies")
             plain(
-                "Tick numbers of the case; the ends of a range are written with their unit.", "p"
+                "Tick numbers of the case; write the ends of a range with their unit.", "p"
             ).classes("k-soft")
             self._show_list(self._offer.parameters, self._show_parameters)
         with ui.element("section").classes("k-section"):
             heading("What is computed")
             plain(
-                "An objective is what klack optimise searches for, and what the front is of: one "
+                "Objectives are what klack optimise searches for, and they define the front: one "
                 "to four.",
                 "p",
             ).classes("k-soft")

@@ -49,7 +49,7 @@ _CLOSE = """() => {
 
 async def new_valve_page(state: State, given: Mapping[str, str]) -> None:
     """The page, where it was left."""
-    words = "From two STEP files or two drawings to a case. What is chosen here is kept."
+    words = "From two STEP files or two drawings to a case. Your choices are kept."
     with frame(state, "New valve", words):
         guide = _Guide(state, await asyncio.to_thread(state.plans.load))
         guide.build()
@@ -314,9 +314,7 @@ class _Guide:
             with ui.element("label").classes("k-field"):
                 with ui.element("div"):
                     plain("Assumed mount and plate")
-                    plain(
-                        "a bracket of 1.5 mm sheet steel, so that the click can be played", "small"
-                    )
+                    plain("a bracket of 1.5 mm sheet steel, needed to play the click", "small")
                 tick_box(
                     self._plan.noise,
                     lambda on: self.keep(replace(self._plan, noise=on)),
@@ -381,7 +379,7 @@ class _Guide:
         with ui.element("div").classes("k-sheet k-form-open"):
             text_field(
                 "Name of the valve",
-                "a folder of this name is made, with case.yaml and the STEP files that it needs",
+                "klack makes a folder of this name with case.yaml and the STEP files it needs",
                 self._plan.name,
                 partial(self._change, "name"),
             )

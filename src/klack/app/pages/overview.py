@@ -59,7 +59,7 @@ _WORDS = {
 
 async def overview_page(state: State, given: Mapping[str, str]) -> None:
     """Everything below the folder, in three lists."""
-    with frame(state, "Cases and results", "Everything below the folder that klack app opened."):
+    with frame(state, "Cases and results", "Everything below the folder opened by klack app."):
         await _Overview(state).build()
 
 
@@ -206,11 +206,11 @@ class _Overview:
             more = f" and {len(found.odd) - _NAMED} more" if len(found.odd) > _NAMED else ""
             plain(f"Left out: {', '.join(found.odd[:_NAMED])}{more}.", "p").classes("k-error")
         if not found.is_whole:
-            plain("There is more below this folder than is looked at.", "p").classes("k-error")
+            plain("This folder contains more than klack app looks at.", "p").classes("k-error")
         if not self._state.folder.path.is_dir():
             plain(
-                f"The folder {self._state.folder.path} is not there any more. Give it its former "
-                "name, or start klack app with its new one.",
+                f"The folder {self._state.folder.path} no longer exists. Give it back its former "
+                "name, or start klack app with the new one.",
                 "p",
             ).classes("k-error").props("role=alert")
         elif not found.cases:
@@ -314,7 +314,7 @@ class _Overview:
 
         self._ask(
             f"Duplicate {case}",
-            "The copy lies beside it, so that files it names are found.",
+            "The copy is placed beside it, so the files that it names are found.",
             (),
             "",
             f"{path.stem}-2",

@@ -280,7 +280,7 @@ class _Sliders:
         self._show_numbers(answer, ghost)
         self._sound.set_visibility(bool(answer.wav))
         self._scale.set_text(
-            f"All clicks to one scale: {answer.scale}." if answer.wav else "Nothing radiates."
+            f"All clicks at the same scale: {answer.scale}." if answer.wav else "Nothing radiates."
         )
         if answer.wav:
             self._play("now", answer.wav)
@@ -345,11 +345,11 @@ class _Sliders:
             return
         with (
             self._body,
-            asking("Replace what is not saved?", "Replace", lambda: self._edit(text)),
+            asking("Replace unsaved changes?", "Replace", lambda: self._edit(text)),
         ):
             plain(
-                "The case has changes that are not saved. These values are put into the file "
-                "as it is saved, and replace those changes.",
+                "The case has unsaved changes. These values go into the file as it was last "
+                "saved, and replace those changes.",
                 "p",
             ).classes("k-soft")
 

@@ -150,7 +150,7 @@ class StudyPanel:
         try:
             saved = await asyncio.to_thread(self._state.folder.case_text, self._path)
             if saved != self._text:
-                self._problem.set_text("Save the text first: a run takes the file.")
+                self._problem.set_text("Save the text first: a run uses the file.")
                 return
             await asyncio.to_thread(
                 self._state.jobs.start,
@@ -322,7 +322,7 @@ class _Page:
         self._words = plain("", "p").classes("k-note").props("role=status")
         with ui.element("div").classes("kp-players") as self._players:
             self._base, self._own = (
-                _player("The case as it is", "kp-base"),
+                _player("Today's case", "kp-base"),
                 _player("The point", "kp-own"),
             )
         self._players.set_visibility(False)
@@ -370,8 +370,8 @@ class _Page:
         change = f"{heard.level - heard.base_level:+.1f} dB(A)".replace("-", "−")
         self._words.set_text(
             f"Point {heard.point}: sound exposure level {heard.level:.1f} dB(A), "
-            f"{change} against {heard.base_level:.1f} dB(A) of the case as it is. "
-            f"Both to one scale: {heard.scale}."
+            f"{change} against {heard.base_level:.1f} dB(A) today. "
+            f"Both at the same scale: {heard.scale}."
         )
         self._players.set_visibility(True)
         if self._plays:

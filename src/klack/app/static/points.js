@@ -209,8 +209,8 @@
     legend() {
       const sign = (kind, words) => make("span", {}, make("i", { class: `kp-sign ${kind}`, "aria-hidden": true }), words);
       return make("div", { class: "kp-legend k-soft" },
-        sign("front", "front"), sign("plain", "beaten by the front"), sign("missed", "misses a bound"),
-        sign("doubt", "in doubt"), sign("picked", "selected"), sign("best", "recommended"), sign("today", "the case as it is"));
+        sign("front", "front"), sign("plain", "dominated"), sign("missed", "misses a bound"),
+        sign("doubt", "in doubt"), sign("picked", "selected"), sign("best", "recommended"), sign("today", "today's case"));
     }
 
     offerAxes() {
@@ -312,7 +312,7 @@
     showChosen() {
       const { chosen } = this.parts, k = this.place.get(this.chosen);
       if (k === undefined) {
-        chosen.replaceChildren(make("p", { class: "k-soft", text: "Click a point, or a number in the table: its values beside those of the case as it is, its click, its case file." }));
+        chosen.replaceChildren(make("p", { class: "k-soft", text: "Click a point, or a number in the table: its values beside today's, its click, its case file." }));
         return;
       }
       const rows = this.study.columns.map(column => make("tr", {},
@@ -323,7 +323,7 @@
       const doubt = this.doubt.get(k), reason = this.reasons.get(this.chosen);
       chosen.replaceChildren(
         make("h2", { text: `Point ${this.chosen}` }),
-        make("p", { class: "k-soft", text: this.marks(k).join(", ") || "beaten by a point of the front, or without objectives" }),
+        make("p", { class: "k-soft", text: this.marks(k).join(", ") || "dominated by a point of the front, or without objectives" }),
         ...(reason ? [make("p", { class: "k-error", text: reason })] : []),
         ...(doubt === undefined ? [] : [make("p", { class: "k-error", text: this.study.doubts[doubt] })]),
         make("div", { class: "k-scroll", tabindex: "0" }, make("table", { class: "k-table kp-compare" },

@@ -86,7 +86,7 @@ def locate(
             got=f"a point at {_text(point, pose)}, {format_si(best.distance, 'm')} outside of the "
             "body",
             expected=f"a point of the body; the nearest one is {_text(best.place, pose)}",
-            hint="take that one, or correct the coordinates: they are those of the drawing.",
+            hint="take that one, or correct the coordinates: they count in the drawing.",
         )
     near = best.distance + _SHARED * size
     return tuple(item for item in found if item.distance <= near)
