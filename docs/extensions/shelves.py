@@ -17,7 +17,7 @@ __all__ = ["setup", "shelves"]
 _SHELF_OF_FOLDER = {
     "tutorials": "tutorials",
     "notebooks": "notebooks",
-    "how-to": "how-to",
+    "how-to": "how-to: run",
     "theory": "theory",
     "reference": "reference",
     "project": "reference",

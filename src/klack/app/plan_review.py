@@ -192,7 +192,7 @@ class _Meeting:
     Parameters
     ----------
     force [N]
-        Estimate from above.
+        Upper limit.
     half_width [m]
         By Hertz under that force; nan if unknown.
     radius [m]
