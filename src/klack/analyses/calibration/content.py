@@ -410,8 +410,8 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
 _LIMITS: tuple[tuple[str, str], ...] = (
     (
         "model",
-        "The errors are those of the strokes. Effects missing in the model shift the fitted "
-        "parameters, which no interval shows: check the residual over time.",
+        "The errors come from the scatter of the strokes. Effects missing in the model shift the "
+        "fitted parameters, which no interval shows: check the residual over time.",
     ),
     (
         "sensor",

@@ -222,8 +222,8 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
         "From smooth flights fitted to the lift before and after an impact, extrapolated to "
         "the rest level of the needle on the stop; read off the computed lift in the same "
         "way, with the same noise as the measured one (median of some readings). "
-        "They are not those of the centre of mass in a table of klack stroke: vibration of "
-        "the needle, squeeze films and the level of rest make a difference.",
+        "They differ from the numbers of the centre of mass in a table of klack stroke: "
+        "vibration of the needle, squeeze films and the level of rest make a difference.",
     ),
     (
         "rebound height",
@@ -249,16 +249,16 @@ _LIMITS: tuple[tuple[str, str], ...] = (
 _DROP_DEFINITIONS: tuple[tuple[str, str], ...] = (
     (
         "highest rebound",
-        "Rebounds of dry drops scatter, and the highest of many is usually taken for that of a "
-        "centred impact. The more drops, the higher the highest: 'mean highest' is what the "
-        "highest of as many computed shots as were measured has on average, and its bias is that "
-        "minus the centred shot.",
+        "Rebounds of dry drops scatter, and the highest of many is usually taken for a centred "
+        "impact. The more drops, the higher the highest: 'mean highest' is what the "
+        "highest of as many computed shots as were measured has on average, and its bias is this "
+        "value minus the centred shot.",
     ),
     (
         "restitution, rebound height",
         "From smooth flights fitted to the height before and after the first impact, computed and "
-        "measured alike. The restitution of klack shots differs: it is that at the "
-        "end of the impact, before friction in the guide reduces the rebound.",
+        "measured alike. The restitution of klack shots differs: it belongs to the end of the "
+        "impact, before friction in the guide reduces the rebound.",
     ),
     (
         "reading error",
@@ -317,8 +317,7 @@ def measured_impact_content(study: MeasuredImpactStudy) -> Content:
             ),
             (
                 "shift",
-                "The time of flight to the sensor is not compared: both fronts are laid on each "
-                "other.",
+                "The time of flight to the sensor is not compared: both fronts are aligned.",
             ),
         ),
     )
@@ -359,8 +358,8 @@ def pulses_chart(study: MeasuredImpactStudy) -> Chart:
             ),
         ),
         note=(
-            "Measured pulses turned upwards, divided by their factors, and laid on the computed "
-            "front. Below: computed minus "
+            "Measured pulses turned upwards, divided by their factors, and aligned with the "
+            "computed front. Below: computed minus "
             + ("the median of the recordings." if several else "measured.")
         ),
     )

@@ -122,7 +122,7 @@ def check_yield(
         )
     for words in doubtful.values():
         warnings.warn(
-            f"contact {surfaces}: the yield stress of {words}. What yields goes with it. Try: "
+            f"contact {surfaces}: the yield stress of {words}. How much yields depends on it. Try: "
             "'yield' from a tensile test, or both ends of its range (klack study).",
             AccuracyWarning,
             stacklevel=2,

@@ -130,8 +130,9 @@ def _bodies_in_space(study: ImpactStudy) -> Section:
 
         return Section(title=title, picture=solid_figure(study))
     text = (
-        "No picture: this result holds no surfaces of the bodies. Those of earlier versions have "
-        "none, 'klack impact CASE' adds them; in a new one the warnings tell what failed."
+        "No picture: this result holds no surfaces of the bodies. Results of earlier versions "
+        "have none; 'klack impact CASE' adds them. In a new result the warnings name what "
+        "failed."
     )
     return Section(title=title, paragraphs=(text,))
 
@@ -426,10 +427,10 @@ def _definitions_point_by_point(study: ImpactStudy) -> tuple[tuple[str, str], ..
             (
                 "estimated error",
                 "Deviation of a reduced level from one interface-level run at the same condition, "
-                "with more modes than the reduced level keeps. It includes the error of the "
-                "local law and of the omitted modes, not that of the mesh. Behind the ± stands "
-                "how far that run is from one with half the modes in longer steps. The steps of "
-                "the full order have an error of their own: that of the same run with the "
+                "with more modes than the reduced level keeps. It includes the error of the local "
+                "law and of the omitted modes, not of the mesh. The number after ± is the "
+                "deviation of that run from one with half the modes in longer steps. The steps "
+                "of the full order have an error of their own, found by the same run with the "
                 "periods and steps of the full order.",
             )
         )

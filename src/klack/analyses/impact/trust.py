@@ -264,8 +264,8 @@ def _doubt(problem: ContactProblem, highest: Iterable[float]) -> str:
     return (
         f"{1e6 * area:.3g} mm^2 of the faces meet all at once, within the shortest period of the "
         f"kept modes ({format_si(period, 's', 2)}): the force rises by about "
-        f"{format_si(front, 'N', 2)} in that time, and rise and peak are those of the truncation. "
-        f"{advice}"
+        f"{format_si(front, 'N', 2)} in that time, and rise and peak depend on the number of "
+        f"modes. {advice}"
     )
 
 

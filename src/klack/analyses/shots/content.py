@@ -259,7 +259,7 @@ def _shares(study: ShotsStudy) -> tuple[Measure[Shot], ...]:
 # --------------------------------------------------------------------------- words
 
 _CENTRED_RUBS = (
-    " Friction between the faces stays, with the mean coefficient: those of a centred valve slip "
+    " Friction between the faces stays, with the mean coefficient: faces of a centred valve slip "
     "on each other, too."
 )
 
@@ -280,8 +280,8 @@ def _definitions(study: ShotsStudy) -> tuple[tuple[str, str], ...]:
         ),
         (
             "the rule, its bias",
-            "Rebounds of dry shots scatter, and the highest one is usually taken as that of a "
-            "centred impact. The bias is the highest value minus the centred one: the error of the "
+            "Rebounds of dry shots scatter, and the highest one is usually taken for the centred "
+            "impact. The bias is the highest value minus the centred one: the error of the "
             "rule for this valve. It depends on the number of shots and on the distributions.",
         ),
         *glossary((*drawn, *FIRST_IMPACT, *_shares(study))),

@@ -457,9 +457,9 @@ def _limits(study: StrokeShotsStudy) -> tuple[tuple[str, str], ...]:
     return (
         (
             "Physics",
-            "Linear elastic bodies with small deformations, faces that are smooth but for Coulomb "
-            "friction where it is given, a rigid bore of the guide unless its law says otherwise; "
-            "magnet, spring and fluid act along the axis.",
+            "Linear elastic bodies with small deformations, faces that are smooth except for "
+            "Coulomb friction where it is given, a rigid bore of the guide unless its law says "
+            "otherwise; magnet, spring and fluid act along the axis.",
         ),
         (
             "Chance",

@@ -443,7 +443,7 @@ def _left(record: StudyRecord) -> tuple[str, ...]:
 
 
 _DEFINITIONS: tuple[tuple[str, str], ...] = (
-    ("today", "The case as it is, computed with the same measures."),
+    ("today", "The case without changes, computed with the same measures."),
     (
         "rank correlation",
         "Spearman's coefficient: +1 if one always rises with the other, -1 if it always falls, "
@@ -453,7 +453,7 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
         "effect of a parameter",
         "Change of a measure when one parameter moves by half of its range, over that half: the "
         "change over the whole range of a straight line (Morris 1991). Size is the mean without "
-        "signs (Campolongo et al. 2007). A scatter as large as the size tells of curves and of "
+        "signs (Campolongo et al. 2007). A scatter as large as the size means curves and "
         "interactions.",
     ),
     (
