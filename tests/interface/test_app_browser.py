@@ -149,7 +149,7 @@ def test_a_run_from_the_editor_is_that_of_the_text_on_the_page(page, server, fol
     area.fill(text.replace("0.3 m/s", "0.4 m/s"))
     page.wait_for_selector("text=valid impact, not saved")
     run.click()
-    page.wait_for_selector("text=the file does not have this text yet")
+    page.wait_for_selector("text=which does not contain this text yet")
     page.get_by_role("button", name="Cancel").click()
     page.wait_for_selector(".q-dialog", state="detached")
     file.write_text(text + "# theirs\n", "utf-8")

@@ -141,7 +141,7 @@ def begin_with_an_empty_folder(walk: Walk, folder: Path) -> None:
 
 
 def duplicate_and_note(walk: Walk, folder: Path) -> None:
-    walk.presses(f"Duplicate {VALVE}", "The copy lies beside it")
+    walk.presses(f"Duplicate {VALVE}", "The copy is placed beside it")
     walk.presses("Make", f"impact, {COPY}")
     walk.finds((folder / COPY).read_text() == (folder / VALVE).read_text(), "a copy is the same")
     walk.presses(f"Note {COPY}", f"Note on {COPY}")
@@ -329,8 +329,8 @@ def move_pin_hear(walk: Walk, folder: Path) -> None:
 def kill_in_the_middle(walk: Walk, folder: Path, serve: Callable[[Path], Served]) -> None:
     """A run and a text that is not saved outlive a server that is killed."""
     walk.goes("/", f"impact, {COPY}")
-    walk.presses(f"Duplicate {COPY}", "The copy lies beside it")
-    walk.types("Name", "case-3", "The copy lies beside it", key="Tab")
+    walk.presses(f"Duplicate {COPY}", "The copy is placed beside it")
+    walk.types("Name", "case-3", "The copy is placed beside it", key="Tab")
     walk.presses("Make", "impact, valve/case-3.yaml")
     walk.presses(f"Run {COPY}", f"klack impact {COPY}")
     walk.goes("/case?path=valve/case-3.yaml", "valid impact, saved")
@@ -390,7 +390,7 @@ def two_browsers(walk: Walk, browser: Any, folder: Path) -> None:
         areas[0].fill(text + "# one\n")
         walk.sees("valid impact, not saved")
         areas[1].fill(text + "# two\n")
-        other.sees("Another page holds a text of this case that is not saved.")
+        other.sees("Another page holds unsaved text of this case.")
         other.presses("Save", "valid impact, saved")
         walk.finds((folder / COPY).read_text() == text + "# two\n", "the second saved first")
         walk.presses("Save", "The file was changed by another program")
