@@ -30,6 +30,7 @@ from klack.errors import AccuracyWarning, InputError
 from klack.mechanics.controlled_force import ControlledForce
 from klack.mechanics.force import ConstantForce, ForceOverTime
 from klack.mechanics.force_over_stroke import ForceOverStroke
+from klack.mechanics.friction import GuideFriction
 from klack.mechanics.gravity import STANDARD_GRAVITY, Gravity
 from klack.mechanics.lever import Lever
 from klack.mechanics.lugre_friction import LuGreFriction
@@ -241,6 +242,29 @@ def test_friction_about_rest_is_a_spring():
 
     assert out[0] == pytest.approx(-1e6 * 0.2e-6, rel=1e-13)
     assert out[4] == pytest.approx(0.0, abs=1e-20)
+
+
+@pytest.mark.parametrize("coarse", [1, 64])
+def test_a_belt_takes_a_block_along_by_friction(coarse):
+    """A driven body has no speed by forces: half of what the block gets is lost, none more."""
+    friction, mass, speed, end = 5.0, 2e-3, 0.4, 1e-3
+    parts = {
+        "belt": PrescribedMotion(
+            points=("top",), time=(0.0, end), displacement=(0.0, speed * end), between="straight"
+        ),
+        "block": RigidMass(mass=mass, points=("tip",)),
+        "grip": GuideFriction(coulomb=friction),
+        "load": Spring(stiffness=1e3, preload=800.0),
+    }
+    nodes = [["block.tip", "grip.body"], ["belt.top", "grip.guide", "load.end"]]
+    rows = Network(parts, nodes).rows()
+    run = simulate_network(rows, duration=0.3e-3, coarse=coarse, record=1.28e-6, start="free")
+
+    slips = np.minimum(run.time, mass * speed / friction)
+    way = 0.5 * friction / mass * slips**2 + speed * (run.time - slips)
+    assert run.channels["block.tip displacement"].values == pytest.approx(way, abs=1e-14)
+    assert run.books.losses["grip loss"] == pytest.approx(0.5 * mass * speed**2, rel=1e-12)
+    assert run.channels["grip.body force"].values[50] == pytest.approx(friction, rel=1e-12)
 
 
 def test_friction_below_sliding_is_refused():

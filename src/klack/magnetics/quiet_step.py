@@ -25,7 +25,7 @@ DIODE = 1e-6
 """Voltage [V] by which a driver must offer more than an open coil induces."""
 
 _ROUGH = 3.1e3  # [1/s] its square times that of a step is the bend allowed in it
-_ROUGHEST = 4e-6  # bend allowed in any step
+_ROUGHEST = 1e-6  # bend allowed in any step
 
 _PHI = FRONT
 _RATE = FRONT + 2
@@ -39,7 +39,7 @@ _THIRD = 1.0 / 3.0
 def allowed_bend(h: float) -> float:
     """Change of a flux in a piece beyond that by its rates, over the largest flux so far.
 
-    The trapezoidal rule errs by about a fifth of it.  Below 0.64 us it falls with the square of the
+    The trapezoidal rule errs by about a fifth of it.  Below 0.32 us it falls with the square of the
     step ``h`` [s]: shorter steps stay more accurate than longer ones that are cut.
     """
     rough = _ROUGH * h

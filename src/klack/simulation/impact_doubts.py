@@ -13,9 +13,9 @@ phase of that swing.  Steps of length ``h`` make each period ``T`` late by ``(2 
 of it, and steps in which the force rises and falls by ``(2 pi h / T)^4 / 720``.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
-from math import exp, floor, isfinite, log, log10, pi, sqrt
+from math import exp, floor, isfinite, log, log10, nan, pi, sqrt
 
 import numpy as np
 
@@ -43,7 +43,7 @@ def impact_doubts(
     events: Sequence[ImpactEvent],
     interfaces: Mapping[str, InterfaceRecord],
     step: float,
-    longest: float,
+    rising: Collection[str] = (),
 ) -> Iterator[str]:
     """Sentences on the first complete impact on each stop that the steps do not resolve.
 
@@ -54,8 +54,8 @@ def impact_doubts(
     ----------
     step [s]
         Fine step.
-    longest [s]
-        In longer steps the force of a closed contact rises and falls.
+    rising
+        Stops whose force rises and falls within steps while they are closed.
     """
     seen = set[str]()
     for event in events:
@@ -64,7 +64,8 @@ def impact_doubts(
         seen.add(event.stop)
         record = interfaces[event.stop]
         since = _last(events, event.time)
-        late, times, period = late_by_swinging(record, event.time, since, longest=longest)
+        rises = event.stop in rising
+        late, times, period = late_by_swinging(record, event.time, since, rises=rises)
         if late > _LATE:
             shorter = min(_rounded_down(step * sqrt(_AIM * _LATE / late)), step)
             yield (
@@ -76,7 +77,8 @@ def impact_doubts(
         if event.contact_time < _FEWEST * _step_at(record, event.peak_time):
             yield _unresolved(event, _step_at(record, event.peak_time))
             continue
-        share, at_touch, length = missing_peak(record, event.peak_time, event.restitution)
+        mean_alone = nan if rises else event.restitution
+        share, at_touch, length = missing_peak(record, event.peak_time, mean_alone)
         if not share > _PEAK:
             continue
         aim = _AIM * _PEAK / share
@@ -134,7 +136,7 @@ def missing_peak(
     peak_time [s]
         Middle of the step with the peak.
     restitution [-]
-        Of the impact; nan where it is not over.
+        Of the impact; nan where it is not over, or where its force rises and falls within steps.
 
     Returns
     -------
@@ -164,7 +166,7 @@ def missing_peak(
 
 
 def late_by_swinging(
-    record: InterfaceRecord, time: float, since: float = 0.0, *, longest: float = np.inf
+    record: InterfaceRecord, time: float, since: float = 0.0, *, rises: bool = False
 ) -> tuple[float, int, float]:
     """Delay [s] of the last contact before ``time``, a first touch, by its swings.
 
@@ -172,8 +174,8 @@ def late_by_swinging(
 
     Parameters
     ----------
-    longest [s]
-        In longer steps the force rises and falls.
+    rises
+        Whether the force rises and falls within steps.
 
     Returns
     -------
@@ -200,7 +202,7 @@ def late_by_swinging(
     periods = 2.0 * np.diff(middle[ends])
     step = record.step[part][ends[0] : ends[-1]]
     angle = 2.0 * pi * step / np.repeat(periods, np.diff(ends))
-    shift = np.where(step > longest, angle**4 / 720.0, angle**2 / 12.0)
+    shift = angle**4 / 720.0 if rises else angle**2 / 12.0
     each = share * np.add.reduceat(shift * step, ends[:-1] - ends[0])
     if not share.any():
         return 0.0, 0, 0.0

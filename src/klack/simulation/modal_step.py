@@ -35,6 +35,7 @@ __all__ = [
     "ROW_V",
     "advance",
     "apply_forces",
+    "apply_rising",
     "average",
     "copy_state",
     "kick",
@@ -223,6 +224,36 @@ def apply_forces(W: Any, n: int, F: Any, port0: int, port1: int) -> None:
         f = W[10 * _N + i]
         W[i] += W[8 * _N + i] * f
         W[_N + i] += W[9 * _N + i] * f
+
+
+@inner(fastmath=FAST, _nrt=False, error_model="numpy", forceinline=True)
+def _turn1(W: Any, n: int, F0: float, S0: float) -> None:
+    for i in range(n):
+        r0 = W[_R * _N + i]
+        f, s = r0 * F0, r0 * S0
+        W[i] += W[8 * _N + i] * f + W[12 * _N + i] * s
+        W[_N + i] += W[9 * _N + i] * f + W[13 * _N + i] * s
+
+
+@inner(fastmath=FAST, _nrt=False, error_model="numpy", forceinline=True)
+def _turn2(W: Any, n: int, F0: float, F1: float, S0: float, S1: float) -> None:
+    for i in range(n):
+        r0, r1 = W[_R * _N + i], W[(_R + 1) * _N + i]
+        f, s = r0 * F0 + r1 * F1, r0 * S0 + r1 * S1
+        W[i] += W[8 * _N + i] * f + W[12 * _N + i] * s
+        W[_N + i] += W[9 * _N + i] * f + W[13 * _N + i] * s
+
+
+@inner(_nrt=False, error_model="numpy", forceinline=True)
+def apply_rising(W: Any, n: int, F: Any, S: Any, port0: int, port1: int) -> None:
+    """The same of forces ``F`` that rose by ``S`` over the step."""
+    if port1 - port0 == 1:
+        _turn1(W, n, F[port0], S[port0])
+    elif port1 - port0 == 2:
+        _turn2(W, n, F[port0], F[port0 + 1], S[port0], S[port0 + 1])
+    else:
+        apply_forces(W, n, F, port0, port1)
+        kick(W, W, n, S, port0, port1, ROW_R1)
 
 
 @inner(fastmath=FAST, _nrt=False, error_model="numpy", forceinline=True)

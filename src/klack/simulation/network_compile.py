@@ -249,8 +249,8 @@ class _Answers(NamedTuple):
                 if row.course is None:
                     found[0, level, here, here] = (shapes * P.B1) @ shapes.T
                     found[1, level, here, here] = (shapes * P.R1) @ shapes.T
+                    found[2, level, here, here] = (shapes * P.B2) @ shapes.T
                     found[3, level, here, here] = (shapes * P.Rm) @ shapes.T
-                found[2, level, here, here] = (shapes * P.B2) @ shapes.T
             first = here.stop
         return cls(*found)
 

@@ -45,6 +45,8 @@ def _unseen_work(network: CompiledNetwork) -> NDArray[np.float64]:
     They are behind the bodies by what the guess of the last step missed.  Times the differences
     of the forces this cancels or is repaid; at the ends of a run the whole force counts, and of a
     preloaded needle that is far more than what moves it.  The same holds for contacts and films.
+    With it, at the first port that is free, what bodies got beyond their due and the next steps
+    take back.
     """
     at, rows, state = network.bodies.at, network.interfaces, network.interface_state
     force, end, seen = (at[row : row + PORTS] for row in (LAST, Y0, SEEN))
@@ -61,22 +63,21 @@ def _unseen_work(network: CompiledNetwork) -> NDArray[np.float64]:
         upper, lower = sliders.upper[s], sliders.lower[s]
         behind = end[upper] - end[lower] - slid.seen[s]
         unseen[upper if upper < ground else lower] += slid.force[s] * behind
+    free = [row.course is None for row in network.rows.bodies for _ in row.ports]
+    if any(free):
+        unseen[free.index(True)] += at[EXCESS]
     return unseen
 
 
 def energy_stores(network: CompiledNetwork) -> dict[str, float]:
     """Energy [J] that each part holds now, by name.
 
-    Bodies are counted without the work that elements have still to see, and the first one without
-    what bodies got beyond their due, which the next steps take back.
+    Bodies are counted without the work that elements have still to see.
     """
     rows, nodes, state = network.rows, network.nodes, network.node_state
     interfaces, touching = network.interfaces, network.interface_state
     stores = {}
     unseen, place = _unseen_work(network), 0
-    counts = [row.course is None for row in rows.bodies for _ in row.ports]
-    if any(counts):
-        unseen[counts.index(True)] += network.bodies.at[EXCESS]
     for b, row in enumerate(rows.bodies):
         if row.course is not None:  # what its motion needs is a supply
             place += len(row.ports)

@@ -45,7 +45,6 @@ from klack.simulation.network_arrays import (
     PORTS,
     RISE,
     TURN,
-    Y0,
     Y1,
     Recording,
     Step,
@@ -54,7 +53,7 @@ from klack.simulation.network_ports import (
     mean_displacement,
     move_body,
     port_speed,
-    watch_average,
+    watch_averages,
 )
 from klack.simulation.network_sliders import push_by_last_friction, slip, slip_seen_late
 from klack.simulation.phase import phase
@@ -86,6 +85,7 @@ __all__ = [
     "push_by_rise",
     "smooth_films",
     "solve_interfaces",
+    "stay_closed",
     "swings_follow",
     "swings_hold",
     "take_back_interfaces",
@@ -106,7 +106,7 @@ _STILL = 0.1  # of that: at rest of an elastic contact, which is followed while 
 _SMOOTH = 0.06  # of a gap and its cut-off: way in a middle step that the film follows
 _AS_HARD = 1.0002  # times the deepest indentation: what is missed of it matters to no peak
 _HARDER = 1.002  # the same of what is expected
-_STAYS = 0.5  # of the gap of a closed contact: way in a macro step in which it stays closed
+_STAYS = 0.5  # of the gap of a closed contact: way in a step in which it stays closed
 _BEND = 2e-3  # of a force that swings: what its second derivative changes in the mean of a step
 _CREST = 1e-5  # the same where a contact presses harder than before
 _JERK = 1e-3  # the same of the change from one step to the next: 1e-5 of the time of the swings
@@ -191,6 +191,18 @@ def may_swing(contacts: Any, now: float, length: float) -> bool:
 
 
 @phase
+def stay_closed(contacts: Any, H: float) -> bool:
+    """Whether contacts that are closed stay so in a sub-step, and all of them are elastic."""
+    state, closed, stay = contacts.state, False, True
+    for c in range(contacts.rows.interfaces):
+        if state.since[c] < np.inf:
+            closed, deep = True, -(state.gap[c] + state.e[c])
+            stay = stay and _elastic(contacts, c) and state.film_before[c] == 0.0
+            stay = stay and abs(state.rate[c]) * H <= _STAYS * deep
+    return closed and stay
+
+
+@phase
 def _elastic(contacts: Any, c: int) -> bool:
     rows = contacts.rows
     return rows.alpha[c] == 0.0 and rows.kind[c] < LAW_RUBBING and rows.kind[c] != NO_LAW
@@ -216,23 +228,22 @@ def forget_swings(contacts: Any, now: float) -> None:
 
 
 @phase
-def begin_swings(contacts: Any, bodies: Any, step: Step) -> None:
-    """Slopes of the forces of closed contacts in a sub-step, and mean gaps without all forces.
+def begin_swings(contacts: Any, bodies: Any, step: Step, swing: bool) -> None:
+    """Slopes of the forces of closed contacts in a sub-step, and mean ways without all forces.
 
     The slope in the middle of the way that is ahead at the last speed.
     """
     rows, state, trial = contacts.rows, contacts.state, contacts.trial
     for c in range(rows.interfaces):
-        trial.stiffness[c] = 0.0
-        if state.since[c] < np.inf and state.far[c] == 0.0:
+        trial.stiffness[c] = trial.rise[c] = 0.0
+        if swing and state.since[c] < np.inf and state.far[c] == 0.0:
             series, deep = rows.series[c], -(state.gap[c] + state.e[c])
             k = _stiffness(contacts, c, deep)
             ahead = -0.5 * state.rate[c] * step.H / (1.0 + k * series)
             k = _stiffness(contacts, c, max(deep + ahead, 0.5 * deep))
             trial.stiffness[c] = k / (1.0 + k * series)
-            for port in (rows.upper[c], rows.lower[c]):
-                if port < bodies.ports:
-                    watch_average(bodies, step.level, step.rate, port)
+    if swing:
+        watch_averages(bodies, step.level, step.rate)
 
 
 @phase
@@ -266,7 +277,8 @@ def swings_hold(contacts: Any, length: float) -> bool:
         force = trial.contact[c]
         if state.since[c] < np.inf:
             bend = abs(trial.stiffness[c] * trial.bow[c])
-            deeper = max(-state.gap[c], -trial.gap[c]) > _AS_HARD * state.deepest[c]
+            deep = 1.5 * max(trial.bow[c], 0.0) + max(-state.gap[c], -trial.gap[c])  # at a crest
+            deeper = deep > _AS_HARD * state.deepest[c]
             holds = holds and trial.stiffness[c] > 0.0 and abs(trial.rise[c]) <= force
             holds = holds and bend <= (_CREST if deeper else _BEND) * force
             if state.bend[c] < np.inf:
@@ -278,25 +290,16 @@ def swings_hold(contacts: Any, length: float) -> bool:
 
 
 @phase
-def end_swings(contacts: Any, S: Any, step: Step, first: bool) -> float:
-    """Take over how the forces of closed contacts changed in a sub-step.
-
-    Returns
-    -------
-    float [J]
-        Work of these changes on the bodies.
-    """
-    rows, state, trial, work = contacts.rows, contacts.state, contacts.trial, 0.0
+def end_swings(contacts: Any, step: Step, first: bool) -> None:
+    """Take over how the forces of closed contacts changed in a sub-step."""
+    rows, state, trial = contacts.rows, contacts.state, contacts.trial
     for c in range(rows.interfaces):
-        rise, was = trial.rise[c], state.bend[c]
+        was = state.bend[c]
         if trial.stiffness[c] == 0.0:
             continue
-        behind = rows.gap0[c] + S[Y0 + rows.upper[c]] - S[Y0 + rows.lower[c]] - state.gap[c]
-        work += rise * (trial.bow[c] + 0.5 * behind)
         state.bend[c] = trial.stiffness[c] * trial.bow[c] * step.rate * step.rate
         jerk = abs(state.bend[c] - was) * step.rate if was < np.inf else np.inf
         state.jerk[c] = jerk if first or state.jerk[c] == np.inf else max(state.jerk[c], jerk)
-    return work
 
 
 @phase
@@ -385,7 +388,7 @@ def _solve_interface(contacts: Any, bodies: Any, c: int, step: Step) -> None:
     rows, state, trial, S = contacts.rows, contacts.state, contacts.trial, bodies.at
     G, g0, k = rows.G[step.level * rows.interfaces + c], state.gap[c], trial.stiffness[c]
     gap_free = gap_between(rows, S, c) - G * trial.force[c]
-    mean, turned, more, average = 0.0, 0.0, 0.0, 0.0
+    mean, turned, more, average, softer = 0.0, 0.0, 0.0, 0.0, 1.0
     if k > 0.0:
         u, low, at = rows.upper[c], rows.lower[c], step.level * PORTS * PORTS
         turned = _opened(shift(bodies.Gr, at), u, low)
@@ -438,7 +441,7 @@ def _solve_interface(contacts: Any, bodies: Any, c: int, step: Step) -> None:
         g1 = trial.gap[c]
         trial.rise[c] = -k * (g1 - g0)
         change = 0.5 * (g0 + g1) - mean + k * more * (g1 - g0)
-        trial.bow[c] = (change - average * trial.contact[c]) / (1.0 + k * average)
+        trial.bow[c] = (change - average * (trial.contact[c] + trial.film[c])) / softer
         trial.contact[c] += k * trial.bow[c]
 
 
@@ -571,10 +574,9 @@ def may_touch(contacts: Any, H: float) -> bool:
     may = False
     for c in range(rows.interfaces):
         if state.far[c] == 0.0:
-            if abs(state.gap[c]) <= 3.0 * abs(state.rate[c]) * H or state.pulled[c] != 0.0:
-                may = True
-            if state.force[c] < -HELD * rows.suction[c]:
-                may = True
+            between = abs(state.gap[c] + state.e[c])
+            may = may or between <= 3.0 * abs(state.rate[c]) * H or state.film_before[c] != 0.0
+            may = may or state.pulled[c] != 0.0 or state.force[c] < -HELD * rows.suction[c]
     return may
 
 
@@ -586,7 +588,7 @@ def contacts_hold(contacts: Any) -> bool:
     for c in range(rows.interfaces):
         if (state.since[c] < np.inf) != (trial.contact[c] > 0.0):
             holds = False
-        if (state.pulled[c] != 0.0) != _pulls(contacts, c):
+        if (state.pulled[c] != 0.0) != _pulls(contacts, c) or state.film_before[c] != 0.0:
             holds = False
     return holds
 

@@ -6,7 +6,8 @@ One macro step ``H = M h`` while elements and fluid are slow beside it:
 2. **Act**: modes move exactly; contacts, films and dry friction find their mean forces.  Far apart
    or at rest, in one step of ``H``; while closed contacts swing, in one or a few in which their
    forces rise or fall; else in sub-steps of a few fine ones ``h``, or of one where films change
-   fast.  A sub-step in which a contact closes or opens is cut into parts.
+   fast; the force of a closed elastic contact rises or falls in them as well.  A sub-step in which
+   a contact closes or opens is cut into parts.
 3. **Answer**: elements, pressures and lines are asked once, for the motion of their ports.
 4. **Repair**: what the guess missed of their forces acts as if it had acted all the time.  Modes
    are linear, so that is exact.  Elements, fluid and interfaces see the displacement ``d`` that it
@@ -37,7 +38,6 @@ from klack.simulation.network_arrays import (
     NEAR,
     PARTS,
     PORTS,
-    WITHIN,
     Accounts,
     Bodies,
     Contacts,
@@ -76,6 +76,7 @@ from klack.simulation.network_interfaces import (
     push_by_rise,
     smooth_films,
     solve_interfaces,
+    stay_closed,
     swings_follow,
     swings_hold,
     take_back_interfaces,
@@ -87,6 +88,7 @@ from klack.simulation.network_ports import (
     begin_ports,
     bring,
     catch_up,
+    count_rise,
     drive_bodies,
     end_ports,
     end_sub_step,
@@ -106,7 +108,6 @@ from klack.simulation.network_ports import (
     respace_forces,
     row_length,
     take_back_ports,
-    turn_bodies,
     turn_ports,
     turn_ports_by_all,
 )
@@ -171,7 +172,7 @@ class _Way(NamedTuple):
     parts: int  # sub-steps
     whole: bool  # nothing that acts can be cut, so that the free motion is asked once
     flight: bool
-    swing: bool  # contacts stay closed, and their forces change within sub-steps
+    swing: bool  # longer sub-steps: contacts stay closed, and their forces change within them
 
 
 class _Loop(NamedTuple):
@@ -457,7 +458,7 @@ def _act(
     a status: ``STATUS_FORCES`` where contacts do not settle in a fine step.
     """
     bodies, contacts, sliding = loop.bodies, loop.contacts, loop.sliding
-    parts, whole, swing = way.parts, way.whole, way.swing
+    parts, whole, swing = way.parts, way.whole, False
     move = first or not whole
     done, cut, kept = 0, 0, False
     all_parts = PARTS * sub.steps
@@ -468,7 +469,13 @@ def _act(
             now = Step(CUT, 0, now.t + (all_parts - cut) * H, H, sub.rate * all_parts)
         elif move:
             keep_dissipation(contacts)
-            kept = not whole and not swing
+            turned = swing
+            swing = way.swing
+            if parts > 1 and bodies.driven == 0:
+                swing = swing or stay_closed(contacts, now.H)
+            if swing or turned:
+                bring(bodies, now.level, now.level)
+            kept = not whole and not way.swing
             kept = kept and (now.level == FINE or may_touch(contacts, now.H))
             if kept:
                 keep_for_cut(bodies, now.level)
@@ -476,9 +483,7 @@ def _act(
         if move:
             if bodies.driven > 0:
                 drive_bodies(bodies, now.level, now.t, now.H)
-            if swing:
-                bring(bodies, now.level, now.level)
-                begin_swings(contacts, bodies, now)
+            begin_swings(contacts, bodies, now, swing)
             move_free(bodies, now.level)
             begin_sub_sliders(sliding, bodies, now.level)
         late = 0.0
@@ -496,19 +501,21 @@ def _act(
             return STATUS_FORCES if fine else STATUS_REFUSED
         if way.flight and not coarse_step_holds(contacts):
             return STATUS_MET
-        if swing and not swings_hold(contacts, now.H):
+        if way.swing and not swings_hold(contacts, now.H):
             return STATUS_MET
-        if (way.flight or swing or now.level == MIDDLE) and not sliders_hold(sliding):
+        if (way.flight or way.swing or now.level == MIDDLE) and not sliders_hold(sliding):
             return STATUS_MET
         if not whole and cut == 0 and not contacts_hold(contacts):
             if not kept:
                 return STATUS_MET
             begin_cut(bodies, sub.level)
             begin_cut_contacts(contacts)
-            cut = all_parts
+            cut, swing = all_parts, False
             continue
         begins = done == 0 and (cut == 0 or cut == all_parts)
-        worked = end_swings(contacts, bodies.at, now, begins) if swing else 0.0
+        if swing:
+            end_swings(contacts, now, begins)
+            count_rise(bodies, now.level, 1.0 / parts)
         end_interfaces(
             contacts,
             bodies,
@@ -521,9 +528,6 @@ def _act(
         )
         end_sliders(sliding, now, begins, loop.accounts, _slider_sums(loop))
         end_sub_step(bodies, late)
-        if swing:
-            turn_bodies(bodies, now.level)
-            bodies.at[WITHIN] -= worked
         if cut == 0:
             done += 1
         else:

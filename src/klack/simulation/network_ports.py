@@ -14,6 +14,7 @@ from klack.simulation.modal_step import (
     ROW_V,
     advance,
     apply_forces,
+    apply_rising,
     average,
     copy_state,
     kick,
@@ -61,6 +62,7 @@ __all__ = [
     "begin_ports",
     "bring",
     "catch_up",
+    "count_rise",
     "drive_bodies",
     "drive_force",
     "end_ports",
@@ -84,10 +86,9 @@ __all__ = [
     "respace_forces",
     "row_length",
     "take_back_ports",
-    "turn_bodies",
     "turn_ports",
     "turn_ports_by_all",
-    "watch_average",
+    "watch_averages",
 ]
 
 
@@ -109,7 +110,7 @@ def begin_ports(bodies: Any) -> None:
     """Begin a run: no force is pending."""
     S = bodies.at
     for i in range(row_length(bodies)):
-        S[PENDING + i] = 0.0
+        S[PENDING + i] = S[TURN + i] = 0.0
 
 
 @phase
@@ -128,16 +129,22 @@ def _copy_state(bodies: Any, source: int, target: int) -> None:
 @phase
 def bring(bodies: Any, source: int, target: int) -> None:
     """Bring the modes from one step size to another, with the pending forces."""
-    S, pending = bodies.at, False
+    S, pending, turning = bodies.at, False, False
     for p in range(bodies.ports):
-        pending = pending or S[PENDING + p] != 0.0
+        turning = turning or S[TURN + p] != 0.0
+        pending = pending or turning or S[PENDING + p] != 0.0
     if pending:
         for k in range(bodies.blocks):
             port0, port1 = bodies.port0[k], bodies.port1[k]
             block = block_of(bodies, k, source)
-            apply_forces(block, bodies.modes[k], shift(S, PENDING), port0, port1)
+            if turning:
+                apply_rising(
+                    block, bodies.modes[k], shift(S, PENDING), shift(S, TURN), port0, port1
+                )
+            else:
+                apply_forces(block, bodies.modes[k], shift(S, PENDING), port0, port1)
         for i in range(row_length(bodies)):
-            S[PENDING + i] = 0.0
+            S[PENDING + i] = S[TURN + i] = 0.0
     if target != source:
         _copy_state(bodies, source, target)
 
@@ -174,7 +181,7 @@ def begin_cut(bodies: Any, level: int) -> None:
     for k in range(bodies.blocks):
         _kick_block(bodies, k, CUT, level, PENDING, ROW_B1)
     for i in range(row_length(bodies)):
-        S[PENDING + i] = 0.0
+        S[PENDING + i] = S[TURN + i] = 0.0
 
 
 @phase
@@ -196,6 +203,7 @@ def take_back_ports(bodies: Any, level: int, kept: bool) -> None:
         S[Y0 + i] = S[BEGIN + i]
         S[WORK + i] = S[WORK_BEGIN + i]
         S[PENDING + i] = S[PENDING_BEGIN + i]
+        S[TURN + i] = 0.0
     S[WITHIN] = S[WITHIN_BEGIN]
     if kept:
         _copy_state(bodies, _kept_at(level), level)
@@ -298,21 +306,22 @@ def turn_ports(bodies: Any, level: int) -> None:
 
 @phase
 def turn_ports_by_all(bodies: Any, level: int) -> None:
-    """Add what the rise of all forces does in a sub-step with a swinging contact."""
+    """Add what the rise of all forces does in a sub-step."""
     S = bodies.at
     for p in range(bodies.ports):
         S[Y1 + p] += _turned(bodies, level, p, TURN)
 
 
 @phase
-def watch_average(bodies: Any, level: int, rate: float, port: int) -> None:
-    """Mean displacement of a port in free motion; before the modes move, no force is pending."""
-    total = 0.0
+def watch_averages(bodies: Any, level: int, rate: float) -> None:
+    """Mean displacements of ports in free motion; before the modes move, no force is pending."""
+    S = bodies.at
+    for p in range(bodies.ports):
+        S[AVERAGE + p] = 0.0
     for k in range(bodies.blocks):
-        if bodies.port0[k] <= port < bodies.port1[k]:
-            row = FIXED_ROWS + port - bodies.port0[k]
-            total += average(block_of(bodies, k, level), bodies.modes[k], rate, row)
-    bodies.at[AVERAGE + port] = total
+        block, port0 = block_of(bodies, k, level), bodies.port0[k]
+        for p in range(port0, bodies.port1[k]):
+            S[AVERAGE + p] += average(block, bodies.modes[k], rate, FIXED_ROWS + p - port0)
 
 
 @phase
@@ -325,20 +334,18 @@ def mean_displacement(bodies: Any, level: int, port: int) -> float:
 
 
 @phase
-def turn_bodies(bodies: Any, level: int) -> None:
-    """Let the rise of all forces act in a sub-step that has ended; counted is all its work."""
+def count_rise(bodies: Any, level: int, share: float) -> None:
+    """Count the work of forces that rise over a sub-step, before it is accepted.
+
+    By parts that of a rise ``s`` is ``s ((y0 + y1)/2 - y_mean)``.  ``share`` of those of elements
+    and fluid over the macro step are in it, which count beside their mean forces.
+    """
     S = bodies.at
-    within = 0.0
     for p in range(bodies.ports):
-        work = S[PENDING + p] * _turned(bodies, level, p, TURN)
-        S[WORK + p] -= work
-        within -= work
-    bring(bodies, level, level)
-    for k in range(bodies.blocks):
-        energy = _kick_block(bodies, k, level, level, TURN, ROW_R1)
-        S[WORK + bodies.port0[k]] += energy
-        within += energy
-    S[WITHIN] += within
+        if S[TURN + p] != 0.0:
+            bow = 0.5 * (S[Y0 + p] + S[Y1 + p]) - mean_displacement(bodies, level, p)
+            S[WORK + p] += S[TURN + p] * bow
+            S[WITHIN] += share * S[RISE + p] * bow
 
 
 @phase

@@ -285,15 +285,14 @@ def simulate_network(
     for doubt in line_doubts(network, step * first_step):
         warnings.warn(doubt, AccuracyWarning, stacklevel=2)
     if network.moving is None:
-        longest = 1.5 * sizes.middle * step
-        for doubt in impact_doubts(result.events, result.interfaces, step, longest):
+        rising = _rising(network) if sizes.near > 1 else ()
+        for doubt in impact_doubts(result.events, result.interfaces, step, rising):
             warnings.warn(doubt, AccuracyWarning, stacklevel=2)
     if failure is not None:
         raise IncompleteRunError(str(failure), result) from failure
     scale = books.scale or 1.0
     owed = float(network.bodies.at[EXCESS])  # a small one is taken back by the next steps
-    if abs(owed) <= _BALANCE * scale:  # to which a watched run may not come
-        owed = 0.0 if watch is None else float(np.clip(books.residual, -abs(owed), abs(owed)))
+    owed = owed if abs(owed) > _BALANCE * scale else 0.0
     energy_balance.check_energy_balance(
         "simulate_network",
         (books.residual - owed) / scale,
@@ -724,6 +723,13 @@ def _changing(network: CompiledNetwork, clock: NDArray[np.int64]) -> dict[str, C
     if network.moving is not None:
         arrays |= {f"moving.{name}": array for name, array in network.moving.changing().items()}
     return {"clock": clock} | arrays
+
+
+def _rising(network: CompiledNetwork) -> list[str]:
+    """Stops whose force rises and falls within sub-steps while they are closed."""
+    faces, rows = network.interfaces, network.rows.interfaces
+    elastic = (faces.alpha == 0.0) & (faces.kind < LAW_RUBBING) & (network.bodies.driven == 0)
+    return [row.component for row, rises in zip(rows, elastic, strict=False) if rises]
 
 
 def _pressed_faces(network: CompiledNetwork) -> dict[str, PressedFaces]:
