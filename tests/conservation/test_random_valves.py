@@ -47,8 +47,9 @@ from klack.simulation.network_result import IncompleteRunError
 DRAWS = program("random_valves")
 
 # 4, 16: plain ones; 58, 156, 227: no drop at a wide feed when the supply steps; 159: a needle
-# pressed on its seat with far more than what moves it
-SAMPLE = (*range(14), 58, 156, 159, 227)
+# pressed on its seat with far more than what moves it; 601: thick oil in a film, which feels the
+# round-off of its gap
+SAMPLE = (*range(14), 58, 156, 159, 227, 601)
 
 # 300, 1076: a preloaded needle that ends between two steps; 262, 726: a film that pulls; 195: a
 # dashpot that has let go of its stop, which is still compressed

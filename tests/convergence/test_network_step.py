@@ -70,7 +70,7 @@ def test_long_steps_are_cut_where_the_fluxes_bend():
 
 def test_flux_work_and_supply_converge():
     """Uncut steps have order two; the error allowed of cut ones falls with the square."""
-    counts = np.array([400, 800, 1600, 3200])
+    counts = np.array([800, 1600, 3200, 6400])
     errors = np.abs(np.array([values(n) / values(128000) - 1.0 for n in counts]))
 
     orders = -np.polyfit(np.log(counts), np.log(errors), 1)[0]

@@ -352,8 +352,10 @@ def solve_interfaces(contacts: Any, sliding: Any, bodies: Any, G: Any, step: Ste
                 trial.force[c] += change
                 S[FORCE + u] += change
                 S[FORCE + low] -= change
-                moved = move_body(bodies, G, u, change, moved)
-                moved = move_body(bodies, G, low, -change, moved)
+                way = move_body(bodies, G, u, change, 0.0)
+                way = move_body(bodies, G, low, -change, way)
+                if way > _ROUND_OFF * abs(trial.gap[c]):  # of the gap, which a film feels
+                    moved = max(moved, way)
         moved = slip(sliding, bodies, G, step, sweep == 0, moved)
         left, work = slip_seen_late(sliding, S)
         distance, held = 0.0, 0.0
