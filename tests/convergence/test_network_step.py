@@ -65,18 +65,19 @@ def test_long_steps_are_cut_where_the_fluxes_bend():
     """Saturation, switchings, eddy currents; uncut, the supply is 30 times as far off."""
     errors = np.abs(values(156) / values(128000) - 1.0)  # steps of 1.28 us
 
-    assert np.all(errors < [1e-4, 3e-4, 3e-4])
+    assert np.all(errors < [4e-5, 2e-4, 1e-4])
 
 
 def test_flux_work_and_supply_converge():
     """Uncut steps have order two; the error allowed of cut ones falls with the square."""
-    counts = np.array([800, 1600, 3200, 6400])
+    counts = np.array([400, 800, 1600, 3200])
     errors = np.abs(np.array([values(n) / values(128000) - 1.0 for n in counts]))
 
     orders = -np.polyfit(np.log(counts), np.log(errors), 1)[0]
 
-    # switchings fall anywhere inside the steps: the constant wobbles, the order does not
-    assert np.all(orders > 1.3)
+    # switchings fall anywhere inside the steps: the constant wobbles; the longest are cut as finely
+    # as those of 0.32 us, so that the order looks lower than it is
+    assert np.all(orders > 1.1)
     assert np.all(errors[-1] < 2.5e-6)  # uncut steps of 62.5 ns: 2e-6 to 1.3e-5
 
 
