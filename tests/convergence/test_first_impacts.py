@@ -273,6 +273,31 @@ def test_a_touch_is_cut_where_everything_goes_in_fine_steps():
     assert force == pytest.approx(truth[1], abs=1.7 * 1.5 * part)  # it rises by 1.7 N a ns
 
 
+@pytest.mark.parametrize("place", [0.0, 0.6e-9, 17.6e-9], ids=["a", "b", "c"])
+def test_a_touch_behind_a_compliance_is_cut_wherever_it_falls(place):
+    """A film presses the compliance: faces touch at gap + compression 0, long after gap 0.
+
+    The parts last until the force of the film has gone over to that of the contact.
+    """
+    film = FilmRow(cubic=1e-16, linear=0.0, cut_off=0.5e-6, suction=1e9)
+    parts: dict[str, Component] = {
+        "needle": RigidMass(mass=2e-4, points=("tip",), speed=-2.0),
+        "seat": EndStop(
+            gap=10e-6 + 2.0 * place,
+            law={"kind": "linear", "stiffness": 1.5e9},
+            series_compliance=1e-9,
+        ),
+    }
+    of = Network(parts, [["needle.tip", "seat.upper"], ["seat.lower", "ground"]]).rows()
+    of = replace(of, interfaces=[replace(of.interfaces[0], film=film)])
+    run = simulate_network(of, duration=8e-6, coarse=1, step=20e-9, start="free")
+
+    record = run.interfaces["seat"]
+    k = int(np.flatnonzero(record.contact_force > 0.0)[0])
+    assert record.gap[k - 1] < -50e-9
+    assert record.step[k : k + 2] == pytest.approx(20e-9 / PARTS, rel=1e-9)
+
+
 def test_a_mass_under_a_force_that_rises_flies_as_far_as_it_should():
     """Exact: a cubic parabola; forces constant over a step would be off by 6e-5 of it.
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from klack.mechanics.end_stop import EndStop
 from klack.mechanics.flexible_body import FlexibleBody
 from klack.mechanics.force import ForceOverTime
+from klack.mechanics.rigid_mass import RigidMass
 from klack.network.component import Component
 from klack.network.network import Network
 from klack.simulation.bodies import rod_body
@@ -68,6 +69,22 @@ def test_two_modes_on_a_linear_spring_swing_exactly_but_for_a_fourth_order(serie
         errors.append(np.abs(way - swings @ found)[late].max() / np.ptp(way))
     assert errors[0] < 2e-5
     assert errors[1] < errors[0] / 12.0  # 16 in short steps
+
+
+def test_a_mass_rebounds_when_it_must():
+    """Exact: half a sine.  A mean force in sub-steps of 80 ns keeps it closed for 0.5 ns more."""
+    mass, stiffness, speed, gap = 2e-3, 2e8, 1.0, 10e-6
+    parts: dict[str, Component] = {
+        "mass": RigidMass(mass=mass, points=("tip",), speed=-speed),
+        "stop": EndStop(gap=gap, law={"kind": "linear", "stiffness": stiffness}),
+    }
+    nodes = [["mass.tip", "stop.upper"], ["stop.lower", "ground"]]
+    result = simulate_network(Network(parts, nodes).rows(), duration=40e-6, start="free")
+
+    leaves = gap / speed + np.pi * np.sqrt(mass / stiffness)
+    late = result.time[-1] - (result.channels["mass.tip displacement"].values[-1] + gap) / speed
+    assert result.steps.sub_fine == 0
+    assert late == pytest.approx(leaves, abs=0.05e-9)
 
 
 @pytest.mark.parametrize(
