@@ -297,7 +297,7 @@ def _work(points: ContactPoints, before: Vector, step: Step) -> tuple[float, flo
 @inner
 def _start(
     modes: Modes, outside: Outside, bore: Guide | None, films: Films | None, n: int, rubs: int
-) -> Step:
+) -> tuple[Step, GuideRub]:
     """Room for a step, the answer of the spring, and how much drag brakes the shaft."""
     M, guides = len(modes.push), 0
     work = None
@@ -312,7 +312,7 @@ def _start(
                 for i in range(M):
                     yields = abs(bore.slide[k, i] * bore.slide[j, i] * modes.B2[i])
                     dragging[k] += bore.viscous[j] * yields
-    return Step(
+    step = Step(
         _spring_share(modes.B1, modes.push, outside.spring),
         np.empty(M),
         np.empty(M),
@@ -333,6 +333,7 @@ def _start(
         np.empty(n if rubs else 0),
         work,
     )
+    return step, no_rub(guides, M)
 
 
 @sums
@@ -778,11 +779,8 @@ def march(
     record
         Out, for at least ``steps`` steps.
     """
-    step = _start(modes, outside, bore, films, len(points.gap), len(state.rubbing.across))
-    heights = 0
-    if bore is not None:
-        heights = len(bore.clearance)
-    guide = no_rub(heights, len(modes.push))
+    n, rubs = len(points.gap), len(state.rubbing.across)
+    step, guide = _start(modes, outside, bore, films, n, rubs)
     return _advance(steps, wait, modes, outside, points, bore, films, state, record, step, guide)
 
 
@@ -1064,7 +1062,9 @@ def march_near(
         record.lands,
         record.places,
     )
-    _, status = march(steps, 0, modes, outside, some, bore, _films_at(films, index), here, into)
+    squeezed = _films_at(films, index)
+    step, guide = _start(modes, outside, bore, films, m, 0)
+    _, status = _advance(steps, 0, modes, outside, some, bore, squeezed, here, into, step, guide)
     state.lam[:] = 0.0
     contact.active[:] = False
     record.points[:] = 0.0

@@ -48,7 +48,7 @@ from klack.simulation.phase import (
 from klack.simulation.propagator import modal_propagator
 from klack.simulation.rest import longest_period
 from klack.simulation.spatial_impact import SpatialImpact, SpatialPath
-from klack.simulation.spatial_step import answer_step, begin_step, end_step
+from klack.simulation.spatial_step import BEGINS, ENDS, Stage, spatial_step
 from klack.simulation.step_sizes import StepSizes
 from klack.transient.impact_recorder import ImpactRecorder, StopRecord, film_lands
 from klack.transient.interface_arrays import (
@@ -278,11 +278,9 @@ class _Moving:
         self.fresh = True
         self.way = np.zeros(model.mode_count)
         self.records: dict[tuple[int, bool], Record] = {}
-        self.begin_step, self.answer_step, self.end_step, self.safe_flight, self.part = (
-            of_one_kind(each)
-            for each in (begin_step, answer_step, end_step, safe_flight, film_changes)
+        self.network_step, self.safe_flight, self.part, self.repair = (
+            of_one_kind(each) for each in (spatial_step, safe_flight, film_changes, repair)
         )
-        self.repair = of_one_kind(repair)
         self.march = of_one_kind(march), of_one_kind(march)  # without points and with them
         self.march_near, self.margin = of_one_kind(march_near), _MARGIN
         if not model.ways:
@@ -646,7 +644,9 @@ class _Moving:
         h, steps, arrays = self.sizes.step, self.steps[level], self.arrays
         t, H = float(clock[0]) * h, steps * h
         last = self._length(int(clock[1]), steps)
-        self.begin_step(steps, steps / last, t, H, self.fresh, arrays, scratch)
+        stage = Stage(BEGINS, level, steps, t, H, steps / last, self.fresh)
+        bundles = arrays, run.recording, scratch, report
+        self.network_step(stage, *bundles)
         self.fresh = False
         rest = points and level == COARSE
         count, modes = (1, self.whole) if rest else self._parts(steps, H, points)
@@ -679,7 +679,7 @@ class _Moving:
             record_ = found
             at[Y1 : Y1 + here] = self.P.T @ self.q
             self.sides.place(0.5 * (begun + self.q))
-            status = self.answer_step(level, steps, attempt, t, H, arrays, scratch, report)
+            status = self.network_step(stage._replace(attempt=attempt), *bundles)
             if status != STATUS_REPEAT:
                 break
         if status in (STATUS_REPEAT, STATUS_REFUSED):
@@ -701,7 +701,8 @@ class _Moving:
         if level == NEAR:
             clock[5] += steps
             clock[6] += steps
-        self.end_step(steps, H, excess, record, record_time, arrays, run.recording, scratch)
+        ended = Stage(ENDS, level, steps, t, H, 1.0, False, excess, record, record_time)
+        self.network_step(ended, *bundles)
         return STATUS_DONE
 
     def _parts(self, steps: int, H: float, points: bool) -> tuple[int, Modes]:

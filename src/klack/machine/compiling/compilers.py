@@ -1,4 +1,4 @@
-"""How numba compiles klack's functions: its own steps, with three of their costs left out.
+"""How numba compiles klack's functions: its own steps, with four of their costs left out.
 
 - numba compares the options of a function with those of every one before, one by one: a tenth of
   all compiling.
@@ -6,6 +6,8 @@
   again: another tenth.
 - Inner functions, which only compiled ones call, become machine code on their own, and again in
   each function that they are linked into.
+- They are optimised on their own, and again in each function that they are linked into, though most
+  stay what they are: too long to be taken into their caller.
 """
 
 import gc
@@ -14,7 +16,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import llvmlite.binding as llvm
-from numba.core.codegen import CPUCodeLibrary
+from numba.core.codegen import CPUCodeLibrary, JITCodeLibrary
 from numba.core.compiler import Compiler, CompileResult, Flags
 
 __all__ = ["EntryCompiler", "InnerCode", "InnerCompiler"]
@@ -23,16 +25,63 @@ __all__ = ["EntryCompiler", "InnerCode", "InnerCompiler"]
 _KIND = "klack inner"
 
 
-class InnerCode(CPUCodeLibrary):
-    """A function and all that it calls, for linking into other functions.
+_SHORT = 100
+"""Instructions beyond its arguments up to which LLVM may take a function into its callers."""
+
+
+class _Code(CPUCodeLibrary):
+    """A function, and optimised ones that it calls, which it is not optimised with."""
+
+    def __init__(self, codegen: Any, name: str) -> None:
+        super().__init__(codegen, name)
+        self._beside: dict[str, Any] = {}  # each after its callers: LLVM links what is called
+
+    def add_linking_library(self, library: Any) -> None:
+        """Take in a library that the function calls."""
+        if not isinstance(library, InnerCode):
+            super().add_linking_library(library)
+            return
+        library._ensure_finalized()
+        for name, module in library.parts():
+            self._beside.pop(name, None)
+            self._beside[name] = module
+        if library.is_short:
+            super().add_linking_library(library)
+        else:
+            self._reload_init.update(library._reload_init)
+            self._dynamic_globals += library._dynamic_globals
+
+
+class EntryCode(_Code, JITCodeLibrary):
+    """Machine code of a function and all that it calls."""
+
+    def _optimize_final_module(self) -> None:
+        super()._optimize_final_module()
+        for module in self._beside.values():
+            self._final_module.link_in(module, preserve=True)
+
+
+class InnerCode(_Code):
+    """A function for linking into other functions.
 
     numba takes it for a library of machine code; what it asks only of those has no effect.
     """
 
-    def serialize_using_object_code(self) -> tuple[str, str, bytes]:
+    is_short = True
+    """Whether it is to be optimised with its callers."""
+
+    def parts(self) -> Iterator[tuple[str, Any]]:
+        """Modules by name that its callers are not optimised with."""
+        if not self.is_short:
+            yield self._symbol, self._get_module_for_linking()
+        yield from self._beside.items()
+
+    def serialize_using_object_code(self) -> tuple[str, str, Any]:
         """Name, kind and content, as numba stores them."""
         self._ensure_finalized()
-        return self.name, _KIND, self._get_module_for_linking().as_bitcode()
+        beside = {name: module.as_bitcode() for name, module in self._beside.items()}
+        own = self._get_module_for_linking().as_bitcode()
+        return self.name, _KIND, (own, beside, self.is_short, self._symbol)
 
     @staticmethod
     def is_stored_in(state: tuple[Any, ...]) -> bool:
@@ -46,7 +95,9 @@ class InnerCode(CPUCodeLibrary):
         for prepare in reload_init:
             prepare()
         library = cls(target_context.codegen(), name)
-        library._final_module = llvm.parse_bitcode(content)
+        own, beside, library.is_short, library._symbol = content
+        library._final_module = llvm.parse_bitcode(own)
+        library._beside = {part: llvm.parse_bitcode(code) for part, code in beside.items()}
         library._reload_init.update(reload_init)
         library._finalize_final_module()
         return CompileResult(
@@ -93,6 +144,12 @@ class InnerCode(CPUCodeLibrary):
                 passes.run(self._final_module, builder)
             case passes:  # LLVM 14, of numba 0.60
                 passes.run(self._final_module)
+        (own,) = filter(_is_new, self._final_module.functions)
+        lines, arguments = str(own).count("\n"), len(list(own.arguments))
+        self._symbol = own.name
+        self.is_short = b"alwaysinline" in b" ".join(own.attributes) or (
+            lines <= arguments + _SHORT
+        )
 
     def _finalize_final_module(self) -> None:
         self._finalize_dynamic_globals()
@@ -108,6 +165,11 @@ class _Options(Flags):
         return bool(super().__eq__(other))
 
     __hash__ = Flags.__hash__
+
+
+def _is_new(function: Any) -> bool:
+    """Whether a module defines a function, and has not linked it in."""
+    return not function.is_declaration and function.linkage == llvm.Linkage.external
 
 
 class EntryCompiler(Compiler):
@@ -126,8 +188,13 @@ class EntryCompiler(Compiler):
         options = _Options(flags)
         super().__init__(typingctx, targetctx, library, args, return_type, options, locals)
 
+    code: type[_Code] = EntryCode
+
     def compile_extra(self, func: Callable[..., Any]) -> Any:
         """Compile a plain function."""
+        if self.state.library is None:
+            self.state.library = self.code(self.state.targetctx.codegen(), func.__qualname__)
+            self.state.library.enable_object_caching()
         with _uncollected():
             return super().compile_extra(func)
 
@@ -135,10 +202,7 @@ class EntryCompiler(Compiler):
 class InnerCompiler(EntryCompiler):
     """Compiler of functions that only compiled ones call."""
 
-    def compile_extra(self, func: Callable[..., Any]) -> Any:
-        """Compile as far as callers need."""
-        self.state.library = InnerCode(self.state.targetctx.codegen(), func.__qualname__)
-        return super().compile_extra(func)
+    code = InnerCode
 
 
 @contextmanager
