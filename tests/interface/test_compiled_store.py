@@ -134,6 +134,53 @@ def test_an_inner_function_from_the_store_is_linked_into_a_new_caller(compiled_p
     assert end(start(program)) == [8.0, 1, []]
 
 
+LONG = """
+from klack.machine.compiling.jit import inner
+
+@inner
+def long(x):
+    y = 0.0
+{lines}    return y
+
+@inner
+def short(x):
+    return long(x) + 1.0
+
+@inner
+def part(x):
+    y = short(x) - long(x + 1.0)
+{lines}    return y
+"""
+LENGTHS = """
+from klack.machine.compiling.compilers import InnerCode
+found = {}
+plain = InnerCode.serialize_using_object_code
+def noted(self):
+    stored = plain(self)
+    found[self.name] = self.is_short
+    return stored
+InnerCode.serialize_using_object_code = noted
+"""
+
+
+@pytest.mark.slow
+def test_long_inner_functions_are_optimised_without_their_callers(program):
+    """They are linked in beside them, also from the store; truth: plain Python."""
+    lines = "".join(f"    if x > {k}.5:\n        y = x * y - {k}.25\n" for k in range(60))
+    text = LONG.format(lines=lines)
+    plain: dict = {"inner": lambda function: function}
+    exec(text[text.index("@inner") :], plain)
+    script = (program / "run.py").read_text().replace("import calls\n", LENGTHS + "import calls\n")
+    script = script.replace("[str(one.message) for one in said]", "found")
+    shorts = {"long": False, "short": True, "part": False}
+    for added, compiled, found in ((1.0, 4, shorts), (3.0, 1, {})):
+        write(program, added=added)
+        (program / "called.py").write_text(text)
+        (program / "run.py").write_text(script)
+        value = pytest.approx(plain["part"](2.0) + added, rel=1e-12)
+        assert end(start(program)) == [value, compiled, found]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("kinds", ["float, float", "float, int"])
 def test_fields_that_change_places_are_other_code(program, kinds):
