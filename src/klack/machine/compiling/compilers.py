@@ -45,11 +45,10 @@ class _Code(CPUCodeLibrary):
         for name, module in library.parts():
             self._beside.pop(name, None)
             self._beside[name] = module
+        self._reload_init.update(library._reload_init)
+        self._dynamic_globals += library._dynamic_globals
         if library.is_short:
             super().add_linking_library(library)
-        else:
-            self._reload_init.update(library._reload_init)
-            self._dynamic_globals += library._dynamic_globals
 
 
 class EntryCode(_Code, JITCodeLibrary):
