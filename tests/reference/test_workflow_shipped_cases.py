@@ -61,6 +61,7 @@ def study_of(name: str, *levels: str, certify: bool = False) -> ImpactStudy:
 
 def test_all_shipped_cases_are_tested():
     assert set(shipped_cases()) == {
+        "demo-mounted",  # in test_in_machine.py
         "demo-shots",
         "demo-stroke",  # in test_workflow_shipped_cases.py
         "demo-valve",
