@@ -16,6 +16,7 @@ from klack.analyses.noise.record import (
     InSituFreedom,
     InterfaceFreedom,
     MountFreedom,
+    MountSource,
     NoiseDesign,
     PathSound,
     StopForce,
@@ -37,6 +38,7 @@ __all__ = [
 ]
 
 _THEORY, _SOUND = "theory/noise", "theory/sound"
+_COUPLING = "theory/structure-borne-source"
 _AUDIBLE = 20e3  # [Hz]
 _NOTHING = 1e-10  # of the square of a reference
 
@@ -153,6 +155,74 @@ def _of_design(measure: Measure[SoundStatistics]) -> Measure[NoiseDesign]:
 
 _OF_DESIGNS = tuple(map(_of_design, CLICK_MEASURES))
 EXPOSURE_LEVEL_A = _OF_DESIGNS[0]
+
+
+def _mounted(
+    read: Callable[[MountSource], float], reference: float
+) -> Callable[[NoiseDesign], Value]:
+    def level(design: NoiseDesign) -> Value:
+        if design.at_mounts is None:
+            return None
+        found = read(design.at_mounts)
+        return 10.0 * log10(found / reference**2) if found > 0.0 else None
+
+    return level
+
+
+_AT_MOUNTS: tuple[Measure[NoiseDesign], ...] = tuple(
+    Measure(
+        key=key,
+        name=name,
+        symbol=symbol,
+        unit="dB",
+        definition=definition,
+        source=_COUPLING,
+        read=_mounted(read, reference),
+        form="fixed",
+        digits=1,
+        deviation="difference",
+        page=True,
+    )
+    for key, name, symbol, definition, read, reference in (
+        (
+            "mount_velocity_level",
+            "free velocity at all mounts",
+            "L_vf",
+            "Exposure of one click, ∫ v² dt to 20 kHz, over all directions of all free mounts, re "
+            "(1 nm/s)² s.",
+            lambda source: source.along(lambda item: item.velocity_bands),
+            VELOCITY_REFERENCE,
+        ),
+        (
+            "mount_force_level",
+            "blocked force at all mounts",
+            "L_Fb",
+            "Exposure of one click, ∫ F² dt to 20 kHz, over all directions of all held mounts, re "
+            "(1 µN)² s.",
+            lambda source: source.along(lambda item: item.force_bands),
+            FORCE_REFERENCE,
+        ),
+        (
+            "equivalent_force_level",
+            "equivalent blocked force (EN 15657)",
+            "L_Fb,eq",
+            "Exposure of one click to 20 kHz of the single force that gives a concrete reception "
+            "plate of 100 mm the same power, re (1 µN)² s.",
+            lambda source: source.equivalent_force,
+            FORCE_REFERENCE,
+        ),
+        (
+            "equivalent_velocity_level",
+            "equivalent free velocity (EN 15657)",
+            "L_vf,eq",
+            "Exposure of one click to 20 kHz of the single free velocity that gives a steel "
+            "reception plate of 0.3 mm the same power, re (1 nm/s)² s.",
+            lambda source: source.equivalent_velocity,
+            VELOCITY_REFERENCE,
+        ),
+    )
+)
+"""Single numbers of the source at its mounts; none without."""
 DESIGN_MEASURES: tuple[Measure[NoiseDesign], ...] = described_in(
     _THEORY,
     Measure(
@@ -335,6 +405,7 @@ DESIGN_MEASURES: tuple[Measure[NoiseDesign], ...] = described_in(
         deviation="factor",
         page=True,
     ),
+    *_AT_MOUNTS,
     Measure(
         key="valid_from",
         symbol="f_1",
@@ -497,7 +568,6 @@ MOUNT_MEASURES: tuple[Measure[MountFreedom], ...] = described_in(
     ),
 )
 
-_COUPLING = "theory/structure-borne-source"
 INTERFACE_MEASURES: tuple[Measure[InterfaceFreedom], ...] = described_in(
     _COUPLING,
     Measure(

@@ -8,11 +8,12 @@ import numpy as np
 from klack.acoustics.at_mounts import source_at_mounts, spectra_of_means
 from klack.acoustics.interface import Complexes, InterfacePoint, SourceAtMounts
 from klack.acoustics.source_files import write_netcdf, write_uff
-from klack.acoustics.source_levels import exposure
+from klack.acoustics.source_levels import exposure, single_equivalents
 from klack.analyses.noise.reactions import HeldForces
 from klack.analyses.noise.record import MountFreedom, MountSource, NoiseStudy
 from klack.arrays import Vector
 from klack.bodies.reduction.structure import Structure
+from klack.errors import InputError
 
 __all__ = ["lowest_band", "mount_source", "source_of", "write_sources"]
 
@@ -53,6 +54,15 @@ def mount_source(structures: Sequence[Structure], held: HeldForces) -> MountSour
     frequency = apart * np.arange(1, int(top / apart + 1e-9) + 1)
     source = source_of(structures, held)(frequency, 0.0)
     position = {point.name: point.position for point in source.points}
+    lowest = max(apart, 15.0)
+    try:
+        plates = single_equivalents(source)
+        numbers = [
+            float(exposure(frequency, values, low=lowest).energy.sum())
+            for values in (plates.force, plates.velocity)
+        ]
+    except InputError:
+        numbers = [float("nan")] * 2
     return MountSource(
         frequency=frequency,
         freedoms=tuple(
@@ -73,6 +83,8 @@ def mount_source(structures: Sequence[Structure], held: HeldForces) -> MountSour
         balance=held.unbalanced / max(held.largest, 1e-300),
         repaid=held.repaid / max(held.largest, 1e-300),
         entering=held.entering,
+        equivalent_force=numbers[0],
+        equivalent_velocity=numbers[1],
     )
 
 

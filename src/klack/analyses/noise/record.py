@@ -221,6 +221,9 @@ class MountSource:
     repaid, entering [-], [N]
         Largest force that took back energy of macro steps, over the largest force; and largest
         change of what enters by columns of fluid, mouths and from outside.
+    equivalent_force, equivalent_velocity [N^2 s], [(m/s)^2 s]
+        Single numbers of EN 15657 to 20 kHz, z along the normal of its plates; nan where the mounts
+        are not in one plane across the axis.
     """
 
     frequency: Floats
@@ -230,6 +233,13 @@ class MountSource:
     balance: float
     repaid: float = 0.0
     entering: float = 0.0
+    equivalent_force: float = float("nan")
+    equivalent_velocity: float = float("nan")
+
+    def along(self, read: Callable[[MountFreedom], ThirdOctaves]) -> float:
+        """Sum over all directions, without rotations, and bands."""
+        own = [item for item in self.freedoms if item.name.split(".")[1] in ("x", "y", "z")]
+        return float(sum(read(item).energy.sum() for item in own))
 
     def source(self) -> SourceAtMounts:
         """As what couples with a receiver."""

@@ -44,6 +44,7 @@ from klack.simulation.network_result import ImpactEvent, NetworkResult
 __all__ = [
     "NoiseSource",
     "SourceStop",
+    "held_forces",
     "impact_sources",
     "load_sources",
     "net_force",
@@ -258,7 +259,7 @@ def stroke_sources(
                 given=given,
                 materials=materials,
                 net=net if net is None else before_impact(net, last),
-                held=_held(study, variant, noise, last),
+                held=held_forces(study, variant, noise, last),
                 speed=max((event.approach_speed for event in variant.result.events), default=0.0),
                 notes=(
                     *filter(None, [cut]),
@@ -271,9 +272,10 @@ def stroke_sources(
     return tuple(found)
 
 
-def _held(
+def held_forces(
     study: StrokeStudy, variant: StrokeVariant, noise: CaseNoise, last: ImpactEvent | None
 ) -> HeldForces | None:
+    """All forces on held bodies up to an impact in which the run ends; None without mounts."""
     if not noise.mounts:
         return None
     structures = _mounted(study, noise)

@@ -26,10 +26,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.analyses.noise.body import Transfers
-from klack.analyses.noise.force import first_part, stop_force
-from klack.analyses.noise.source import NoiseSource, net_force, stroke_sources
+from klack.analyses.noise.force import first_part, interrupted_impact, stop_force
+from klack.analyses.noise.reactions import HeldForces
+from klack.analyses.noise.source import NoiseSource, held_forces, net_force, stroke_sources
 from klack.analyses.sensitivities.parameters import SlopeSpace, VariedKey
-from klack.analyses.stroke.record import StrokeStudy
+from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
 from klack.analyses.stroke.run import (
     VariantRun,
     body_summaries,
@@ -50,6 +51,7 @@ from klack.errors import InputError
 from klack.machine.progress import Progress
 from klack.network.rows import Rows
 from klack.signals.sampled import TimeSeries
+from klack.simulation.network_result import NetworkResult
 from klack.simulation.network_run import has_python_steps
 from klack.simulation.tangent_numbers import Direction
 from klack.simulation.tangent_run import DIRECTIONS, TangentRun, compile_tangents, run_tangents
@@ -64,12 +66,14 @@ Floats = NDArray[np.float64]
 class MovedForces:
     """Forces behind the noise of a run, and their derivatives with one parameter.
 
-    ``stops`` and ``net`` [N per unit] are derivatives at the times of ``source``.
+    ``stops`` and ``net`` [N per unit] are derivatives at the times of ``source``; ``held`` gives
+    all forces on held bodies where the parameter has changed by an amount.
     """
 
     source: NoiseSource
     stops: Mapping[str, Floats]
     net: Floats | None
+    held: Callable[[float], HeldForces | None]
 
     def at(self, amount: float) -> NoiseSource:
         """Forces where the parameter has changed by an amount, to first order.
@@ -84,6 +88,7 @@ class MovedForces:
                 for stop in self.source.stops
             ),
             net=net if net is None or self.net is None else _added(net, amount, self.net),
+            held=self.held(amount),
         )
 
 
@@ -112,7 +117,51 @@ def moved_forces(
     if net is not None and pushed is not None:  # its impulse is what the speed changes by
         ends = _evenly(late[: part + 1], net.values.size)
         of_net = pushed.values + transported(net.values, ends, net.step)
-    return MovedForces(source=source, stops=stops, net=of_net)
+    whole = replace(variant, result=followed)
+    last = None if net is None else interrupted_impact(followed.events, net)
+    moved = (
+        _moved_channels(whole, rates, late[: part + 1])
+        if source.held is not None
+        else dict[str, Floats]()
+    )
+
+    def held(amount: float) -> HeldForces | None:
+        channels = dict(followed.channels)
+        for name, along in moved.items():
+            values = channels[name].values + amount * along
+            channels[name] = replace(channels[name], values=values)
+        now = replace(whole, result=replace(followed, channels=channels))
+        return held_forces(study, now, source.noise, last)
+
+    return MovedForces(source=source, stops=stops, net=of_net, held=held)
+
+
+def _moved_channels(
+    variant: StrokeVariant, rates: NetworkResult, late: Floats
+) -> dict[str, Floats]:
+    """Derivatives at fixed times of the channels that forces on held bodies come from.
+
+    Impulses and speeds are sums of means over intervals; pressures are values at their ends.
+    """
+    result = variant.result
+    ends, step = _evenly(late, result.time.size - 1), float(result.time[1] - result.time[0])
+    sums = [part.channel for part in variant.acting if part.impulse]
+    sums += [name for body in variant.moving for name in (body.velocity, body.repaid) if name]
+    means = [part.channel for part in variant.acting if not part.impulse]
+    means += [name for item in variant.passages for name in item.flows]
+    found = {}
+    for name in dict.fromkeys(means):
+        values, own = result.channels[name].values[1:], rates.channels[name].values
+        along = own[1:] + values * np.diff(ends) / step + transported(values, ends, step)
+        found[name] = np.concatenate([own[:1], along])
+    for name in dict.fromkeys(sums):
+        values, own = np.diff(result.channels[name].values), rates.channels[name].values
+        along = np.diff(own) + step * transported(values / step, ends, step)
+        found[name] = own[0] + np.concatenate([[0.0], np.cumsum(along)])
+    for name in dict.fromkeys(name for item in variant.passages for name in item.pressures if name):
+        values = result.channels[name].values
+        found[name] = rates.channels[name].values - np.gradient(values, step) * ends
+    return found
 
 
 def transported(values: Floats, late: Floats, step: float) -> Floats:

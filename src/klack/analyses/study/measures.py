@@ -145,6 +145,11 @@ _OF_NOISE = {
     for name in [f"{_NOISE}.{measure.key}"]
 }
 """Measures of the noise of a run with :class:`PointNoise`."""
+for _former, _present in {"radiated_energy_upper_bound": "equivalent_radiated_energy"}.items():
+    # studies of former versions: the same number by another name
+    _OF_NOISE[f"{_NOISE}.{_former}"] = replace(
+        _OF_NOISE[f"{_NOISE}.{_present}"], name=f"{_NOISE}.{_former}"
+    )
 
 
 def choose_measures(
