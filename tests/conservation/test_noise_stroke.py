@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 import scipy
 
+import klack
 from klack.acoustics.force_bands import force_bands
 from klack.acoustics.mount import Mount, support_mobility
 from klack.acoustics.plate import Air, Plate
 from klack.acoustics.receivers.uff import read_uff_responses
 from klack.acoustics.source_files import read_source, write_netcdf, write_uff
 from klack.acoustics.spectrum import force_spectrum
+from klack.analyses.noise.measures import DESIGN_MEASURES
 from klack.analyses.noise.record import NoiseDesign
 from klack.analyses.noise.run import run_noise
 from klack.analyses.noise.source import NoiseSource, stroke_sources
@@ -265,3 +267,55 @@ def test_the_support_gets_all_forces_with_their_signs(source, design):
     ]
     # the bodies give way below their modes, by (f/f_1)^2
     assert radiated[shown] == pytest.approx(truth, rel=0.02)
+
+
+def test_an_impact_leaves_its_impulse_at_the_mount(tmp_path):
+    """Held at low frequencies the mount feels the impulse; free, the valve moves by it over m."""
+    text = find_case("demo-valve-axisymmetric").read_text(encoding="utf-8")
+    mounts = "\nnoise:\n  mounts: {flange: {surface: housing.rim}}\n  #"
+    path = tmp_path / "case.yaml"
+    path.write_text(text.replace("\nnoise:  #", mounts), encoding="utf-8")
+    found = klack.noise_of(klack.run_impact(path, levels=["reduced"])).record.reference
+    source = found.at_mounts.source()
+    z = [str(freedom) for freedom in source.freedoms].index("flange.z")
+    low = slice(0, 20)  # to 200 Hz
+    assert np.abs(source.blocked_force[low, z]) == pytest.approx(found.stops[0].impulse, rel=1e-4)
+    moved = source.free_velocity[low, z] * found.at_mounts.mass * 2.0 * np.pi
+    moved *= source.frequency[low]
+    assert np.abs(moved) == pytest.approx(found.stops[0].impulse, rel=1e-4)
+    assert np.isnan(found.at_mounts.balance)  # nothing but the contact acts
+
+
+NUMBERS = (
+    "mount_velocity_level",
+    "mount_force_level",
+    "equivalent_force_level",
+    "equivalent_velocity_level",
+    "fast_level",
+    "equivalent_radiated_energy",
+)
+
+
+def test_points_of_a_study_have_the_numbers_of_single_runs(tmp_path):
+    """Single numbers of the source by their names, and one by its former name."""
+    text = find_case("demo-stroke").read_text(encoding="utf-8")
+    keys = (
+        "noise:\n  mounts: {flange: {surface: [housing.rim, pole.rim]}}\n"
+        "  reactions: {spring: pole.top, guide: housing.inside}\n  #"
+    )
+    path = tmp_path / "case.yaml"
+    path.write_text(text.replace("noise:  #", keys).replace("duration: 5 ms", "duration: 0.8 ms"))
+    case, key = klack.load_case(path), "network.components.spring.preload"
+    former = "noise.radiated_energy_upper_bound"
+    names = [*(f"noise.{name}" for name in NUMBERS), former]
+    points = [{key: "11 N"}, {key: "13 N"}]
+    table = klack.run_many(case, points, names, variant="dry")
+    measures = {measure.key: measure for measure in DESIGN_MEASURES}
+    for k, point in enumerate(points):
+        run = klack.run_stroke(case.with_value(key, point[key]), variants=["dry"])
+        design = klack.noise_of(run).record.reference
+        for name in NUMBERS:
+            value = measures[name].read(design)
+            assert value is not None
+            assert table[f"noise.{name}"][k] == pytest.approx(value, rel=1e-9), name
+        assert table[former][k] == table["noise.equivalent_radiated_energy"][k]
