@@ -3,6 +3,7 @@
 from dataclasses import replace
 from itertools import pairwise
 from math import pi
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,9 +14,13 @@ from klack.acoustics.boundary.outline import REST, revolved_outline
 from klack.acoustics.boundary.over_frequency import SurfaceRadiation, surface_radiation
 from klack.acoustics.boundary.solid_outline import solid_outline
 from klack.acoustics.boundary.solution import radiation
+from klack.acoustics.plate import Air
+from klack.acoustics.radiation import radiation_loss
+from klack.analyses.noise.run import _radiation_notes
 from klack.bodies.reduction.structure import Structure
 from klack.errors import InputError
 from klack.verification.radiation import sphere_efficiency
+from klack.verification.vibration import oscillator
 
 C = 343.2
 SIZE = C / 20e3 / 6.0
@@ -91,6 +96,25 @@ def test_sphere_at_frequencies_between_those_solved(sphere) -> None:
         heard = ka > (0.6 if n == 2 else 0.0)  # P_2 below: the volume flow of its elements is left
         error = 10.0 * np.log10(power / known)[heard]
         assert np.abs(error).max() < (0.1 if n < 2 else 0.3)
+
+
+def test_sound_damps_modes_by_its_power_over_their_energy(sphere) -> None:
+    """A breathing sphere, and one mass whose face radiates plane waves: ``rho c sigma S / w m``."""
+    own, found = sphere
+    air = Air(density=1.2, sound_speed=C)
+    breathing = replace(own, omega=np.full_like(own.omega, 2.0 * pi * 9e3))
+    loss = radiation_loss(breathing, found, air)
+    area, ka = 4.0 * pi * 0.02**2, 2.0 * pi * 9e3 / C * 0.02
+    known = air.impedance * area * sphere_efficiency(0, ka) / (2.0 * pi * 9e3)
+    assert loss[0] == pytest.approx(known, rel=0.02)
+    mass = oscillator(mass=1e-3, stiffness=1e7, base=1.0)
+    plane = float(radiation_loss(mass, "unity", air)[0])
+    assert plane == pytest.approx(air.impedance * 1e-4 / (1e-3 * 1e5), rel=1e-12)
+    around = SimpleNamespace(radiation_of=lambda own: "unity", air=air)
+    heavy, light = (replace(mass, damping=np.array([zeta])) for zeta in (0.01, 0.001))
+    assert not list(_radiation_notes(SimpleNamespace(structures=[heavy]), around))
+    (note,) = _radiation_notes(SimpleNamespace(structures=[light]), around)
+    assert f"Sound takes {100 * plane / 0.002:.2g} %" in note
 
 
 def test_motions_that_cross_do_not_radiate_together(sphere) -> None:

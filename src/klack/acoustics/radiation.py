@@ -32,6 +32,7 @@ __all__ = [
     "mean_squares",
     "piston_efficiency",
     "power_transfer",
+    "radiation_loss",
     "surface_efficiency",
 ]
 
@@ -130,6 +131,26 @@ def surface_efficiency(
     if efficiency == "unity":
         return np.ones(len(frequency))
     return piston_efficiency(frequency, structure.area, air.sound_speed)
+
+
+def radiation_loss(structure: Structure, radiation: Efficiency, air: Air) -> NDArray[np.float64]:
+    r"""Loss factor of each mode by its own sound, shape (m,).
+
+    .. math:: \eta_i = \frac{R_{ii}(\omega_i)}{\omega_i}
+
+    for modes of unit modal mass, whose resistance ``R`` is the power per mean square velocity.  It
+    is no part of the damping of a structure.
+    """
+    omega = structure.omega
+    frequency, count = omega / (2.0 * np.pi), omega.size
+    if isinstance(radiation, SurfaceRadiation):
+        fields = np.eye(count, structure.group_gram.shape[1], dtype=complex)
+        power = radiation.power(frequency, fields).sum(axis=0)
+    else:
+        modes = np.arange(count)
+        power = structure.group_gram[:, modes, modes].sum(axis=0)
+        power = power * surface_efficiency(structure, frequency, radiation, air)
+    return np.asarray(air.impedance * np.maximum(power, 0.0) / omega)
 
 
 def piston_efficiency(

@@ -15,6 +15,7 @@ from klack.acoustics.impulsive import impulsive_prominence
 from klack.acoustics.loudness import time_varying_loudness
 from klack.acoustics.mount import Mount
 from klack.acoustics.plate import Air, Plate
+from klack.acoustics.radiation import radiation_loss
 from klack.acoustics.signal_statistics import (
     pressure_third_octaves,
     sound_statistics,
@@ -60,6 +61,7 @@ __all__ = ["click_sound", "noise_design", "run_noise"]
 _LOWEST, _HIGHEST, _POINTS = 20.0, 200e3, 600  # [Hz] of spectra that are drawn
 _HEARING = 20e3  # [Hz]
 _ENDS_ALIKE = 1e-3  # of the peak
+_DAMPED_BY_SOUND = 0.1  # 0.4 dB
 
 
 def run_noise(
@@ -188,6 +190,7 @@ def _design(
         notes=(
             *source.notes,
             *_design_notes(source, bodies, sound, elements),
+            *_radiation_notes(source, around),
             *(machine.notes if machine is not None else ()),
         ),
         own_components=source.own_components,
@@ -494,6 +497,22 @@ def _design_notes(
     if sound is not None and sound.loudness.note:
         found.append(f"The click is {sound.loudness.note}.")
     return tuple(found)
+
+
+def _radiation_notes(source: NoiseSource, around: Surroundings) -> Iterator[str]:
+    """Where sound damps an audible mode by more than a tenth of what its body does."""
+    for own in map(damped, source.structures):
+        loss = radiation_loss(own, around.radiation_of(own), around.air)
+        share = np.where(own.omega < 2.0 * np.pi * _HEARING, loss / (2.0 * own.damping), 0.0)
+        worst = int(np.argmax(share)) if share.size else 0
+        if share.size and share[worst] > _DAMPED_BY_SOUND:
+            at = format_si(float(own.omega[worst]) / (2.0 * np.pi), "Hz")
+            yield (
+                f"Sound takes {100 * share[worst]:.2g} % of what the damping of '{own.name}' takes "
+                f"from its mode at {at}, and is no part of that: the level of the mode is up to "
+                f"{10 * np.log10(1.0 + share[worst]):.1f} dB too high. Add the loss by sound, "
+                f"{50 * loss[worst]:.2g} % of critical damping, to the damping of the body."
+            )
 
 
 def _notes(designs: Sequence[NoiseDesign]) -> list[str]:
