@@ -11,6 +11,7 @@ import pytest
 import klack
 from klack.analyses.sensitivities.parameters import slope_space
 from klack.analyses.sensitivities.slopes import SlopeRunner, moved_forces, transported
+from klack.case.reader import find_case
 from klack.case.study_source import study_of
 from klack.machine.progress import silent
 
@@ -103,6 +104,33 @@ class TestSmallValve:
         assert rate.sum() == pytest.approx(0.0, abs=1e-3 * np.abs(rate).sum())
         assert (rate * stop.force.time).sum() == pytest.approx(later * force.sum(), rel=1e-4)
         assert (force * rate).sum() == pytest.approx(0.0, abs=1e-4 * np.abs(force * rate).sum())
+
+
+@pytest.mark.slow
+def test_forces_on_held_bodies_follow_the_momentum(tmp_path):
+    """Truth: at mounts the derivative of the sum of all forces is that of -m a of the needle."""
+    text = find_case("demo-stroke").read_text(encoding="utf-8")
+    keys = (
+        "noise:\n  mounts: {flange: {surface: [housing.rim, pole.rim]}}\n"
+        "  reactions: {spring: pole.top, guide: housing.inside}\n  #"
+    )
+    path = tmp_path / "case.yaml"
+    path.write_text(text.replace("noise:  #", keys).replace("duration: 5 ms", "duration: 0.4 ms"))
+    case, key = klack.load_case(path), "network.components.spring.preload"
+    space = slope_space(case.checked, None, [key])
+    (run,) = SlopeRunner(case.checked, case.tree, space, "dry", silent, None).tangents()
+    study = klack.run_stroke(case, variants=["dry"]).record
+    found = moved_forces(study, case.checked, run, 0)
+    held, now = found.source.held, found.held(1e-3)
+    assert held is not None
+    assert now is not None
+    assert found.net is not None
+    change = sum((now.forces[name] - held.forces[name]).sum(axis=1) / 1e-3 for name in held.forces)
+    kept = int(0.8 * change.size)
+    net = found.net[:kept]
+    assert np.abs(net).max() > 1.0  # [N/N]: impacts move in time
+    # the force that takes back energy of macro steps is in the momentum alone
+    assert np.abs(change[:kept] + net).max() < 1e-4 * np.abs(net).max()
 
 
 @pytest.mark.slow
