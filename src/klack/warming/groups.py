@@ -101,6 +101,31 @@ def _impact() -> None:
     run_impact(load_case(find_case("witness")), levels=("reduced", "interface"))
 
 
+def _radiation() -> None:
+    import numpy as np
+
+    from klack.acoustics.boundary.revolved import Meridian
+    from klack.acoustics.boundary.triangles import Triangles
+
+    angle = np.linspace(np.pi, 0.0, 9)
+    points = np.vstack([np.eye(3), -np.eye(3)])  # of an octahedron
+    corners = [
+        [0, 1, 2],
+        [1, 3, 2],
+        [3, 4, 2],
+        [4, 0, 2],
+        [1, 0, 5],
+        [3, 1, 5],
+        [4, 3, 5],
+        [0, 4, 5],
+    ]
+    for mesh in (
+        Meridian(nodes=np.column_stack([np.abs(np.sin(angle)), np.cos(angle)])),
+        Triangles(points=points, corners=np.array(corners)),
+    ):
+        mesh.kernels(mesh.centres, 1.0)
+
+
 GROUPS: Mapping[str, Group] = MappingProxyType(
     {
         "loop": Group("time loop of a network", _loop),
@@ -114,6 +139,7 @@ GROUPS: Mapping[str, Group] = MappingProxyType(
             "the same with guide, friction, yield, rough faces", partial(_small, "featured_impacts")
         ),
         "impact": Group("meshes, bodies and contacts of impacts", _impact),
+        "radiation": Group("boundary elements of noise", _radiation),
     }
 )
 """All groups, those first that take longest."""
