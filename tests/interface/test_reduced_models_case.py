@@ -21,6 +21,8 @@ import scipy.io
 from klack.analyses.impact.analysis import IMPACT
 from klack.analyses.impact.content import report_content
 from klack.analyses.impact.run import run_impact
+from klack.analyses.noise.run import run_noise
+from klack.analyses.noise.source import impact_sources
 from klack.analyses.reduction.analysis import REDUCTION
 from klack.analyses.reduction.run import run_reduce
 from klack.assembling.assembled_bodies import assembled_body, assembled_from_matrices
@@ -428,6 +430,24 @@ def test_the_case_of_the_page_gives_the_impact_of_klacks_own_matrices(folder):
     needle = given.bodies[0]
     assert "needle.sti" in needle.material
     assert "7854 kg/m^3" in needle.material  # straight edges
+
+
+@pytest.mark.slow
+def test_given_matrices_at_mounts_are_the_source_of_klacks_own(folder):
+    """Six freedoms of the seat: free velocity, blocked force and mobility alike."""
+    mounts = "noise: {mounts: {foot: {surface: seat.bottom}}}\n"
+    found = []
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AccuracyWarning)
+        for name, text in (("at.yaml", page_case()), ("own_at.yaml", own_case())):
+            impact = run_impact(load(folder, text + mounts, name), levels=("reduced",))
+            found.append(run_noise(impact_sources(impact)).reference.at_mounts.source())
+    given, own = found
+    assert len(own.freedoms) == 6
+    for name in ("free_velocity", "blocked_force", "mobility"):
+        ours = getattr(own, name)
+        size = np.abs(ours).max()
+        np.testing.assert_allclose(getattr(given, name), ours, atol=1e-5 * size, err_msg=name)
 
 
 @pytest.mark.slow

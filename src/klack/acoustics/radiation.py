@@ -113,12 +113,11 @@ def power_transfer(
 def mean_squares(structure: Structure, answer: HarmonicResponse) -> NDArray[np.float64]:
     """Integral of ``|Y_n|^2`` over each group [m^4/(N s)^2], shape (g, k)."""
     parts = answer.fields.real, answer.fields.imag
-    return np.stack(
-        [
-            np.maximum(sum(np.einsum("kb,kb->k", y @ gram, y) for y in parts), 0.0)
-            for gram in structure.group_gram
-        ]
-    ).reshape(len(structure.group_gram), answer.frequency.size)
+    found = [
+        np.maximum(sum(np.einsum("kb,kb->k", y @ gram, y) for y in parts), 0.0)
+        for gram in structure.group_gram
+    ]
+    return np.array(found).reshape(len(structure.group_gram), answer.frequency.size)
 
 
 def surface_efficiency(
