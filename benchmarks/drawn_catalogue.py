@@ -729,6 +729,22 @@ def _liquid(v: _Valve) -> None:
         v.top.append("gap.needle")
         inlet.append("gap.a")
         v.joints.append(["back.fluid", "gap.b"])
+    if v.odds(0.15) and not given:
+        v.parts["drag"] = {
+            "type": "unsteady-drag",
+            **(
+                {"shape": "sphere", "radius": v.q(bore, "length")}
+                if v.odds(0.5)
+                else {
+                    "shape": "layer",
+                    "area": v.q(6.0 * bore**2, "area"),
+                    "height": v.q(v.log(2e-5, 3e-4), "length"),
+                    "added_mass": v.q(0.2 * v.mass, "mass"),
+                }
+            ),
+            "memory": v.one(True, False),
+        }
+        v.top.append("drag.body")
     if v.odds(0.15):
         v.parts["relief"] = {
             "type": "relief-valve",

@@ -36,7 +36,6 @@ from klack.mechanics.lever import Lever
 from klack.mechanics.lugre_friction import LuGreFriction
 from klack.mechanics.nonlinear_spring import NonlinearSpring
 from klack.mechanics.prescribed_motion import PrescribedMotion
-from klack.mechanics.relaxation import relaxed
 from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.rubber_stop import MaxwellElement, RubberStop
 from klack.mechanics.spring import Spring
@@ -44,6 +43,7 @@ from klack.mechanics.surging_spring import SurgingSpring
 from klack.network.catalogue import component_class
 from klack.network.component import Component
 from klack.network.network import Network
+from klack.network.relaxation import relaxed
 from klack.network.step_function import evaluate
 from klack.simulation.network_run import simulate_network
 

@@ -13,9 +13,9 @@ from scipy.optimize import nnls
 from klack.errors import InputError
 from klack.hydraulics.network_fluid import fixed_viscosity
 from klack.input.problem import CaseProblem
-from klack.mechanics.relaxation import relaxed
 from klack.network.component import Component
 from klack.network.port import ELEMENT, Port
+from klack.network.relaxation import relaxed
 from klack.network.rows import Book, Channel, LimitRow, Rows
 from klack.network.step_function import step_function
 from klack.units import Area, Length, Mass, Speed

@@ -8,9 +8,9 @@ from pydantic import Field, model_validator
 
 from klack.machine.compiling.jit import inner
 from klack.mechanics.friction import require_breakaway
-from klack.mechanics.relaxation import relaxed
 from klack.network.component import Component
 from klack.network.port import ELEMENT, Port
+from klack.network.relaxation import relaxed
 from klack.network.rows import Book, Channel, Rows
 from klack.network.step_function import step_function
 from klack.units import DampingCoefficient, Force, Ratio, Speed, Stiffness

@@ -18,9 +18,9 @@ from klack.mechanics.nonlinear_spring import (
     curve_value,
     curve_work,
 )
-from klack.mechanics.relaxation import relaxed
 from klack.network.component import Component
 from klack.network.port import ELEMENT, Port
+from klack.network.relaxation import relaxed
 from klack.network.rows import Book, Channel, Rows
 from klack.network.step_function import step_function
 from klack.units import Length, Stiffness, Time

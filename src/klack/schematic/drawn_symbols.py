@@ -41,6 +41,11 @@ _TWO_ENDED: Mapping[str, tuple[Stroke, ...]] = {
     ),
     "guide-friction": _FRICTION,
     "lugre-friction": (*_FRICTION, Stroke("M11,-6 v-2 M15,-6 v-2 M19,-6 v-2 M23,-6 v-2")),
+    "unsteady-drag": (
+        Stroke("M0,0 H9 M31,0 H36"),
+        Stroke(_circle(20, 0, 6), "metal"),
+        Stroke("M9,-9 q3,-4 6,0 t6,0 t6,0 t4,0 M9,11 q3,-4 6,0 t6,0 t6,0 t4,0", "thin"),
+    ),
     "check-valve": (
         Stroke("M0,0 H9 M26,0 H36 M18,-9 L9,0 L18,9"),
         Stroke(_circle(19.5, 0, 6.5), "paper"),
