@@ -205,6 +205,10 @@ class TestClassicalChain(Tutorial):
     name = "classical-chain"
 
 
+class TestOneValveInTwoMachines(Tutorial):
+    name = "one-valve-in-two-machines"
+
+
 def test_every_page_is_followed() -> None:
     pages = {path.stem for path in FOLDER.glob("*.md")} - {"index"}
     assert pages == {tutorial.name for tutorial in Tutorial.__subclasses__()}

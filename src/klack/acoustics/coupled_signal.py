@@ -184,7 +184,7 @@ def _fade(frequency: Vector, *, whole: bool) -> tuple[Vector, tuple[str, ...]]:
     top, bottom = frequency[-1], frequency[0]
     falling = np.clip((frequency - top / _THIRD) / (top - top / _THIRD), 0.0, 1.0)
     fade = 0.5 * (1.0 + np.cos(np.pi * falling))
-    notes = [f"Faded out from {top / _THIRD:.4g} to {top:.4g} Hz, where the responses end."]
+    notes = [f"Faded out from {top / _THIRD:.5g} to {top:.5g} Hz, where the responses end."]
     if not whole:
         rising = np.clip((frequency - bottom) / (bottom * _THIRD - bottom), 0.0, 1.0)
         fade *= 0.5 * (1.0 - np.cos(np.pi * rising))

@@ -151,7 +151,10 @@ def run_sources(
 
     ``names`` are levels, by default ``reduced``, or variants, by default the first.
     """
-    check_machine(case.noise, case.materials)
+    if all(
+        body.matrices is None for body in case.bodies.values()
+    ):  # else mounts move along z alone
+        check_machine(case.noise, case.materials)
     if isinstance(case, ValveCase):
         variants = tuple(names) or case.run.variants[:1]
         stroke = run_stroke(case, variants=variants, progress=progress, threads=threads)
