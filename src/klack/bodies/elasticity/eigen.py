@@ -62,16 +62,21 @@ class _Subspace:
         self.V[:, self.size : needed] = block
         self.size = needed
 
-    def orthonormalised(self, W: Array) -> tuple[Array, Array, Array]:
-        """W = V C + Q B with Q mass-orthonormal and orthogonal to V; Q may have fewer columns."""
+    def orthonormalised(self, W: Array) -> tuple[Array, Array, Array, Array]:
+        """W = V C + Q B with Q mass-orthonormal and orthogonal to V; Q, M Q, C, B.
+
+        Q may have fewer columns.
+        """
         MW = self.M @ W
         largest = np.sqrt(np.einsum("ij,ij->j", W, MW).max(initial=0.0))
         C = self.basis.T @ MW
-        Q, B = _orthonormal(self.M, W - self.basis @ C, largest)
+        W = W - self.basis @ C
+        Q, MQ, B = _orthonormal(W, self.M @ W, largest)
         # the first pass left round-off of W, which is large beside its smallest new directions
-        rest = self.basis.T @ (self.M @ Q)
-        Q, again = _orthonormal(self.M, Q - self.basis @ rest, 1.0)
-        return Q, C + rest @ B, again @ B
+        rest = self.basis.T @ MQ
+        Q = Q - self.basis @ rest
+        Q, MQ, again = _orthonormal(Q, self.M @ Q, 1.0)
+        return Q, MQ, C + rest @ B, again @ B
 
 
 def block_lanczos(
@@ -95,7 +100,7 @@ def block_lanczos(
     Parameters
     ----------
     operator
-        X (n, b) to A X (n, b).
+        M X (n, b) to A X (n, b).
     start (n, b)
         Start block, in the range of A.
     enough
@@ -117,12 +122,12 @@ def block_lanczos(
     """
     b = start.shape[1]
     space = _Subspace(M, np.empty((len(start), max(12 * b, expected)), order="F"), np.zeros((0, 0)))
-    Q, _, _ = space.orthonormalised(start)
+    Q, MQ, _, _ = space.orthonormalised(start)
     T = np.zeros((0, 0))
     steps = 0
     while True:
         space.append(Q)
-        Q, C, B = space.orthonormalised(operator(space.V[:, space.size - Q.shape[1] : space.size]))
+        Q, MQ, C, B = space.orthonormalised(operator(MQ))
         T = _bordered(T, C)
         steps += 1
         exhausted = Q.shape[1] == 0
@@ -155,15 +160,16 @@ def _bordered(T: Array, C: Array) -> Array:
     return grown
 
 
-def _orthonormal(M: csr_array, W: Array, scale: float) -> tuple[Array, Array]:
-    """W = Q B with Q^T M Q = 1; directions below round-off of ``scale`` are dropped."""
+def _orthonormal(W: Array, MW: Array, scale: float) -> tuple[Array, Array, Array]:
+    """W = Q B with Q^T M Q = 1, and M Q; directions below round-off of ``scale`` are dropped."""
     if W.shape[1] == 0:
-        return W, np.zeros((0, 0))
-    gram = W.T @ (M @ W)
+        return W, MW, np.zeros((0, 0))
+    gram = W.T @ MW
     squares, X = np.linalg.eigh((gram + gram.T) / 2)
     keep = squares > (_RANK * scale) ** 2
     root = np.sqrt(squares[keep])
-    return W @ (X[:, keep] / root), root[:, None] * X[:, keep].T
+    turn = X[:, keep] / root
+    return W @ turn, MW @ turn, root[:, None] * X[:, keep].T
 
 
 _LARGEST_DENSE = 600
@@ -351,9 +357,6 @@ def _iterated(
 ) -> NDArray[np.float64]:
     body = flexibility.body
 
-    def operator(X: NDArray[np.float64]) -> NDArray[np.float64]:
-        return flexibility.solve(body.M @ X)
-
     def enough(values: NDArray[np.float64]) -> bool:
         if total is not None and len(values) >= total:
             return True
@@ -365,7 +368,13 @@ def _iterated(
     most = len(body.free) - body.rigid_modes.shape[1]
     expected = 0 if count is None else _VECTORS_EXPECTED * count + 2 * _BLOCK
     _, shapes = block_lanczos(
-        operator, body.M, operator(start), enough, most, exact=count, expected=expected
+        flexibility.solve,
+        body.M,
+        flexibility.solve(body.M @ start),
+        enough,
+        most,
+        exact=count,
+        expected=expected,
     )
     return shapes
 

@@ -181,9 +181,8 @@ class _Constrained:
         )
         return np.asarray(u + self.FB @ found[: self.n] + self.R @ found[self.n :])
 
-    def inverse(self, X: Matrix) -> Matrix:
-        """Deflection under M X with ``B^T u = 0``."""
-        load = self.flexibility.body.M @ X
+    def inverse(self, load: Matrix) -> Matrix:
+        """Deflection under loads with ``B^T u = 0``."""
         return self.corrected(self.flexibility.solve(load), 0.0, self.R.T @ load)
 
 
@@ -202,7 +201,7 @@ def constrained_modes(flexibility: Flexibility, averages: Matrix, highest: float
         _, shapes = block_lanczos(
             statics.inverse,
             body.M,
-            statics.inverse(start),
+            statics.inverse(body.M @ start),
             lambda values: len(values) > most / 4 or bool(len(values) and values[-1] < limit),
             most,
         )
