@@ -4,7 +4,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from klack.assembling.bodies import (
     BodyPair,
@@ -31,7 +30,7 @@ from klack.contact.statics import ReachError, StaticContact
 from klack.contact.worn_faces import opened_by
 from klack.files.closing import Closing
 from klack.machine.cache.result_cache import result_cache
-from klack.machine.cores import side_by_side, threads_for
+from klack.machine.cores import blas_threads, side_by_side, threads_for
 from klack.machine.progress import Progress, remark
 from klack.mesh.mesh import Surface
 from klack.mesh.rigid import Pose
@@ -275,7 +274,7 @@ def place_bodies(case: Case, progress: Progress, *, threads: int | None = None) 
     # large ones take the memory that is left one after the other, as its plan says
     blas, of_solver = threads_for(pair.unknowns), threads_for(pair.unknowns, threads)
     at_once = threads != 1 and blas == 1
-    with threadpool_limits(blas, user_api="blas"):
+    with blas_threads(blas):
         upper, lower = side_by_side(
             [
                 partial(

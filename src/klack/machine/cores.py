@@ -2,9 +2,11 @@
 
 import os
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+from importlib import import_module
 from typing import TypeVar
 
-__all__ = ["available_cores", "share_of", "side_by_side", "threads_for"]
+__all__ = ["available_cores", "blas_threads", "share_of", "side_by_side", "threads_for"]
 
 _T = TypeVar("_T")
 
@@ -31,6 +33,14 @@ def share_of(threads: int | None, parts: int) -> int:
     return max(1, (threads or available_cores()) // parts)
 
 
+def blas_threads(threads: int | None) -> AbstractContextManager[object]:
+    """Limit of the threads of BLAS in NumPy, SciPy and MKL; none by default."""
+    from threadpoolctl import threadpool_limits
+
+    import_module("scipy.linalg")  # a library that is loaded later is not limited
+    return threadpool_limits(limits=threads, user_api="blas")
+
+
 def side_by_side(tasks: Sequence[Callable[[], _T]], *, at_once: bool = True) -> list[_T]:
     """Results of independent tasks, in their order.
 
@@ -45,10 +55,8 @@ def side_by_side(tasks: Sequence[Callable[[], _T]], *, at_once: bool = True) -> 
         return [task() for task in tasks]
     from concurrent.futures import ThreadPoolExecutor
 
-    from threadpoolctl import threadpool_limits
-
     with (
-        threadpool_limits(limits=1, user_api="blas"),
+        blas_threads(1),
         ThreadPoolExecutor(max_workers=len(tasks)) as workers,
     ):
         jobs = [workers.submit(task) for task in tasks]

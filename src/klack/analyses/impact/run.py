@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 from time import perf_counter
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from klack.acoustics.comparison import compare_histories
 from klack.analyses.impact.analysis import answer_so_far
@@ -104,7 +103,7 @@ from klack.contact.submodel import LocalStiffness
 from klack.errors import AccuracyWarning, InputError
 from klack.files.closing import Closing
 from klack.machine.cache.result_cache import result_cache
-from klack.machine.cores import available_cores
+from klack.machine.cores import available_cores, blas_threads
 from klack.machine.progress import Progress, silent
 from klack.machine.stages import (
     StageClock,
@@ -203,7 +202,7 @@ def _with_modes(
     certify: bool,
     progress: Progress,
 ) -> ImpactBodies:
-    with collected_warnings() as notes, threadpool_limits(placed.threads, user_api="blas"):
+    with collected_warnings() as notes, blas_threads(placed.threads):
         pools = mode_pools(
             placed,
             at_least=_modes_needed(placed.case, levels),
@@ -270,7 +269,7 @@ def _study(
 ) -> ImpactStudy:
     """One impact of these bodies; the last one frees them, and is compared with others."""
     blas = bodies.placed.threads
-    with collected_warnings() as notes, threadpool_limits(blas, user_api="blas"):
+    with collected_warnings() as notes, blas_threads(blas):
         work = _Work(contact_problem(case, bodies.placed, clock), bodies)
         work.reduce(wanted, certify, clock)
         work.run_levels(wanted, clock)
