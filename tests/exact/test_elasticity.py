@@ -31,7 +31,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from property_profiles import examples
-from scipy.sparse import random_array
+from scipy.sparse import csr_array, random_array
 
 from klack.bodies.elasticity.assembly import assemble
 from klack.bodies.elasticity.body import elastic_body
@@ -42,6 +42,7 @@ from klack.bodies.elasticity.loads import traction_load
 from klack.bodies.elasticity.quadrature import quadrature
 from klack.bodies.elasticity.shape_functions import reference_nodes, shape_functions
 from klack.bodies.elasticity.statics import Flexibility
+from klack.errors import InputError
 from klack.machine.cache.result_cache import ResultCache
 from klack.materials.material import Material
 from klack.mesh.families import FAMILIES
@@ -537,6 +538,47 @@ def test_a_coupling_is_that_of_whole_solves_and_kept(tmp_path, monkeypatch):
     np.testing.assert_allclose(C, exact, rtol=0.0, atol=1e-11 * np.abs(exact).max())
     np.testing.assert_array_equal(again, C)
     np.testing.assert_array_equal(turned, C.T)
+
+
+@pytest.mark.skipif("pardiso" not in available_backends(), reason="needs pardiso")
+@pytest.mark.parametrize("held", [False, True], ids=["free", "held"])
+def test_known_loads_have_the_compliance_of_whole_solves(held):
+    """And so have others beside them; solutions and modes are those without known loads."""
+    rod = body("tet10", held=held)
+    G = loads(90, rod.dof_count)
+    with Flexibility(rod) as plain:
+        U = plain.solve(G.toarray().T)
+        exact, frequency = G @ U, eigenmodes(rod, count=6, flexibility=plain).frequency
+    groups = [np.arange(20, 80), np.r_[0:20, 80:90]]
+    with Flexibility(rod, loads=G[:60]) as flexibility:
+        known, beside = flexibility.condensed(G[10:50]), flexibility.coupling(G[:5], G[40:60])
+        mixed = flexibility.condensed(G, groups)
+        fewer = flexibility.condensed(G[groups[0]])
+        found = flexibility.solve(G.toarray().T)
+        assert eigenmodes(rod, count=6, flexibility=flexibility).frequency == pytest.approx(
+            frequency, rel=1e-10
+        )
+
+    scale = 1e-11 * np.abs(exact).max()
+    np.testing.assert_allclose(known, exact[10:50, 10:50], rtol=0.0, atol=scale)
+    np.testing.assert_allclose(beside, exact[:5, 40:60], rtol=0.0, atol=scale)
+    np.testing.assert_allclose(mixed, exact, rtol=0.0, atol=scale)
+    np.testing.assert_array_equal(mixed, mixed.T)
+    np.testing.assert_array_equal(mixed[np.ix_(groups[0], groups[0])], fewer)
+    np.testing.assert_allclose(found, U, rtol=0.0, atol=1e-10 * np.abs(U).max())
+
+
+@pytest.mark.skipif("pardiso" not in available_backends(), reason="needs pardiso")
+def test_known_loads_hide_no_negative_pivot():
+    """Two equal ones leave pivots of either sign, which do not stand for those of the matrix."""
+    A = np.eye(4)
+    A[2, 3] = A[3, 2] = 2.0
+    twice = csr_array(np.ones((2, 4)))
+    with pytest.raises(InputError, match="not positive definite"):
+        factorize(csr_array(A), loads=twice)
+    A[2, 3] = A[3, 2] = 0.5
+    with factorize(csr_array(A), loads=twice) as factor:
+        np.testing.assert_allclose(factor.solve(A), np.eye(4), rtol=0.0, atol=1e-14)
 
 
 def test_a_rigid_load_does_not_deform_a_free_body():

@@ -5,12 +5,14 @@ grades, :math:`2^{k/4}` micrometres, and the compliance is condensed grade by gr
 reach holds every shorter one, to the last bit.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil, log2
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array, vstack
 
 from klack.assembling.bodies import BodyPair
 from klack.bodies.elasticity.statics import Flexibility
@@ -18,7 +20,7 @@ from klack.contact.mortar import ContactSpace, contact_space
 from klack.contact.statics import compliances_of
 from klack.contact.worn_faces import WornFaces, opened_by
 
-__all__ = ["Candidates", "CondensedSpace", "grade_of", "reach_of"]
+__all__ = ["Candidates", "CondensedSpace", "grade_of", "likely_loads", "reach_of"]
 
 _STEPS = 4
 """Grades for twice the reach: on average 9 % farther than needed."""
@@ -27,6 +29,11 @@ _UNIT = 1e-6  # [m]
 
 _FIRST_POINTS = 48
 """Points touching first that the first estimate loads."""
+
+_FEW = 500
+"""Likely points that may become twice as many by a reach of at least ``_FLAT``."""
+
+_FLAT = 20e-6  # [m]
 
 _FIRST_GROUP = 64
 """Fewest points of the first group, solved for at once."""
@@ -77,7 +84,12 @@ class _Kept:
 class Candidates:
     """Candidate points of two surfaces, which need not touch."""
 
-    def __init__(self, pair: BodyPair, upper: Flexibility, lower: Flexibility) -> None:
+    def __init__(
+        self,
+        pair: BodyPair,
+        upper: Flexibility,
+        lower: Flexibility,
+    ) -> None:
         self.pair, self._upper, self._lower = pair, upper, lower
         self._first: dict[float | None, tuple[ContactSpace, float]] = {}
         self._spaces: dict[int, ContactSpace] = {}
@@ -134,15 +146,7 @@ class Candidates:
         return self._least
 
     def _space(self, reach: float | None) -> ContactSpace:
-        pair = self.pair
-        return contact_space(
-            pair.upper.mesh,
-            pair.upper_surface,
-            pair.lower.mesh,
-            pair.lower_surface,
-            reach=reach,
-            form=pair.form,
-        )
+        return _space(self.pair, reach)
 
     def _first_compliance(self, space: ContactSpace) -> float:
         gap = np.where(space.axial > 1e-6, space.gap, np.inf)
@@ -155,6 +159,38 @@ class Candidates:
             load = G.T @ lam
             compliance += float(load @ flexibility.deflections(load[:, None])[:, 0])
         return compliance
+
+
+def _space(
+    pair: BodyPair, reach: float | None, slave: Literal["a", "b"] | None = None
+) -> ContactSpace:
+    return contact_space(
+        pair.upper.mesh,
+        pair.upper_surface,
+        pair.lower.mesh,
+        pair.lower_surface,
+        reach=reach,
+        slave=slave,
+        form=pair.form,
+    )
+
+
+def likely_loads(pairs: Iterable[BodyPair]) -> Mapping[str, csr_array]:
+    """Loads of 1 N, one per row, on each body of contacts of solids, at points that may carry.
+
+    As many as are cheap, known before the bodies are factorised. Bodies of revolution have few
+    points, and are quick without.
+    """
+    loads: dict[str, list[csr_array]] = {}
+    for pair in pairs:
+        if pair.upper.dimension == 3:
+            space = _space(pair, None)
+            if space.count < _FEW:  # flat faces all have one gap: their last ones are left out
+                wide = _space(pair, max(_FLAT, space.reach), space.slave)
+                space = wide if wide.count < 2 * _FEW else space
+            for body, G in ((pair.upper, space.G_a), (pair.lower, space.G_b)):
+                loads.setdefault(body.name, []).append(G)
+    return {name: csr_array(vstack(rows, format="csr")) for name, rows in loads.items()}
 
 
 def _groups(space: ContactSpace, first: int, last: int) -> Sequence[NDArray[np.int64]]:

@@ -135,7 +135,7 @@ def build_stop(
     stop between two held bodies.
     """
     stop = case.stops[name]
-    pair = _touching(name, stop, bodies)
+    pair = touching(name, stop, bodies)
     flexibility = [flexibilities[body.name] for body in (pair.upper, pair.lower)]
     static, _ = static_ladder(
         Candidates(pair, *flexibility),
@@ -264,7 +264,8 @@ def without_bulk(local: LocalLaw, D: float) -> LocalLaw:
     )
 
 
-def _touching(name: str, stop: CaseStop, bodies: Mapping[str, ElasticBody]) -> BodyPair:
+def touching(name: str, stop: CaseStop, bodies: Mapping[str, ElasticBody]) -> BodyPair:
+    """Both bodies of a stop, the upper one moved to first touch."""
     upper, lower = bodies[stop.upper.body], bodies[stop.lower.body]
     if upper.is_fixed and lower.is_fixed:
         raise InputError(

@@ -1,12 +1,10 @@
 """From a valve case to a network that can run: meshes, modes, stops, laws."""
 
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from klack.assembling.bodies import (
     Places,
@@ -17,11 +15,12 @@ from klack.assembling.bodies import (
     wanted_sizes,
     with_size,
 )
+from klack.assembling.candidates import likely_loads
 from klack.assembling.given_shapes import require_given_shapes, tell_effort
 from klack.assembling.modes import damping_of, mode_pool, selection_of
 from klack.assembling.spatial import build_spatial, check_heights
 from klack.assembling.spatial_rings import build_spatial_rings
-from klack.assembling.stops import StopContact, StopFaces, build_stop, stop_law
+from klack.assembling.stops import StopContact, StopFaces, build_stop, stop_law, touching
 from klack.assembling.structures import valve_structures
 from klack.bodies.elasticity.body import ElasticBody
 from klack.bodies.elasticity.eigen import Modes
@@ -36,7 +35,7 @@ from klack.case.valve_consistency import is_consistent
 from klack.case.valve_roles import FLEXIBLE_BODY, find_roles
 from klack.errors import InputError
 from klack.machine.cache.result_cache import result_cache
-from klack.machine.cores import threads_for
+from klack.machine.cores import blas_threads, side_by_side, threads_for
 from klack.machine.progress import Progress, silent
 from klack.machine.stages import warnings_of
 from klack.mechanics.end_stop import EndStop
@@ -100,8 +99,9 @@ def build_valve(
     bodies = build_valve_bodies(case, progress)
     if case.motion == "three-dimensional":
         check_heights(case, find_roles(case), bodies)
-    threads = threads_for(sum(body.dof_count for body in bodies.values()), threads)
-    with threadpool_limits(limits=threads, user_api="blas"):
+    # side by side, unless one of them is worth several threads
+    threads = threads_for(max((body.dof_count for body in bodies.values()), default=0), threads)
+    with blas_threads(threads):
         return _built(case, bodies, progress, threads)
 
 
@@ -120,10 +120,25 @@ def valve_parts(
     case: ValveCase, bodies: Mapping[str, ElasticBody], progress: Progress, threads: int | None
 ) -> ValveParts:
     """Factorise bodies; modes and static contact of each stop; cached."""
-    flexibilities: dict[str, Flexibility] = {}
-    for i, (name, body) in enumerate(bodies.items()):
-        progress("factorise", i / len(bodies))
-        flexibilities[name] = Flexibility(body, threads=threads, cache=result_cache())
+    progress("factorise", 0.0)
+    # directions of friction would be loads as well, and too many
+    pairs = {} if case.rubs else {n: touching(n, stop, bodies) for n, stop in case.stops.items()}
+    loads = likely_loads(pairs.values())
+    made = side_by_side(
+        [
+            partial(
+                Flexibility,
+                body,
+                threads=threads,
+                cache=result_cache(),
+                at_once=threads == 1,
+                loads=loads.get(name),
+            )
+            for name, body in bodies.items()
+        ],
+        at_once=threads == 1,
+    )
+    flexibilities = dict(zip(bodies, made, strict=True))
     pools = _mode_pools(case, bodies, flexibilities, progress)
     # in space the contact points rub
     with_law = case.without_friction() if case.motion == "three-dimensional" else case
@@ -239,17 +254,15 @@ def _mode_pools(
     progress: Progress,
 ) -> dict[str, Modes]:
     progress("modes", 0.0)
-    # the triangular solves run outside of the interpreter: two bodies keep two cores busy
-    with ThreadPoolExecutor(max_workers=2) as workers:
-        jobs = {
-            name: workers.submit(
-                mode_pool, selection_of(case.reduction.choice(name)), body, flexibilities[name]
-            )
-            for name, body in bodies.items()
-        }
-        pools = {name: job.result() for name, job in jobs.items()}
+    pools = side_by_side(
+        [
+            partial(mode_pool, selection_of(case.reduction.choice(name)), bodies[name], item)
+            for name, item in flexibilities.items()
+        ],
+        at_once=all(item.at_once for item in flexibilities.values()),
+    )
     progress("modes", 1.0)
-    return pools
+    return dict(zip(flexibilities, pools, strict=True))
 
 
 def _ports(case: ValveCase, body: ElasticBody, contacts: Mapping[str, StopContact]) -> list[Port]:

@@ -239,7 +239,7 @@ def extended_compliance(
 
     Only the columns of the new points are solved for; surfaces and slave side must be the same.
     """
-    if space.slave != known.space.slave:
+    if space.slave != known.space.slave or (flexibility_a.has_loads and flexibility_b.has_loads):
         return contact_compliance(space, flexibility_a, flexibility_b)
     parts = (space.G_a, space.G_b, space.nodes, known.space.nodes, known.compliance)
     return _remembered_compliance(
