@@ -51,7 +51,7 @@ def side_by_side(tasks: Sequence[Callable[[], _T]], *, at_once: bool = True) -> 
     at_once
         Each with one thread of BLAS; else in turn with all.
     """
-    if not at_once:
+    if not (at_once and tasks):
         return [task() for task in tasks]
     from concurrent.futures import ThreadPoolExecutor
 
