@@ -501,18 +501,22 @@ def test_landing_in_a_network_is_the_landing_alone():
             1
         )
 
-    alone_film, alone_contact = alone(1)
     assert np.max(contact) > 10.0
     assert np.min(film) < -0.1
-    # the network cuts the step in which the contact opens, after which the film pulls
     release = int(np.flatnonzero(contact)[-1])
-    other = np.arange(len(film)) != release
-    np.testing.assert_allclose(film[other], alone_film[other], atol=1e-5)
-    np.testing.assert_allclose(contact[other], alone_contact[other], atol=1e-6)
-    # uncut steps of 20 ns miss 1.2e-4 of both there, those of 10 ns 1.6e-3, of 0.6 ns 1e-5
+    touch = int(np.flatnonzero(contact)[0])
+    np.testing.assert_allclose(film[:touch], alone(1)[0][:touch], rtol=0.0, atol=1e-5)
+    # the network cuts the steps in which the contact closes and opens; of 20 ns they leave it with
+    # 2.1e-4 of the speed too much, of 1.25 ns with 2e-6
     finer_film, finer_contact = alone(32)
-    both = (film + contact)[release]
-    assert both == pytest.approx((finer_film + finer_contact)[release], rel=5e-5)
+    closed = slice(touch, release)
+    np.testing.assert_allclose(
+        contact[closed], finer_contact[closed], rtol=0.0, atol=4e-4 * contact.max()
+    )
+    after = slice(release + 1, None)
+    np.testing.assert_allclose(film[after], finer_film[after], rtol=1e-3, atol=0.0)
+    impulse = 1e-6 * (film + contact).sum()
+    assert impulse == pytest.approx(1e-6 * (finer_film + finer_contact).sum(), rel=2e-4)
 
 
 @pytest.mark.parametrize("coarse", [1, 16])

@@ -139,7 +139,7 @@ def test_a_file_is_replaced_as_a_whole_and_keeps_its_rights(folder):
 def test_new_files_replace_nothing(folder):
     folder.make_file("other/case.yaml", TEXT)
 
-    with pytest.raises(InputError, match="there already"):
+    with pytest.raises(InputError, match="already exists"):
         folder.make_file("valve/case.yaml", "klack: 1\n")
     assert folder.case_text("valve/case.yaml") == TEXT
     assert folder.look().cases == ("other/case.yaml", "valve/case.yaml")

@@ -363,7 +363,7 @@ def test_a_case_folder_is_made_with_all_files_or_none(tmp_path):
     folder.make_folder("valve", {"case.yaml": b"klack: 1\n", "needle.step": b"ISO"})
     assert sorted(p.name for p in (tmp_path / "valve").iterdir()) == ["case.yaml", "needle.step"]
 
-    with pytest.raises(InputError, match="there already"):
+    with pytest.raises(InputError, match="already exists"):
         folder.make_folder("valve", {"case.yaml": b"other"})
     with pytest.raises(TypeError):
         folder.make_folder("half", {"case.yaml": b"klack: 1\n", "needle.step": "no bytes"})

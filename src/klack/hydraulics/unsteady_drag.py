@@ -260,7 +260,7 @@ class UnsteadyDrag(Component):
                     component=name,
                     quantity="Reynolds number",
                     unit="-",
-                    valid=(-inf, _NEWTON),
+                    valid=(0.0, _NEWTON),
                     law="the drag of a sphere",
                     source="Schiller and Naumann 1933",
                     effect=lambda value: "The drag is higher there than computed.",

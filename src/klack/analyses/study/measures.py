@@ -308,9 +308,10 @@ def impact_measures(case: Case, names: Iterable[str]) -> tuple[ChosenMeasure, ..
     ``"peak_force"`` of the level; ``"noise.radiated_energy"``; ``"shots.restitution.mean"``.
     InputError also for noise of bodies without surfaces.
     """
-    known, words = impact_measure_names(case), f"one of: {one_of(_OF_LEVELS)}; {NOISE_WORDS}"
+    known, words = impact_measure_names(case), f"one of: {one_of(_OF_LEVELS)}; "
     if case.shots is not None:
-        words = f"{words}; {SHOT_WORDS}"
+        words += f"{SHOT_WORDS}; "
+    words += NOISE_WORDS
     chosen = choose_measures(
         names, lambda name: _impact_measure(case, name), known, words, "peak_force"
     )
