@@ -153,7 +153,8 @@ def _worst(
     found = [Compared(key=item.name)]
     for name, channel in rates.channels.items():
         at = fixed if channel.unit in _AT_START else fixed[1:]
-        if name not in ends[0][0].channels or not at.size:
+        # what is repaid to macro steps is round-off of their forces
+        if name not in ends[0][0].channels or not at.size or name.endswith("repaid impulse"):
             continue
         size = max(largest[channel.unit], _LEAST.get(channel.unit, 0.0), 1e-30)
         pairs = zip(_CHANGES, ends, strict=False)

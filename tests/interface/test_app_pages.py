@@ -187,7 +187,7 @@ def test_words_of_a_row_keep_room_beside_its_buttons(page, server):
     """A page of 1280 px at a zoom of 200 %."""
     page.set_viewport_size({"width": 640, "height": 450})
     page.goto(f"{server.base}/")
-    page.get_by_text("2 notes on this result").wait_for()
+    page.get_by_text("2 notes on this result").first.wait_for()
     page.get_by_role("button", name="Run", exact=False).first.wait_for()
     settle(page)
 

@@ -202,12 +202,7 @@ class LoadedFactorization(Closing):
     Parameters
     ----------
     loads (m, n)
-        G, one load per row.
-
-    Attributes
-    ----------
-    condensed (m, m)
-        ``G A^-1 G^T``.
+        G, one load per row; ``condensed`` is ``G A^-1 G^T``.
     """
 
     def __init__(
