@@ -201,3 +201,29 @@ def test_added_mass_moves_with_the_body_as_a_whole():
     assert body.mass == pytest.approx(4e-3)
     assert body.port_shapes[0, 0] == pytest.approx(1.0 / sqrt(4e-3))
     assert body.rigid_axial[0] == pytest.approx(sqrt(4e-3))
+
+
+def test_without_the_liquid_nothing_is_left():
+    """Definition: what the dry variant of a stroke asks."""
+    assert UnsteadyDrag(shape="sphere", radius=RADIUS).dry() is None
+
+
+@pytest.mark.slow
+def test_what_moves_along_with_its_surroundings_is_not_dragged():
+    """Exact: one speed from the start, so no force; of two speeds the momentum stays."""
+    drag = UnsteadyDrag(shape="layer", area=1e-4, height=1e-4)
+    for other, momentum in ((0.5, 1.5e-3), (-0.25, 0.0)):
+        parts = {
+            "needle": RigidMass(mass=1e-3, speed=0.5),
+            "housing": RigidMass(mass=2e-3, speed=other),
+            "drag": drag,
+        }
+        joined = [["needle.body", "drag.body"], ["housing.body", "drag.around"]]
+        rows = Network(parts, joined, fluid=liquid(0.01)).rows()
+        run = simulate_network(rows, duration=5e-3, step=1e-6, record=1e-4, start="free")
+        needle, housing = (
+            run.channels[f"{name}.body velocity"].values for name in ("needle", "housing")
+        )
+        np.testing.assert_allclose(1e-3 * needle + 2e-3 * housing, momentum, atol=1e-15)
+        if other == 0.5:
+            np.testing.assert_allclose(needle, 0.5, rtol=1e-12)

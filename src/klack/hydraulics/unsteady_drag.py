@@ -198,6 +198,9 @@ class UnsteadyDrag(Component):
                 )
         return self
 
+    def dry(self) -> None:
+        """Nothing: it is the liquid."""
+
     def added(self, density: float) -> float:
         """Added mass [kg] in a liquid of a density [kg/m^3]."""
         if self.added_mass is not None:
@@ -242,8 +245,7 @@ class UnsteadyDrag(Component):
             steady, reynolds = viscosity * (self.area or 0.0) / (self.height or inf), 0.0
         if not self.steady:
             steady, reynolds = 0.0, 0.0
-        speed = [float(getattr(body, "speed", 0.0)) for body in rows.partner("body")]
-        past = next((value for value in speed if value != 0.0), 0.0)
+        past = _starting_speed(rows, "body") - _starting_speed(rows, "around")
         table = np.column_stack((damping, time)).ravel()
         rows.element(
             unsteady_drag_step,
@@ -271,6 +273,11 @@ class UnsteadyDrag(Component):
         added = self.added(density)
         if added > 0.0:
             rows.closing[f"{name} added mass"] = lambda all_rows: _load(all_rows, name, port, added)
+
+
+def _starting_speed(rows: Rows, port: str) -> float:
+    """Speed [m/s] of the body at a port at the start; 0 of the ground."""
+    return sum(float(getattr(body, "speed", 0.0)) for body in rows.partner(port))
 
 
 def _load(rows: Rows, component: str, port: int, added: float) -> None:
