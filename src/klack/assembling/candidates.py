@@ -84,12 +84,7 @@ class _Kept:
 class Candidates:
     """Candidate points of two surfaces, which need not touch."""
 
-    def __init__(
-        self,
-        pair: BodyPair,
-        upper: Flexibility,
-        lower: Flexibility,
-    ) -> None:
+    def __init__(self, pair: BodyPair, upper: Flexibility, lower: Flexibility) -> None:
         self.pair, self._upper, self._lower = pair, upper, lower
         self._first: dict[float | None, tuple[ContactSpace, float]] = {}
         self._spaces: dict[int, ContactSpace] = {}

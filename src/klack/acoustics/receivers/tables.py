@@ -199,14 +199,18 @@ def _table(path: Path) -> tuple[list[str], NDArray[np.float64]]:
     return names, table
 
 
-def _text(path: Path) -> str:
+def _require_file(path: Path, expected: str) -> None:
     refuse_if(
         not path.is_file() or path.stat().st_size > _LARGEST,
         str(path),
         got="no file, or more than 1 GB",
-        expected="a table over frequency",
+        expected=expected,
         hint="check the path.",
     )
+
+
+def _text(path: Path) -> str:
+    _require_file(path, "a table over frequency")
     data = path.read_bytes()
     try:
         return data.decode("utf-8-sig")
@@ -384,13 +388,7 @@ def _npz(path: Path) -> Arrays:
 
 def netcdf3_arrays(path: Path) -> dict[str, Any]:
     """Variables and texts of a netCDF 3 file; rows of characters are texts."""
-    refuse_if(
-        not path.is_file() or path.stat().st_size > _LARGEST,
-        str(path),
-        got="no file, or more than 1 GB",
-        expected="a netCDF file",
-        hint="check the path.",
-    )
+    _require_file(path, "a netCDF file")
     arrays: dict[str, Any] = {}
     damage = "write it again; it may be truncated, or of netCDF 5."
     with (
