@@ -214,7 +214,7 @@ COVERS = {
     "integrator": "Time integration of reduced bodies: exact modes, order of convergence, energy "
     "and momentum.",
     "impact": "Reduced impacts against closed and tabulated solutions: Hertz, St Venant, "
-    "needle on a spring, Zener.",
+    "needle on a spring, Zener; a bar that bounces, at all levels.",
     "transient": "Full-order impact with set-valued contact: rods, a blocked bar, a sphere on a "
     "thick block.",
     "interface": "Contact point by point on modal bodies: statics, Hertz impacts, sub-impacts, "

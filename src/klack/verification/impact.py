@@ -7,6 +7,7 @@ import numpy as np
 
 from klack.contact.laws import HertzLaw, HuntCrossley, gonthier_coefficient
 from klack.contact.restitution import measure_impact
+from klack.verification.bouncing_bar import bouncing_bar_checks
 from klack.verification.check import Check, ComparedCurve, check
 from klack.verification.one_dimension import (
     BAR_SPEED,
@@ -54,6 +55,9 @@ def checks() -> list[Check]:
         *_needle_on_spring(),
         *_modal_convergence(),
         *_zener(),
+        *bouncing_bar_checks("full", 200, 6e-3, 5e-3),
+        *bouncing_bar_checks("interface", 160, 5e-3, 5e-4),
+        *bouncing_bar_checks("reduced", 320, 3e-3, 5e-4),
     ]
 
 

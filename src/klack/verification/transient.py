@@ -115,11 +115,13 @@ def drop_rod(
     scheme: Scheme = "contact-stabilised-newmark",
     material: Material = STEEL,
     courant: float = 1.0,
+    weight: float = 0.0,
+    returns: float = 1.6,
 ) -> FullOrderResult:
     """Rod of ``length`` [m] on a rigid wall, or on a free rod of length ``other`` [m].
 
-    Elements of one size h; time step ``courant`` h / c; the run takes 1.6 return times of the
-    wave.
+    Elements of one size h; time step ``courant`` h / c; ``weight`` [N] of the rod; the run takes
+    so many return times of the wave.
     """
     size = length / elements
     a = rod_body("upper", material, area=area, length=length, elements=elements)
@@ -138,8 +140,9 @@ def drop_rod(
         b,
         rod_contact(a, b, area=min(area, other_area), gap=0.0),
         speed=speed,
-        duration=1.6 * 2.0 * length / material.bar_wave_speed,
+        duration=returns * 2.0 * length / material.bar_wave_speed,
         step=courant * size / material.bar_wave_speed,
+        axial_force=-weight,
         scheme=scheme,
     )
 
