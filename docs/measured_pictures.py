@@ -2,7 +2,8 @@
 
 From the six shots of the case ``struck-bar``, with and without the dome on the striker's end, come
 struck-bar.svg and struck-bar-ends.svg; alumina.svg from the oblique impacts of spheres;
-bounce-in-liquid.svg and rebounds-in-oil.svg from bounces of spheres on a wall in a liquid.
+bounce-in-liquid.svg and rebounds-in-oil.svg from bounces of spheres on a wall in a liquid;
+ball-on-rock.svg from the waves of a ball on rock.
 """
 
 from pathlib import Path
@@ -13,6 +14,7 @@ from matplotlib.figure import Figure
 
 from klack.report.chart import COLOURS
 from klack.report.printed import STYLE, svg
+from klack.verification.ball_on_rock import STEEP, computed_pulse, measured_pulses
 from klack.verification.half_space import oblique_spheres
 from klack.verification.measured import SHOTS, struck_bar
 from klack.verification.sphere_in_liquid import (
@@ -71,6 +73,7 @@ def figures() -> dict[str, Figure]:
         "alumina.svg": alumina(),
         "bounce-in-liquid.svg": bounce_in_liquid(),
         "rebounds-in-oil.svg": rebounds_in_oil(),
+        "ball-on-rock.svg": ball_on_rock(),
     }
 
 
@@ -131,6 +134,26 @@ def rebounds_in_oil() -> Figure:
         axes.grid(visible=True, color="#dddddd", lw=0.5)
     figure.axes[0].set_ylabel("height [mm]")
     figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    return figure
+
+
+def ball_on_rock() -> Figure:
+    """Surface velocity over time, over its first extreme."""
+    figure = Figure(figsize=(6.4, 3.4), layout="constrained")
+    axes = figure.add_subplot()
+    steep = [one for one in measured_pulses() if one.angle < STEEP]
+    shapes = np.array([one.velocity / one.velocity[one.extremes[0]] for one in steep])
+    time = 1e6 * steep[0].time
+    axes.plot(time, shapes.T, color=COLOURS["blue"], lw=0.4, alpha=0.5)
+    axes.plot(time, shapes.mean(axis=0), color=COLOURS["blue"], lw=2.0,
+              label=f"measured at {len(steep)} places, and their mean")  # fmt: skip
+    pulse = computed_pulse()
+    axes.plot(1e6 * pulse.time, pulse.velocity / pulse.velocity[pulse.extremes[0]],
+              color=COLOURS["black"], lw=1.3, ls="--", label="computed")  # fmt: skip
+    axes.set(xlabel="time since the P wave [us]", xlim=(-1.0, 8.0), ylim=(-0.9, 1.1),
+             ylabel="velocity over its first extreme")  # fmt: skip
+    axes.grid(visible=True, color="#dddddd", lw=0.5)
+    axes.legend()
     return figure
 
 

@@ -233,7 +233,8 @@ COVERS = {
     "radiation": "Sound of moving surfaces by boundary elements: spheres, cylinders, small rigid "
     "bodies.",
     "measurement": "Lift sensor, differentiation and impacts found in records of exact flights.",
-    "measured": "Measurements of others: strain pulses of struck bars, oblique impacts of spheres.",
+    "measured": "Measurements of others: strain pulses of struck bars, oblique impacts of spheres, "
+    "bounces in liquids, waves in rock.",
     "mechanics": "Mass, spring, friction, gravity and forces in the time loop, against closed "
     "motions.",
     "mechanical-parts": "Nonlinear springs, surge, rubber, LuGre friction and levers "

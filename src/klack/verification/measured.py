@@ -1,4 +1,4 @@
-"""Checks against measurements of others: struck bars, oblique impacts, bounces in a liquid.
+"""Checks against measurements of others: struck bars, oblique impacts, bounces, a ball on rock.
 
 Recordings: case ``struck-bar``, see its README. End face of the strikers and low pass of the
 amplifier are not known: one dome and one low pass for all shots, chosen once, and the same
@@ -16,6 +16,7 @@ from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.impact.run import run_impact
 from klack.case.reader import find_case, read_case, text_of
 from klack.machine.stages import collected_warnings
+from klack.verification.ball_on_rock import ball_on_rock
 from klack.verification.check import Check, ComparedCurve, check
 from klack.verification.half_space import oblique_spheres
 from klack.verification.sphere_in_liquid import (
@@ -109,6 +110,7 @@ def checks() -> list[Check]:
         *oblique_spheres(),
         *bounces_in_liquid(),
         *rebounds_in_oil(),
+        ball_on_rock(),
     ]
 
 
