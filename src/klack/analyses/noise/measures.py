@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from math import log10
-from typing import cast
+from typing import Any, cast
 
 from klack.acoustics.signal_statistics import PRESSURE_REFERENCE, SoundStatistics
 from klack.acoustics.source_levels import FORCE_REFERENCE, VELOCITY_REFERENCE
@@ -52,11 +52,19 @@ def _heard(read: Callable[[ClickSound], Value]) -> Callable[[NoiseDesign], Value
     return lambda design: None if design.sound is None else read(design.sound)
 
 
-FORCE_LEVEL = Measure[NoiseDesign](
+_LEVEL = Measure[Any](key="level", definition="", unit="dB", form="fixed", digits=1, page=True)
+"""What all levels have: one decimal, and a row of the report."""
+
+
+def _column(head: str = "", unit: str = "dB") -> Column:
+    return Column(unit, 1.0, ".1f", head)
+
+
+FORCE_LEVEL: Measure[NoiseDesign] = replace(
+    _LEVEL,
     key="force_level",
     name="level of the unbalanced force",
     symbol="L_F",
-    unit="dB",
     definition="Level of ∫ F² dt over all bands, re 1 pN² s = (1 µN)² s: the level re 1 µN of a "
     "steady force with the same energy in one second.",
     note="Springs, magnet and fluid push the needle from the housing that it hits; below about one "
@@ -69,15 +77,13 @@ FORCE_LEVEL = Measure[NoiseDesign](
     read=lambda design: (
         10.0 * log10(max(float(design.unbalanced_energy.sum()), 1e-300) / ENERGY_REFERENCE)
     ),
-    form="fixed",
-    digits=1,
-    column=Column("dB", 1.0, ".1f", "force"),
+    column=_column("force"),
     deviation="difference",
-    page=True,
 )
 CLICK_MEASURES: tuple[Measure[SoundStatistics], ...] = described_in(
     _SOUND,
-    Measure(
+    replace(
+        _LEVEL,
         key="sound_exposure_level_weighted",
         json_name="sound_exposure_level_dBA",
         name="sound exposure level of a click, A-weighted",
@@ -85,39 +91,31 @@ CLICK_MEASURES: tuple[Measure[SoundStatistics], ...] = described_in(
         unit="dBA",
         definition="Level of ∫ p² dt of one click with weighting A, re (20 µPa)² s.",
         read=lambda click: click.exposure_level_A,
-        form="fixed",
-        digits=1,
-        column=Column("dBA", 1.0, ".1f", "SEL"),
+        column=_column("SEL", "dBA"),
         deviation="difference",
-        page=True,
     ),
-    Measure(
+    replace(
+        _LEVEL,
         key="sound_exposure_level",
         name="sound exposure level of a click",
         symbol="L_E",
-        unit="dB",
         definition="Level of ∫ p² dt of one click without weighting, re (20 µPa)² s.",
         read=lambda click: click.exposure_level,
-        form="fixed",
-        digits=1,
-        column=Column("dBZ", 1.0, ".1f", "SEL"),
+        column=_column("SEL", "dBZ"),
         deviation="difference",
-        page=True,
     ),
-    Measure(
+    replace(
+        _LEVEL,
         key="peak_level",
         name="peak level of a click",
         symbol="L_peak",
-        unit="dB",
         definition="Level of the largest pressure of one click without weighting, re 20 µPa.",
         read=lambda click: click.peak_level,
-        form="fixed",
-        digits=1,
-        column=Column("dBZ", 1.0, ".1f", "peak"),
+        column=_column("peak", "dBZ"),
         deviation="difference",
-        page=True,
     ),
-    Measure(
+    replace(
+        _LEVEL,
         key="peak_level_weighted",
         json_name="peak_level_dBC",
         name="peak level of a click, C-weighted",
@@ -125,12 +123,10 @@ CLICK_MEASURES: tuple[Measure[SoundStatistics], ...] = described_in(
         unit="dBC",
         definition="Level of the largest pressure of one click with weighting C, re 20 µPa.",
         read=lambda click: click.peak_level_C,
-        form="fixed",
-        digits=1,
         deviation="difference",
-        page=True,
     ),
-    Measure(
+    replace(
+        _LEVEL,
         key="fast_level",
         json_name="fast_level_dBA",
         name="highest level of a click, A-weighted, fast",
@@ -139,10 +135,7 @@ CLICK_MEASURES: tuple[Measure[SoundStatistics], ...] = described_in(
         definition="Highest level of one click with the frequency weighting A and the time "
         "weighting F (125 ms), re 20 µPa: what a sound level meter shows.",
         read=lambda click: click.fast_level_A,
-        form="fixed",
-        digits=1,
         deviation="difference",
-        page=True,
     ),
 )
 """Of one click, from its pressure alone."""
@@ -170,18 +163,15 @@ def _mounted(
 
 
 _AT_MOUNTS: tuple[Measure[NoiseDesign], ...] = tuple(
-    Measure(
+    replace(
+        _LEVEL,
         key=key,
         name=name,
         symbol=symbol,
-        unit="dB",
         definition=definition,
         source=_COUPLING,
         read=_mounted(read, reference),
-        form="fixed",
-        digits=1,
         deviation="difference",
-        page=True,
     )
     for key, name, symbol, definition, read, reference in (
         (
@@ -298,7 +288,8 @@ DESIGN_MEASURES: tuple[Measure[NoiseDesign], ...] = described_in(
         page=True,
     ),
     *_OF_DESIGNS,
-    Measure(
+    replace(
+        _LEVEL,
         key="pattern_level",
         name="level of the drive pattern, A-weighted",
         symbol="L_Aeq",
@@ -307,10 +298,7 @@ DESIGN_MEASURES: tuple[Measure[NoiseDesign], ...] = described_in(
         "re 20 µPa.",
         source=_SOUND,
         read=_heard(lambda sound: sound.pattern.equivalent_level_A),
-        form="fixed",
-        digits=1,
         deviation="difference",
-        page=True,
     ),
     Measure(
         key="loudness_max",
@@ -366,21 +354,18 @@ DESIGN_MEASURES: tuple[Measure[NoiseDesign], ...] = described_in(
         deviation="difference",
         page=True,
     ),
-    Measure(
+    replace(
+        _LEVEL,
         key="impulse_adjustment",
         name="adjustment for impulsive sound",
         symbol="K_I",
-        unit="dB",
         definition="1.8 (P - 5) dB of an impulsive prominence P above 5, else 0: added to the "
         "equivalent level where a noise is rated; above 9 dB beyond the usual range of the method.",
         source=_SOUND,
         read=_heard(
             lambda sound: None if sound.prominence is None else sound.prominence.adjustment
         ),
-        form="fixed",
-        digits=1,
         deviation="difference",
-        page=True,
     ),
     Measure(
         key="kurtosis",
@@ -535,70 +520,58 @@ def _exposure_level(energy: float, reference: float) -> float | None:
 
 MOUNT_MEASURES: tuple[Measure[MountFreedom], ...] = described_in(
     "theory/structure-borne-source",
-    Measure(
+    replace(
+        _LEVEL,
         key="free_velocity_level",
         name="free velocity",
         symbol="L_vf",
-        unit="dB",
         definition="Exposure of one click, ∫ v² dt over the bands to 20 kHz, of mounts that are "
         "free, re (1 nm/s)² s; of rotations re (1 nrad/s)² s.",
         note="ISO 9611 refers to 50 nm/s, which makes levels 34 dB lower.",
         read=lambda freedom: _exposure_level(
             float(freedom.velocity_bands.energy.sum()), VELOCITY_REFERENCE
         ),
-        form="fixed",
-        digits=1,
-        column=Column("dB", 1.0, ".1f"),
-        page=True,
+        column=_column(),
     ),
-    Measure(
+    replace(
+        _LEVEL,
         key="blocked_force_level",
         name="blocked force",
         symbol="L_Fbl",
-        unit="dB",
         definition="Exposure of one click, ∫ F² dt over the bands to 20 kHz, on mounts that are "
         "held, re (1 µN)² s; of moments re (1 µN m)² s.",
         read=lambda freedom: _exposure_level(
             float(freedom.force_bands.energy.sum()), FORCE_REFERENCE
         ),
-        form="fixed",
-        digits=1,
-        column=Column("dB", 1.0, ".1f"),
-        page=True,
+        column=_column(),
     ),
 )
 
 INTERFACE_MEASURES: tuple[Measure[InterfaceFreedom], ...] = described_in(
     _COUPLING,
-    Measure(
+    replace(
+        _LEVEL,
         key="force_on_machine_level",
         name="force on the machine",
         symbol="L_g",
-        unit="dB",
         definition="Exposure of one click, ∫ F² dt over the bands that are known, on the machine, "
         "re (1 µN)² s; of moments re (1 µN m)² s.",
         read=lambda freedom: _exposure_level(
             float(freedom.force_bands.energy.sum()), FORCE_REFERENCE
         ),
-        form="fixed",
-        digits=1,
-        column=Column("dB", 1.0, ".1f"),
-        page=True,
+        column=_column(),
     ),
-    Measure(
+    replace(
+        _LEVEL,
         key="blocked_force_beside_level",
         name="blocked force in the same bands",
         symbol="L_Fbl",
-        unit="dB",
         definition="Exposure of the blocked force of the same freedom in the same bands: what an "
         "immovable machine would take up.",
         read=lambda freedom: _exposure_level(
             float(freedom.blocked_bands.energy.sum()), FORCE_REFERENCE
         ),
-        form="fixed",
-        digits=1,
-        column=Column("dB", 1.0, ".1f", "if blocked"),
-        page=True,
+        column=_column("if blocked"),
     ),
     Measure(
         key="energy_into_machine",
@@ -627,7 +600,8 @@ def _at_ear(measure: Measure[SoundStatistics]) -> Measure[EarSound]:
 
 EAR_MEASURES: tuple[Measure[EarSound], ...] = described_in(
     _COUPLING,
-    Measure(
+    replace(
+        _LEVEL,
         key="ear_exposure_level_weighted",
         json_name="ear_exposure_level_dBA",
         name="sound exposure level at the ear, A-weighted",
@@ -636,11 +610,8 @@ EAR_MEASURES: tuple[Measure[EarSound], ...] = described_in(
         definition="Level of ∫ p_A² dt of one click by its spectrum, in the band that is known, re "
         "(20 µPa)² s.",
         read=lambda ear: _exposure_level(ear.exposure_A, PRESSURE_REFERENCE),
-        form="fixed",
-        digits=1,
-        column=Column("dBA", 1.0, ".1f", "SEL"),
+        column=_column("SEL", "dBA"),
         deviation="difference",
-        page=True,
     ),
     *(_at_ear(measure) for measure in CLICK_MEASURES[3:]),
     Measure(
@@ -661,7 +632,8 @@ EAR_MEASURES: tuple[Measure[EarSound], ...] = described_in(
 
 PATH_MEASURES: tuple[Measure[PathSound], ...] = described_in(
     _COUPLING,
-    Measure(
+    replace(
+        _LEVEL,
         key="path_exposure_level_weighted",
         json_name="path_exposure_level_dBA",
         name="level of the path alone",
@@ -670,10 +642,7 @@ PATH_MEASURES: tuple[Measure[PathSound], ...] = described_in(
         definition="A-weighted sound exposure level of what one freedom alone brings to the ear, "
         "re (20 µPa)² s.",
         read=lambda path: _exposure_level(path.exposure_A, PRESSURE_REFERENCE),
-        form="fixed",
-        digits=1,
-        column=Column("dBA", 1.0, ".1f", "alone"),
-        page=True,
+        column=_column("alone", "dBA"),
     ),
     Measure(
         key="path_share",
@@ -692,30 +661,24 @@ PATH_MEASURES: tuple[Measure[PathSound], ...] = described_in(
 
 IN_SITU_MEASURES: tuple[Measure[InSituFreedom], ...] = described_in(
     _COUPLING,
-    Measure(
+    replace(
+        _LEVEL,
         key="blocked_force_in_situ_level",
         name="blocked force, found in situ",
         symbol="L_Fbl",
-        unit="dB",
         definition="Exposure of the blocked force that a test on the running machine finds (ISO "
         "20270), re (1 µN)² s; of moments re (1 µN m)² s.",
         read=lambda freedom: _exposure_level(float(freedom.found.energy.sum()), FORCE_REFERENCE),
-        form="fixed",
-        digits=1,
-        column=Column("dB", 1.0, ".1f", "found"),
-        page=True,
+        column=_column("found"),
     ),
-    Measure(
+    replace(
+        _LEVEL,
         key="blocked_force_of_source_level",
         name="blocked force of the source",
         symbol="L_Fbl",
-        unit="dB",
         definition="The same of the source in the freedoms that the machine takes up.",
         read=lambda freedom: _exposure_level(float(freedom.exact.energy.sum()), FORCE_REFERENCE),
-        form="fixed",
-        digits=1,
-        column=Column("dB", 1.0, ".1f", "of the source"),
-        page=True,
+        column=_column("of the source"),
     ),
 )
 """Of one freedom in a virtual test."""
