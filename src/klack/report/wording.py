@@ -45,6 +45,8 @@ def quantity(value: float, unit: str, digits: int = 4) -> str:
     (['70', 'mm^2'], ['3.000', 'g'], ['2e+04', '1/s'])
     >>> quantity(0.0123, "sone", 2).split(), quantity(-0.0123, "", 2)
     (['0.012', 'sone'], '−0.012')
+    >>> quantity(7.27e-24, "J", 3).split()
+    ['7.27e−24', 'J']
     """
     if not isfinite(value):
         return _NONE if value != value else "∞"
@@ -59,6 +61,8 @@ def quantity(value: float, unit: str, digits: int = 4) -> str:
         return f"{value:.{digits}g}".replace("-", _MINUS) + _space(unit)
     rounded = float(f"{value:.{digits - 1}e}")
     power = min(max(3 * floor(log10(abs(rounded)) / 3 + 1e-12), -15), 9)
+    if abs(rounded) < 10.0**power:  # smaller than all prefixes
+        return f"{rounded:.{digits - 1}e}".replace("-", _MINUS) + _space(unit)
     scaled = rounded / 10.0**power
     decimals = max(0, digits - 1 - floor(log10(abs(scaled)) + 1e-12))
     return f"{scaled:.{decimals}f}".replace("-", _MINUS) + _space(_PREFIXES[power] + unit)

@@ -118,7 +118,7 @@ def noise_content(study: NoiseStudy) -> Content:
         answer=noise_answer(study),
         numbers=_number_table(study),
         sections=sections,
-        definitions=_DEFINITIONS,
+        definitions=_definitions(study),
         limits=_limits(study),
     )
 
@@ -137,7 +137,7 @@ def _number_table(study: NoiseStudy) -> Table:
     rows = []
     for measure in DESIGN_MEASURES:
         values = [measure.read(design) for design in study.designs]
-        if not measure.page or not any(v is not None and isfinite(v) for v in values):
+        if not measure.page or not any(map(_known, values)):
             continue
         cells = [measure.on_page(first)]
         for other in others:
@@ -213,10 +213,18 @@ def _machine(study: NoiseStudy) -> tuple[Section, ...]:
                 if path.exposure_A > 0.0:
                     cells = page_cells(PATH_MEASURES, path)
                     ears.append((f"by {path.name}", *blank, *cells))
+        lost = f", {quantity(found.element_loss, 'J', 3)} are lost in elements"
         words.append(
             f"{whose}{design.settings.machine}. {quantity(found.energy, 'J', 3)} of one click go "
-            f"into it, {quantity(found.element_loss, 'J', 3)} are lost in elements; at each line "
-            f"all powers make zero within {found.balance:.1g} of the largest."
+            f"into it{lost if found.elements else ''}; at each line all powers make zero within "
+            f"{found.balance:.1g} of the largest."
+        )
+        words.append(
+            f"{whose}that is the work of all forces (contacts, magnet, springs, with their "
+            "reactions) at the mounts, where the valve moves as a whole. The "
+            f"{quantity(design.injected_energy, 'J', 3)} above are the work of the contacts alone "
+            "on the modes of bodies whose mounts rest, and stay in them: neither is part of the "
+            "other, and either may be larger."
         )
         if isfinite(found.motion):
             words.append(
@@ -380,6 +388,7 @@ def _radiation(study: NoiseStudy) -> Section:
         title="Radiated sound",
         paragraphs=(
             *dict.fromkeys(_RADIATED[design.settings.radiation] for design in study.designs),
+            *[_BESIDE] * any(design.machine is not None for design in study.designs),
         ),
         charts=(chart,),
         tables=(Table(columns=("surface", "area", *heads), rows=tuple(rows)),),
@@ -388,13 +397,18 @@ def _radiation(study: NoiseStudy) -> Section:
 
 def _assumptions(study: NoiseStudy) -> Section:
     rows: list[tuple[str, ...]] = []
-    for title, text in (
+    estimated = (
         ("mount", lambda d: d.settings.mount or "rigid"),
         ("plate", lambda d: d.settings.plate or "none"),
-        ("machine", lambda d: d.settings.machine or "none described"),
+    )
+    coupled = (("machine", lambda d: d.settings.machine or "none described"),)
+    alone = all(design.machine is None for design in study.designs)
+    together = all(design.machine is not None for design in study.designs)
+    for title, text in (
+        *(() if together else estimated),
+        *(() if alone else coupled),
         ("sound", lambda d: heard_words(d)[0]),
         ("radiation", lambda d: _EFFICIENCY[d.settings.radiation] + d.settings.outside),
-        ("distance", lambda d: quantity(d.settings.distance, "m", 3)),
         (
             "air",
             lambda d: f"{d.settings.air_density:.4g} kg/m³, {d.settings.sound_speed:.4g} m/s",
@@ -434,6 +448,10 @@ _ESTIMATED = (
     "added as if they did not cancel: too loud for bodies smaller than the wavelength, by 17 dB "
     "and more where a small valve shakes as a whole."
 )
+_BESIDE = (
+    "In a machine: of the surfaces of the valve itself, held rigidly. What the machine radiates is "
+    "the sound at its ears."
+)
 _RADIATED = {
     "piston": _ESTIMATED,
     "unity": _ESTIMATED,
@@ -460,22 +478,34 @@ def _modes(design: NoiseDesign) -> str:
 # --------------------------------------------------------------------------- words
 
 
-_DEFINITIONS: tuple[tuple[str, str], ...] = (
-    *glossary(DESIGN_MEASURES),
-    (
-        "blocked force",
-        "Axial force of the body on a rigid support. A softer structure receives less.",
-    ),
-    *glossary(INTERFACE_MEASURES),
-    *glossary(EAR_MEASURES),
-    *glossary(PATH_MEASURES),
-    (
-        "sound pressure",
-        "At an ear by the forces on the machine; without ears all radiated power as a monopole in "
-        "a free field, with minimum phase. Reflections, directivity and the travel time are "
-        "neglected.",
-    ),
-)
+def _definitions(study: NoiseStudy) -> tuple[tuple[str, str], ...]:
+    """Of the words in the report, each once."""
+    design = study.reference
+    shown = [m for m in DESIGN_MEASURES if any(_known(m.read(d)) for d in study.designs)]
+    found = [
+        *glossary(shown),
+        (
+            "blocked force",
+            "Axial force of the body on a rigid support. A softer structure receives less.",
+        ),
+    ]
+    if any(design.machine is not None for design in study.designs):
+        for measures in (INTERFACE_MEASURES, EAR_MEASURES, PATH_MEASURES):
+            found += glossary(measures)
+    pressure = (
+        "At an ear by the forces on the machine."
+        if design.settings.ear
+        else "All radiated power as a monopole in a free field, with minimum phase. Reflections, "
+        "directivity and the travel time are neglected."
+    )
+    once: dict[str, str] = {}
+    for name, words in (*found, ("sound pressure", pressure)):
+        once.setdefault(name, words)
+    return tuple(once.items())
+
+
+def _known(value: float | None) -> bool:
+    return value is not None and isfinite(value)
 
 
 def _limits(study: NoiseStudy) -> tuple[tuple[str, str], ...]:
@@ -486,17 +516,18 @@ def _limits(study: NoiseStudy) -> tuple[tuple[str, str], ...]:
             f"Below {quantity(begins, 'Hz', 2)} the record, which does not end as it began, is "
             "shorter than a period. "
         )
+    click = (
+        "Click",
+        "All of a click is heard at once here, where a real plate rings on: peak level, crest "
+        "factor, kurtosis and loudest moment are on the high side; exposure levels are not.",
+    )
     limits = [
         (
             "Estimate",
             "Levels in dB, not tenths of them: mount, plate and damping decide, and they are known "
             "roughly. Differences between two designs on the same mount are better than levels.",
         ),
-        (
-            "Click",
-            "All of a click is heard at once here, where a real plate rings on: peak level, crest "
-            "factor, kurtosis and loudest moment are on the high side; exposure levels are not.",
-        ),
+        *([click] if any(not design.settings.ear for design in study.designs) else []),
         (
             "Force",
             "Of the rigidly held bodies; the mount does not act back on the impact. Without "

@@ -47,6 +47,7 @@ Floats = NDArray[np.float64]
 SOUND_ENERGY_REFERENCE = 1e-12  # [J], the reference of ISO 3740 for sound energy levels
 _SMALLEST = 1e-300
 _FREQUENCY = (0.02, 200.0)  # [kHz]
+_UNSEEN = 0.01  # share of a path that a bar does not show
 _SILENCE = 60.0  # [dB] below the highest value that a level chart shows
 
 
@@ -489,7 +490,7 @@ def machine_charts(study: NoiseStudy) -> tuple[AnyChart, ...]:
     axis = AxisSpec(label="frequency", unit="kHz", log=True, range=(_FREQUENCY[0], top))
 
     def chart(name: str, title: str, panel: Panel, note: str) -> Chart:
-        return Chart(name=name, title=title, x=axis, panels=(panel,), note=note)
+        return Chart(name=name, title=title, x=axis, panels=(replace(panel, share=1.0),), note=note)
 
     return (
         chart(
@@ -521,24 +522,28 @@ def machine_charts(study: NoiseStudy) -> tuple[AnyChart, ...]:
 def _path_bars(rows: Sequence[tuple[str, dict[str, float]]]) -> BarChart:
     """Shares of the paths: what raises the sound, and what lowers it."""
     paths = dict.fromkeys(path for _, own in rows for path, share in own.items() if share)
+    lowered = any(share < -_UNSEEN for _, own in rows for share in own.values())
+    ways = (("raise", 1.0), ("lower", -1.0)) if lowered else (("raise", 1.0),)
     return BarChart(
         name="paths",
         title="Shares of the paths in the sound",
         x=AxisSpec(label="share of the A-weighted exposure", unit="%"),
-        rows=tuple(f"{name}: {way}" for name, _ in rows for way in ("raise", "lower")),
+        rows=tuple(f"{name}: {way}" if lowered else name for name, _ in rows for way, _ in ways),
         parts=tuple(
             BarPart(
                 label=path,
                 values=tuple(
                     100.0 * max(sign * own.get(path, 0.0), 0.0)
                     for _, own in rows
-                    for sign in (1.0, -1.0)
+                    for _, sign in ways
                 ),
                 colour=look_of(k).colour,
             )
             for k, path in enumerate(paths)
         ),
-        note="Each path with its phase; what raises less what lowers makes 100 %.",
+        note="Each path with its phase; what raises less what lowers makes 100 %."
+        if lowered
+        else "Each path with its phase; none lowers the sound by 1 % or more.",
     )
 
 

@@ -243,14 +243,15 @@ DESIGN_MEASURES: tuple[Measure[NoiseDesign], ...] = described_in(
     ),
     Measure(
         key="support_energy",
-        name="energy into mount and plate besides",
+        name="energy through the mounts",
         symbol="W_s",
         unit="J",
-        definition="Energy through the held surfaces into mount and plate, or into the machine and "
-        "its elements.",
-        note="A valve as a whole passes it on; it comes on top of the injected energy.",
+        definition="Energy that all forces together bring through the held surfaces into mount and "
+        "plate, or into the machine and its elements.",
+        note="There the valve moves as a whole. The injected energy is that of the contacts on "
+        "bodies whose held surfaces rest, and stays in them: neither is part of the other.",
         digits=3,
-        column=Column("uJ", 1e6, ".4g", "to mount, plate"),
+        column=Column("uJ", 1e6, ".4g", "to the mount"),
         deviation="energy",
         page=True,
     ),
@@ -652,7 +653,7 @@ PATH_MEASURES: tuple[Measure[PathSound], ...] = described_in(
         "100 %; below 0 where a path lowers the sound.",
         read=lambda path: path.share,
         form="share",
-        digits=3,
+        digits=1,
         column=Column("%", 100.0, ".1f", "share"),
         page=True,
     ),
