@@ -28,7 +28,14 @@ from klack.acoustics.interface import (
 from klack.arrays import Matrix, Vector
 from klack.bodies.reduction.craig_bampton import CraigBampton
 
-__all__ = ["blocked_force", "mount_impedance", "source_at_mounts", "spectra_of_means"]
+__all__ = [
+    "blocked_force",
+    "freedoms_of_bodies",
+    "mount_impedance",
+    "points_of",
+    "source_at_mounts",
+    "spectra_of_means",
+]
 
 
 def blocked_force(body: CraigBampton, forces: Complexes, s: Complexes) -> Complexes:
@@ -47,6 +54,27 @@ def mount_impedance(body: CraigBampton, s: Complexes) -> Complexes:
     at = s[:, None, None]
     carried = (_receptance(body, s) @ pairs).reshape(-1, n, n)
     return body.stiffness / at + body.loss + at * (body.mass - at**2 * carried)
+
+
+def points_of(bodies: Sequence[CraigBampton]) -> tuple[InterfacePoint, ...]:
+    """Mounts of bodies, each once."""
+    places = {
+        mount: place
+        for body in bodies
+        for mount, place in zip(body.mounts, body.references, strict=True)
+    }
+    return tuple(InterfacePoint(name=name, position=place) for name, place in places.items())
+
+
+def freedoms_of_bodies(
+    bodies: Sequence[CraigBampton], points: Sequence[InterfacePoint]
+) -> tuple[Freedom, ...]:
+    """Motions of mounts that bodies share, each once, in the order of the points."""
+    found = {pair for body in bodies for pair in zip(body.mounts, body.directions, strict=True)}
+    order = [point.name for point in points]
+    return tuple(
+        Freedom(*pair) for pair in sorted(found, key=lambda pair: (order.index(pair[0]), pair[1]))
+    )
 
 
 def source_at_mounts(
@@ -71,13 +99,12 @@ def source_at_mounts(
     shift [1/s]
     """
     s = laplace(frequency, shift)
-    found = {pair for body in bodies for pair in zip(body.mounts, body.directions, strict=True)}
-    order = [point.name for point in points]
-    all_ = sorted(found, key=lambda pair: (order.index(pair[0]), pair[1]))
-    n = len(all_)
+    freedoms = freedoms_of_bodies(bodies, points)
+    n = len(freedoms)
     F, Z = np.zeros((s.size, n), dtype=complex), np.zeros((s.size, n, n), dtype=complex)
     for body, force in zip(bodies, forces, strict=True):
-        places = [all_.index(pair) for pair in zip(body.mounts, body.directions, strict=True)]
+        own = zip(body.mounts, body.directions, strict=True)
+        places = [freedoms.index(Freedom(*pair)) for pair in own]
         F[:, places] += blocked_force(body, force, s)
         Z[:, np.array(places)[:, None], places] += mount_impedance(body, s)
     # moments and forces differ in unit: rows and columns by their sizes before the inverse
@@ -88,7 +115,7 @@ def source_at_mounts(
     return SourceAtMounts(
         frequency=frequency,
         points=points,
-        freedoms=tuple(Freedom(mount, direction) for mount, direction in all_),
+        freedoms=freedoms,
         free_velocity=(Y @ F[..., None])[..., 0],
         blocked_force=F,
         mobility=Y,

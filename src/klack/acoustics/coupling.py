@@ -47,6 +47,7 @@ __all__ = [
     "joined",
     "junction",
     "power_balance",
+    "transformation",
 ]
 
 Missing = Literal["blocked", "free"]
@@ -209,7 +210,9 @@ def junction(
     missing: Mapping[str, Missing] | None = None,
 ) -> Junction:
     """Bring source and receiver together; parameters and errors as of :func:`couple`."""
-    T, kept, notes = _transformation(source, receiver, placements or {}, missing or {})
+    T, kept, notes = transformation(
+        source.points, source.freedoms, receiver, placements or {}, missing or {}
+    )
     unknown = set(isolators or {}) - {point.name for point in source.points}
     refuse_if(
         unknown,
@@ -311,18 +314,19 @@ def power_balance(joint: Junction, found: Coupled) -> tuple[Vector, Vector]:
 # --------------------------------------------------------------------------- frames
 
 
-def _transformation(
-    source: SourceAtMounts,
+def transformation(
+    points_of_source: Sequence[InterfacePoint],
+    freedoms: Sequence[Freedom],
     receiver: Receiver,
     placements: Mapping[str, Placement],
     missing: Mapping[str, Missing],
 ) -> tuple[Matrix, list[int], tuple[str, ...]]:
-    """Rows of ``v' = T v``, the freedoms of the source that are kept, and what was assumed."""
-    mounts = {point.name: point for point in source.points}
+    """Rows of ``v' = T v``, which freedoms of the source are kept, and what was assumed."""
+    mounts = {point.name: point for point in points_of_source}
     points = {point.name: point for point in receiver.points}
     rows, kept, open_ones = [], [], []
     taken: dict[str, list[str]] = {}
-    for i, freedom in enumerate(source.freedoms):
+    for i, freedom in enumerate(freedoms):
         place = placements.get(freedom.point, Placement())
         name = place.point or freedom.point
         refuse_if(

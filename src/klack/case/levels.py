@@ -29,5 +29,5 @@ OFF_AXIS_LEVELS: tuple[Level, ...] = ("lumped", "interface")
 """Levels of axisymmetric bodies off-axis."""
 
 
-Variant = Literal["wet", "dry", "wet-lumped", "dry-lumped"]
-VARIANTS: tuple[Variant, ...] = ("wet", "dry", "wet-lumped", "dry-lumped")
+Variant = Literal["wet", "dry", "dry-mounted", "wet-lumped", "dry-lumped"]
+VARIANTS: tuple[Variant, ...] = get_args(Variant)

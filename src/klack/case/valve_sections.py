@@ -131,8 +131,9 @@ class StrokeRun(Section):
     variants: tuple[Variant, ...] = Field(
         default=("wet",),
         min_length=1,
-        description="wet: as described; dry: without fluid; with -lumped: rigid bodies on one "
-        "spring per stop.",
+        description="wet: as described; dry: without fluid; dry-mounted: the same on the "
+        "receiver of the noise section, where the valve itself moves; with -lumped: rigid bodies "
+        "on one spring per stop.",
     )
     lift: BodySurface | None = Field(
         default=None,

@@ -44,6 +44,7 @@ class FlexibleBody(Component):
     )
 
     _reduced: ReducedBody | None = PrivateAttr(None)
+    _places: Mapping[str, tuple[str, str]] = PrivateAttr(default_factory=dict)
 
     @model_validator(mode="after")
     def _different_points(self) -> "FlexibleBody":
@@ -58,7 +59,11 @@ class FlexibleBody(Component):
 
     @classmethod
     def of(
-        cls, reduced: ReducedBody, points: Sequence[str] | None = None, speed: float = 0.0
+        cls,
+        reduced: ReducedBody,
+        points: Sequence[str] | None = None,
+        speed: float = 0.0,
+        places: Mapping[str, tuple[str, str]] | None = None,
     ) -> Self:
         """Make a component from a reduced body.
 
@@ -68,9 +73,13 @@ class FlexibleBody(Component):
             Ports that the network uses; all by default.
         speed [m/s]
             Of the whole free body at the start, along +z.
+        places
+            Point -> body and port of the case, of several bodies in one; the others are in none.
         """
         chosen = tuple(reduced.port_names if points is None else points)
-        return cls(body=reduced.name, points=chosen, speed=speed).with_reduced(reduced)
+        result = cls(body=reduced.name, points=chosen, speed=speed).with_reduced(reduced)
+        result._places = dict(places or {})
+        return result
 
     def with_reduced(self, reduced: ReducedBody, port_map: Mapping[str, str] | None = None) -> Self:
         """Same component with its modes filled in.
@@ -141,7 +150,9 @@ class FlexibleBody(Component):
 
     def add_rows(self, rows: Rows) -> None:
         """Add the body."""
-        rows.body(self.reduced, self.points, self.speed)
+        own = self._places or {point: (self.body, point) for point in self.points}
+        places = [own.get(point, ("", "")) for point in self.points]
+        rows.body(self.reduced, self.points, self.speed, places=places)
 
 
 def _with_ports(body: ReducedBody, chosen: list[int], names: tuple[str, ...]) -> ReducedBody:

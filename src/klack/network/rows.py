@@ -128,6 +128,7 @@ class BodyRow:
     ``names`` are those of the component.  ``speed`` [m/s] along +z is that of the whole free body
     at the start, undeformed: the rigid modal velocities are ``speed * rigid_axial``.  A body with a
     ``course`` follows it whatever pushes it; it has one mode, of shape 1 at all its ports.
+    ``places`` are body and port of the case at each port, default component and name.
     """
 
     component: str
@@ -136,6 +137,7 @@ class BodyRow:
     names: tuple[str, ...]
     speed: float = 0.0
     course: MotionCourse | None = None
+    places: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -555,6 +557,7 @@ class Rows:
         ports: Sequence[str],
         speed: float = 0.0,
         course: MotionCourse | None = None,
+        places: Sequence[tuple[str, str]] = (),
     ) -> None:
         """Add a body; ``ports`` are the component's ports, one per port of the body, in order."""
         handles = tuple(self.handles[name] for name in ports)
@@ -565,6 +568,7 @@ class Rows:
             names=tuple(ports),
             speed=speed,
             course=course,
+            places=tuple(places) or tuple((self.component, name) for name in ports),
         )
         self.bodies.append(row)
 

@@ -356,7 +356,7 @@ class _Balance:
             shapes = np.asarray(body.port_shapes)
             r = body.rigid_count
             self.shapes[mode : mode + len(directions), here] = directions @ shapes[:r]
-            elastic = shapes[r:] / body.omega[r:, None]
+            elastic = shapes[r:] / body.resting_omega[:, None]
             self.compliance[here, here] = elastic.T @ elastic
             begin, mode = here.stop, mode + len(directions)
         self.body_of_port = np.repeat(
@@ -928,7 +928,7 @@ class _Balance:
             body, r = body_row.body, body_row.body.rigid_count
             here = slice(begin, begin + len(body_row.ports))
             q = np.asarray(body.port_shapes) @ self.force[:-1][here]
-            q[r:] /= body.omega[r:] ** 2
+            q[r:] /= body.resting_omega**2
             directions = self.along[b]
             q[:r] = state.z[mode : mode + len(directions)] @ directions
             for k in range(network.body_blocks[b], network.body_blocks[b + 1]):

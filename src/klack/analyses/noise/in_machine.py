@@ -46,12 +46,16 @@ SourceAt = Callable[[Vector, float], SourceAtMounts]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Installed:
-    """A source on its machine: ``at`` frequencies and a shift, and the record [s] of its forces."""
+    """A source on its machine: ``at`` frequencies and a shift, and the record [s] of its forces.
+
+    ``moves``: they are those of a run on this machine.
+    """
 
     at: SourceAt
     machine: Machine
     span: float
     top: float
+    moves: bool = False
 
     def signal(self) -> tuple[CoupledSignal | None, str]:
         """Signals up to 20 kHz, beginning 5 ms before the forces, or why there are none."""
@@ -134,6 +138,7 @@ def installed(source: NoiseSource) -> Installed | None:
         machine=machine_of(source.noise, source.materials, points),
         span=held.step * next(iter(held.forces.values())).shape[0],
         top=min(_HIGHEST, 0.1 / held.step),
+        moves=source.run.endswith("mounted"),
     )
 
 
@@ -161,11 +166,18 @@ def in_machine(
     if why:
         notes.append(f"No signal over time at the machine: {why}")
     notes += signal.notes if signal is not None else ()
-    if moved > _FELT:
+    if found.moves:
+        notes.append(
+            f"The valve itself moves in its run, with up to {100 * moved:.2g} % of the speed of "
+            "its needle: its forces are those on this machine and hold on no other."
+        )
+    elif moved > _FELT:
         notes.append(
             f"On this machine the valve itself moves with up to {100 * moved:.2g} % of the speed "
             "of its needle: the force of the impact, which is that of the rigidly held valve, is "
             "off by about as much."
+            + " The variant dry-mounted of the stroke moves with it."
+            * machine.causal
         )
     record = InMachine(
         receiver=machine.words[0],

@@ -1,7 +1,7 @@
 """The machine below a valve, from its keys: what it is at the mounts, and where its ears are."""
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,14 +35,16 @@ from klack.acoustics.receivers.opening import read_responses
 from klack.acoustics.receivers.plates import InfinitePlate, PlateSound, finite_plate
 from klack.acoustics.receivers.tables import read_isolator
 from klack.arrays import Matrix
+from klack.bodies.reduction.structure import Structure
 from klack.case.bodies import CaseMaterial
 from klack.case.machine import NoiseReceiver, NoiseVirtualPoint
 from klack.case.noise import CaseNoise
 from klack.errors import InputError
+from klack.input.problem import one_of
 from klack.materials.material import Material
 from klack.units import format_si
 
-__all__ = ["Machine", "check_machine", "machine_of"]
+__all__ = ["Machine", "check_machine", "machine_of", "mounted"]
 
 HIGHEST = 24e3
 """[Hz] to which models are known: sound files end there."""
@@ -172,6 +174,50 @@ def check_machine(noise: CaseNoise | None, materials: Mapping[str, CaseMaterial]
             mobility=one,
         )
         machine.junction(source)
+
+
+def mounted(structures: Sequence[Structure], noise: CaseNoise, case: str) -> tuple[Structure, ...]:
+    """Structures at mounts, of all held bodies; rejects what nothing but the mounts joins."""
+    found = tuple(item for item in structures if item.at_mounts)
+    without = [item.name for item in structures if not item.at_mounts]
+    if without or not found:
+        raise InputError(
+            f"result of case {case}: noise.mounts",
+            got=f"no mount of {one_of(without)}" if found else "no bodies at mounts in the result",
+            expected="every held body at a mount, since all of them carry forces",
+            hint="list the surfaces that move together: "
+            "mounts: {flange: {surface: [housing.rim, pole.rim]}}."
+            if found
+            else "run the case again with these mounts, then klack noise.",
+        )
+    if any(set(item.at_mounts[0].port_names) - set(item.port_names) for item in found):
+        raise InputError(
+            f"result of case {case}: noise.mounts",
+            got="bodies of a former version, without the places of reactions",
+            expected="bodies that hold them",
+            hint="run the case again, then klack noise.",
+        )
+    joined = {found[0].name}
+    mounts = {item.name: set(item.at_mounts[0].mounts) for item in found}
+    for _ in found:
+        reached = {mount for name in joined for mount in mounts[name]}
+        joined |= {name for name, own in mounts.items() if own & reached}
+    apart = [name for name in mounts if name not in joined]
+    known = {mount for own in mounts.values() for mount in own}
+    missing = [name for name in noise.mounts or {} if name not in known]
+    if apart or missing:
+        raise InputError(
+            f"case {case}: noise.mounts",
+            got=f"{one_of(apart)} and {found[0].name}, which share no mount"
+            if apart
+            else f"the mount '{missing[0]}', which the result does not hold",
+            expected="one vibrating body: held bodies that share a mount",
+            hint="list both surfaces in one mount, if they are joined stiffly there: "
+            "surface: [housing.rim, pole.rim]."
+            if apart
+            else "run the case again, then klack noise.",
+        )
+    return found
 
 
 def _isolators(noise: CaseNoise) -> dict[str, Isolator]:

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from klack.acoustics.at_mounts import source_at_mounts, spectra_of_means
-from klack.acoustics.interface import Complexes, InterfacePoint, SourceAtMounts
+from klack.acoustics.at_mounts import points_of, source_at_mounts, spectra_of_means
+from klack.acoustics.interface import Complexes, SourceAtMounts
 from klack.acoustics.source_files import write_netcdf, write_uff
 from klack.acoustics.source_levels import exposure, single_equivalents
 from klack.analyses.noise.reactions import HeldForces
@@ -28,12 +28,7 @@ def source_of(
     """The source at frequencies (k,) [Hz] at even distances, and a shift [1/s]."""
     used = [item for item in structures if item.at_mounts]
     parts = [part for item in used for part in item.at_mounts]
-    places = {
-        mount: place
-        for part in parts
-        for mount, place in zip(part.mounts, part.references, strict=True)
-    }
-    points = tuple(InterfacePoint(name=name, position=place) for name, place in places.items())
+    points = points_of(parts)
 
     def at(frequency: Vector, shift: float = 0.0) -> SourceAtMounts:
         forces: list[Complexes] = []

@@ -23,7 +23,7 @@ from klack.analyses.noise.force import (
     interrupted_impact,
     stop_forces,
 )
-from klack.analyses.noise.machine import check_machine
+from klack.analyses.noise.machine import check_machine, mounted
 from klack.analyses.noise.reactions import HeldForces, forces_of_impact, forces_of_stroke
 from klack.analyses.stroke.record import StopSummary, StrokeStudy, StrokeVariant
 from klack.analyses.stroke.run import run_stroke
@@ -212,7 +212,9 @@ def impact_sources(
                 noise=noise,
                 given=given,
                 materials=materials,
-                held=forces_of_impact(_mounted(study, noise), force) if noise.mounts else None,
+                held=forces_of_impact(mounted(study.structures, noise, study.case), force)
+                if noise.mounts
+                else None,
                 speed=study.speed,
                 notes=(
                     *failed,
@@ -281,57 +283,13 @@ def held_forces(
     """All forces on held bodies up to an impact in which the run ends; None without mounts."""
     if not noise.mounts:
         return None
-    structures = _mounted(study, noise)
+    structures = mounted(study.structures, noise, study.case)
     return forces_of_stroke(
         structures,
         variant,
         noise,
         until=None if last is None else last.time,
     )
-
-
-def _mounted(study: ImpactStudy | StrokeStudy, noise: CaseNoise) -> tuple[Structure, ...]:
-    """Structures at mounts, of all held bodies; rejects what nothing but the mounts joins."""
-    found = tuple(item for item in study.structures if item.at_mounts)
-    without = [item.name for item in study.structures if not item.at_mounts]
-    if without or not found:
-        raise InputError(
-            f"result of case {study.case}: noise.mounts",
-            got=f"no mount of {one_of(without)}" if found else "no bodies at mounts in the result",
-            expected="every held body at a mount, since all of them carry forces",
-            hint="list the surfaces that move together: "
-            "mounts: {flange: {surface: [housing.rim, pole.rim]}}."
-            if found
-            else "run the case again with these mounts, then klack noise.",
-        )
-    if any(set(item.at_mounts[0].port_names) - set(item.port_names) for item in found):
-        raise InputError(
-            f"result of case {study.case}: noise.mounts",
-            got="bodies of a former version, without the places of reactions",
-            expected="bodies that hold them",
-            hint="run the case again, then klack noise.",
-        )
-    joined = {found[0].name}
-    mounts = {item.name: set(item.at_mounts[0].mounts) for item in found}
-    for _ in found:
-        reached = {mount for name in joined for mount in mounts[name]}
-        joined |= {name for name, own in mounts.items() if own & reached}
-    apart = [name for name in mounts if name not in joined]
-    known = {mount for own in mounts.values() for mount in own}
-    missing = [name for name in noise.mounts or {} if name not in known]
-    if apart or missing:
-        raise InputError(
-            f"case {study.case}: noise.mounts",
-            got=f"{one_of(apart)} and {found[0].name}, which share no mount"
-            if apart
-            else f"the mount '{missing[0]}', which the result does not hold",
-            expected="one vibrating body: held bodies that share a mount",
-            hint="list both surfaces in one mount, if they are joined stiffly there: "
-            "surface: [housing.rim, pole.rim]."
-            if apart
-            else "run the case again, then klack noise.",
-        )
-    return found
 
 
 def _stops(

@@ -3,13 +3,11 @@
 Forces of all pressures and flows on a port are one, called ``fluid``, and recorded by its impulse.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from math import pi
 
 from klack.hydraulics.inertance import Inertance
 from klack.hydraulics.line import Line
-from klack.mechanics.flexible_body import FlexibleBody
 from klack.network.network import Network
 from klack.network.rows import AMBIENT, GROUND, LineRow, Rows, WaveRow
 from klack.simulation.flow_channels import flow_label
@@ -106,9 +104,13 @@ class MovingBody:
     repaid: str = ""
 
 
-def acting_forces(rows: Rows, network: Network) -> tuple[ActingForce, ...]:
+def acting_forces(rows: Rows) -> tuple[ActingForce, ...]:
     """All recorded forces of elements, end stops and friction."""
-    places = dict(_places(rows, network))
+    places = {
+        handle: place
+        for row in rows.bodies
+        for handle, place in zip(row.ports, row.places, strict=True)
+    }
     names = {handle: row.component for row in rows.bodies for handle in row.ports}
 
     def acting(component: str, channel: str, handle: int, sign: float) -> ActingForce:
@@ -186,11 +188,11 @@ def _area(network: Network, component: str) -> float:
     return 0.25 * pi * part.diameter**2 if isinstance(part, Line) else 0.0
 
 
-def moving_bodies(rows: Rows, network: Network) -> tuple[MovingBody, ...]:
+def moving_bodies(rows: Rows) -> tuple[MovingBody, ...]:
     """Bodies that nothing holds."""
     return tuple(
         MovingBody(
-            body=_body(row.component, network),
+            body=row.places[0][0],
             velocity=f"{row.component} velocity",
             mass=float(row.body.mass),
             in_fluid=bool(rows.in_fluid & set(row.ports)),
@@ -200,15 +202,3 @@ def moving_bodies(rows: Rows, network: Network) -> tuple[MovingBody, ...]:
         for row in rows.bodies
         if row.body.rigid_count > 0
     )
-
-
-def _places(rows: Rows, network: Network) -> Iterator[tuple[int, tuple[str, str]]]:
-    for row in rows.bodies:
-        body = _body(row.component, network)
-        for name, handle in zip(row.names, row.ports, strict=True):
-            yield handle, (body, name)
-
-
-def _body(component: str, network: Network) -> str:
-    part = network.components.get(component)
-    return part.body if isinstance(part, FlexibleBody) else component

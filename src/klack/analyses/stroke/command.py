@@ -31,7 +31,7 @@ _Variants = Annotated[
         name="--variant",
         consume_multiple=True,
         negative="",
-        help="wet, dry, wet-lumped, dry-lumped; several (a,b,c) are overlaid. "
+        help="wet, dry, dry-mounted, wet-lumped, dry-lumped; several (a,b,c) are overlaid. "
         "[default: as in the case]",
     ),
 ]

@@ -442,8 +442,9 @@ NEXT_STEPS = (
 _DEFINITIONS: tuple[tuple[str, str], ...] = (
     (
         "variants",
-        "wet: as described in the case; dry: the same without its fluid, films included; lumped: "
-        "rigid bodies on one spring and dashpot per stop.",
+        "wet: as described in the case; dry: the same without its fluid, films included; mounted: "
+        "on the machine of the case, where the valve itself moves; lumped: rigid bodies on one "
+        "spring and dashpot per stop.",
     ),
     (
         "opening time, closing time",

@@ -35,6 +35,7 @@ Floats = NDArray[np.float64]
 _LOOKS: dict[str, Look] = {
     "wet": Look("black", "solid", 2.2),
     "dry": Look("red", "dashed", 2.0),
+    "dry-mounted": Look("green", "dashdot", 2.0),
     "wet-lumped": Look("blue", "dashdot", 2.0),
     "dry-lumped": Look("orange", "dotted", 2.2),
 }

@@ -165,7 +165,7 @@ class StrokeVariant:
     Parameters
     ----------
     name
-        ``"wet"``, ``"dry"``, ``"wet-lumped"`` or ``"dry-lumped"``.
+        ``"wet"``, ``"dry"``, ``"dry-mounted"``, ``"wet-lumped"`` or ``"dry-lumped"``.
     label
         For a legend, for example ``"n-heptane at 5 bar, 20 + 40 modes"``.
     modes

@@ -16,6 +16,7 @@ from klack.analyses.record import case_fields, run_fields
 from klack.analyses.stroke.acting import acting_forces, fluid_passages, moving_bodies
 from klack.analyses.stroke.controllers import controller_notes
 from klack.analyses.stroke.missing import cut_records, missing_notes, rest_note
+from klack.analyses.stroke.mounted import STANDING, standing_network
 from klack.analyses.stroke.record import (
     FluidSummary,
     IncompleteStrokeError,
@@ -152,10 +153,12 @@ def _record_notes(case: ValveCase, variants: Mapping[str, StrokeVariant]) -> Ite
 
 
 def variant_network(valve: Valve, variant: Variant) -> Network:
-    """Network of a variant: without fluid, with rigid bodies, or both."""
+    """Network of a variant: without fluid, with rigid bodies or on a machine."""
     network = valve.network
     if variant.startswith("dry"):
         network = network.dry()
+    if variant.endswith("mounted"):
+        return standing_network(valve, network)
     lumped = valve.case.lumped
     if variant.endswith("lumped"):
         if lumped is None:  # refused by require_variants already
@@ -482,8 +485,8 @@ def variant_of(
         times=times,
         result=result,
         setup_time=setup_time,
-        acting=acting_forces(rows, valve.network),
-        moving=moving_bodies(rows, valve.network),
+        acting=acting_forces(rows),
+        moving=moving_bodies(rows),
         passages=fluid_passages(rows, valve.network),
     )
 
@@ -503,7 +506,8 @@ def _label(valve: Valve, rows: Rows, *, wet: bool, flexible: bool) -> str:
         return f"{fluid}, rigid bodies on {lumped.stiffness / 1e6:.4g} N/um"
     if not any(elastic):
         return f"{fluid}, rigid bodies"
-    return f"{fluid}, {' + '.join(str(count) for count in elastic)} modes"
+    where = ", on its machine" if any(row.component == STANDING for row in rows.bodies) else ""
+    return f"{fluid}, {' + '.join(str(count) for count in elastic)} modes{where}"
 
 
 def _highest_pressure(rows: Rows) -> float:

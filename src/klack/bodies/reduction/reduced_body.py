@@ -14,7 +14,15 @@ from klack.errors import InputError
 from klack.files.whole import whole_file
 from klack.mesh.mesh import Mesh, simplices
 
-__all__ = ["Recovery", "ReducedBody", "StateSpace", "port_among", "read_arrays", "surface_faces"]
+__all__ = [
+    "HANGS",
+    "Recovery",
+    "ReducedBody",
+    "StateSpace",
+    "port_among",
+    "read_arrays",
+    "surface_faces",
+]
 
 
 Arrays = dict[str, NDArray[Any]]
@@ -121,6 +129,9 @@ def surface_faces(mesh: Mesh, surfaces: Sequence[str]) -> NDArray[np.int64]:
     empty = np.empty((0, mesh.dimension), dtype=np.int64)
     return np.concatenate([empty, *pieces])
 
+
+HANGS = 2.0 * np.pi * 0.1
+"""Frequency [rad/s] at which a whole hangs that nothing holds: forces at rest do not move it."""
 
 FORMAT = "klack.reduced_body"
 VERSION = 1
@@ -230,6 +241,12 @@ class ReducedBody:
     def frequencies(self) -> NDArray[np.float64]:
         """Eigenfrequencies [Hz], shape (m,); rigid ones are 0."""
         return self.omega / (2.0 * np.pi)
+
+    @property
+    def resting_omega(self) -> NDArray[np.float64]:
+        """Of the elastic modes [rad/s], as forces at rest meet them; infinite for those that hang."""
+        elastic = self.omega[self.rigid_count :]
+        return np.where(elastic > HANGS, elastic, np.inf)
 
     @property
     def modal_compliance(self) -> NDArray[np.float64]:
