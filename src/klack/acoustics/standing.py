@@ -51,6 +51,8 @@ class StandingValve:
         n motions of the mounts.
     mounts (m, n) [1/sqrt(kg)]
         Their shapes.
+    momentum (m,) [sqrt(kg)]
+        Axial momentum of the bodies per modal velocity.
     dampers
         Name -> shape (m,) of the motion that it sees, and its damping [N s/m].
     """
@@ -60,6 +62,7 @@ class StandingValve:
     shapes: Matrix
     freedoms: tuple[Freedom, ...]
     mounts: Matrix
+    momentum: Vector
     dampers: Mapping[str, tuple[Vector, float]]
 
     def reduced(
@@ -92,6 +95,7 @@ class StandingValve:
             rigid_axial=np.zeros(0),
             dof_count=omega.size,
             correction="none",
+            momentum=self.momentum[kept],
         )
 
 
@@ -115,6 +119,9 @@ def standing_valve(
     T, kept, _ = transformation(points, freedoms, receiver, placements, missing)
     modes, own = sum(body.omega.size for body in bodies), len(freedoms)
     M, K, C, ports = _valve(bodies, freedoms)
+    momentum = M[
+        :, [modes + i for i, freedom in enumerate(freedoms) if freedom.direction == 3]
+    ].sum(axis=1)
     omega, damping, shapes, residual, plate = _receiver(receiver)
     size, r = modes + own + omega.size, omega.size
     M = scipy.linalg.block_diag(M, np.eye(r) * (0.0 if plate.size else 1.0))
@@ -149,6 +156,7 @@ def standing_valve(
         shapes=X[: modes + own].T @ ports,
         freedoms=freedoms,
         mounts=X[modes : modes + own].T,
+        momentum=X[: modes + own].T @ momentum,
         dampers=seen,
     )
 

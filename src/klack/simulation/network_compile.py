@@ -278,6 +278,8 @@ def _compile_bodies(
         cm = np.zeros(modes)
         if body.rigid_count:
             cm[: body.rigid_count] = body.rigid_axial / body.mass
+        if body.momentum is not None:
+            cm = body.momentum / body.mass
         v0 = np.zeros(modes)
         v0[: body.rigid_count] = row.speed * body.rigid_axial
         here = slice(first_port, first_port + own)

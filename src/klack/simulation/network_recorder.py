@@ -73,7 +73,7 @@ class Recorder:
             for k, row in enumerate(rows.branches)
             for channel in row.channels
         ]
-        free = [b for b, row in enumerate(rows.bodies) if row.body.rigid_count > 0]
+        free = [b for b, row in enumerate(rows.bodies) if row.body.moves]
         driven = [row.component for row in rows.bodies if row.course is not None]
         blocks = network.body_blocks
         owner = [b for b, row in enumerate(rows.bodies) for _ in row.ports]
@@ -285,7 +285,7 @@ def _parting(rows: Rows, blocks: NDArray[np.int64]) -> NDArray[np.int64]:
     free = {
         port: (blocks[b], blocks[b + 1])
         for b, row in enumerate(rows.bodies)
-        if row.body.rigid_count > 0
+        if row.body.moves
         for port in row.ports
     }
     ends = [(row.upper, row.lower) for row in rows.interfaces]
@@ -296,7 +296,7 @@ def _parting(rows: Rows, blocks: NDArray[np.int64]) -> NDArray[np.int64]:
 def recorded_columns(rows: Rows) -> int:
     """Channels that a run of these rows records."""
     ports = sum(len(row.ports) for row in rows.bodies)
-    free = sum(1 for row in rows.bodies if row.body.rigid_count > 0)
+    free = sum(1 for row in rows.bodies if row.body.moves)
     states = sum(len(row.channels) for row in rows.elements)
     states += sum(len(row.channels) for row in rows.branches)
     forces = sum(len(row.names) for row in rows.elements) + len(rows.branches)

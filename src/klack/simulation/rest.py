@@ -82,7 +82,7 @@ def longest_period(bodies: Sequence[BodyRow | None]) -> float:
 
 def effective_mass(bodies: Sequence[BodyRow | None]) -> float:
     """Mass of the relative motion of the moving bodies [kg]; infinite if none moves."""
-    inverse = sum(1.0 / b.body.mass for b in bodies if b is not None and b.body.rigid_count > 0)
+    inverse = sum(1.0 / b.body.mass for b in bodies if b is not None and b.body.moves)
     return 1.0 / inverse if inverse > 0.0 else np.inf
 
 
@@ -96,6 +96,9 @@ def mobility(row: InterfaceRow, bodies: Sequence[BodyRow | None]) -> float:
         if owner is None or owner.course is not None:
             continue
         body, port = owner.body, owner.ports.index(handle)
+        if body.momentum is not None:
+            found += float(body.momentum @ body.port_shapes[:, port]) / body.mass
+            continue
         found += float(body.rigid_axial @ body.port_shapes[: body.rigid_count, port]) / body.mass
     return found
 

@@ -187,6 +187,9 @@ class ReducedBody:
         See :mod:`klack.bodies.reduction.reduce`.
     attachment_count
         Attachment modes among the modes.
+    momentum (m,) [sqrt(kg)]
+        Axial momentum per modal velocity of what moves as a whole without rigid modes, such as a
+        valve on its machine; not stored.
     """
 
     name: str
@@ -204,6 +207,7 @@ class ReducedBody:
     correction: str = "consistent"
     attachment_count: int = 0
     recovery: Recovery | None = None
+    momentum: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         modes, ports, observers = len(self.omega), len(self.port_names), len(self.observer_names)
@@ -233,6 +237,11 @@ class ReducedBody:
             )
 
     @property
+    def moves(self) -> bool:
+        """Whether its centre of mass moves other than by waves within."""
+        return self.rigid_count > 0 or self.momentum is not None
+
+    @property
     def mode_count(self) -> int:
         """Number of modes, rigid ones included."""
         return len(self.omega)
@@ -244,7 +253,7 @@ class ReducedBody:
 
     @property
     def resting_omega(self) -> NDArray[np.float64]:
-        """Of the elastic modes [rad/s], as forces at rest meet them; infinite for those that hang."""
+        """Of the elastic modes [rad/s], for forces at rest; infinite for those that hang."""
         elastic = self.omega[self.rigid_count :]
         return np.where(elastic > HANGS, elastic, np.inf)
 
