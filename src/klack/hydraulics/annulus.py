@@ -10,7 +10,7 @@ from klack.hydraulics.network_fluid import ambient_viscosity, viscosity_law
 from klack.hydraulics.pressure_viscosity import mean_viscosity_ratio
 from klack.network.component import Component
 from klack.network.port import ELEMENT, FLOW, Port, Role
-from klack.network.rows import Rows
+from klack.network.rows import Liquid, Rows
 from klack.network.step_function import step_function
 from klack.units import Length, Ratio
 
@@ -120,8 +120,10 @@ class Annulus(Component):
 
     def add_rows(self, rows: Rows) -> None:
         """Add one branch that pushes needle and body."""
-        _, viscosity = ambient_viscosity(rows)
+        fluid, viscosity = ambient_viscosity(rows)
         law = viscosity_law(rows)
+        half = 0.5 * pi * self.diameter * self.clearance
+        density = float(fluid.density(rows.ambient.pressure))
         rows.branch(
             annulus_step if law is None else annulus_under_pressure_step,
             a=rows.port("a"),
@@ -129,8 +131,13 @@ class Annulus(Component):
             ports=(rows.port("needle"), rows.port("body")),
             parameters=(
                 self.conductance(viscosity),
-                0.5 * pi * self.diameter * self.clearance,
+                half,
                 self.drag(viscosity),
                 *(law.numbers if law is not None else ()),
+            ),
+            liquid=Liquid(
+                inertance=0.5 * density * self.length / half,
+                length=self.length,
+                resistance=1.0 / self.conductance(viscosity),
             ),
         )

@@ -12,7 +12,7 @@ from klack.hydraulics.pressure_viscosity import mean_viscosity_ratio
 from klack.machine.compiling.jit import inner
 from klack.network.component import Component
 from klack.network.port import FLOW, Port
-from klack.network.rows import Book, Channel, Rows
+from klack.network.rows import Book, Channel, Liquid, Rows
 from klack.network.step_function import carray, step_function
 from klack.units import Area, Length
 
@@ -119,4 +119,9 @@ class Inertance(Component):
             books=(Book("kinetic", "store"),),
             channels=(Channel("mass flow", "kg/s", 0),),
             column=friction,
+            liquid=Liquid(
+                inertance=density * self.length / self.channel_area,
+                length=self.length,
+                resistance=self.resistance(viscosity),
+            ),
         )

@@ -14,7 +14,7 @@ from klack.machine.compiling.constant import with_slope_of
 from klack.machine.compiling.jit import njit
 from klack.network.component import Component
 from klack.network.port import FLOW, Port
-from klack.network.rows import Rows
+from klack.network.rows import Liquid, Rows
 from klack.network.step_function import step_function
 from klack.units import Area, Length, Ratio
 
@@ -260,6 +260,17 @@ class Orifice(Component):
         throat = NOT_CHOKED if self.cavitation is None else self.cavitation * area
         return self.discharge * area, number, throat, vapour_pressure
 
+    def liquid(self, density: float) -> Liquid:
+        """Liquid in and about the holes as if in a thin plate, ``rho/d`` each.
+
+        Exact for potential flow through a circular hole in an infinite thin wall (Rayleigh, Theory
+        of Sound II, 1878, art. 306): a column ``pi/4 d`` long.  A wall adds its thickness.
+        """
+        area = self.count * self.hole_area
+        length = 0.25 * pi * sqrt(4.0 * self.hole_area / pi)
+        loss = 0.5 * density / (self.discharge * area) ** 2
+        return Liquid(inertance=density * length / area, length=length, loss=loss, thin=True)
+
     def add_rows(self, rows: Rows) -> None:
         """Add one branch."""
         fluid, viscosity = ambient_viscosity(rows)
@@ -270,4 +281,5 @@ class Orifice(Component):
             a=rows.port("a"),
             b=rows.port("b"),
             parameters=parameters if law is None else (*parameters, *law.numbers),
+            liquid=self.liquid(float(fluid.density(rows.ambient.pressure))),
         )

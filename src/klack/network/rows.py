@@ -38,6 +38,7 @@ __all__ = [
     "InterfaceRow",
     "LimitRow",
     "LineRow",
+    "Liquid",
     "MotionCourse",
     "NodeRow",
     "Rows",
@@ -212,12 +213,35 @@ class ControllerRow:
     handle: int
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Liquid:
+    """What a passage holds: its inertia, and what else the flow through it meets.
+
+    Parameters
+    ----------
+    inertance [kg/m^4]
+        ``rho length/area``.
+    length [m]
+    resistance, loss [Pa s/m^3], [Pa s^2/m^6]
+        Pressure drop ``resistance Q + loss Q^2``.
+    thin
+        Whether nothing but the diameter of a hole is known, and the length is that of a thin plate.
+    """
+
+    inertance: float
+    length: float
+    resistance: float = 0.0
+    loss: float = 0.0
+    thin: bool = False
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class BranchRow:
     """Flow between two hydraulic nodes, perhaps pushing mechanical ports.
 
     ``column`` [J s/kg^2] belongs to a column of fluid whose mass flow is its first state: its
-    friction, ``g_a - g_b = column * mdot`` in steady flow.
+    friction, ``g_a - g_b = column * mdot`` in steady flow.  Other rows leave out the inertia of
+    their ``liquid``, where that is known.
     """
 
     component: str
@@ -232,6 +256,7 @@ class BranchRow:
     channels: tuple[Channel, ...]
     failures: Mapping[int, str]
     column: float | None = None
+    liquid: Liquid | None = None
     state_names: Mapping[int, tuple[str, str]] = field(default_factory=dict)
 
 
@@ -631,6 +656,7 @@ class Rows:
         failures: Mapping[int, str] | None = None,
         label: str = "",
         column: float | None = None,
+        liquid: Liquid | None = None,
     ) -> None:
         """Add a flow between the nodes ``a`` and ``b``; its mass flow is recorded."""
         self.branches.append(
@@ -647,6 +673,7 @@ class Rows:
                 channels=tuple(channels),
                 failures=failures or {},
                 column=column,
+                liquid=liquid,
             )
         )
 

@@ -21,6 +21,7 @@ from klack.network.rows import BranchRow, ElementRow, Rows
 from klack.simulation import energy_balance
 from klack.simulation.control_loop import ControlLoop
 from klack.simulation.delay_line import LINE_MEMORY
+from klack.simulation.displaced_liquid import liquid_doubts
 from klack.simulation.impact_doubts import impact_doubts, line_doubts
 from klack.simulation.impact_events import ImpactFinder
 from klack.simulation.lasting_laws import pressed_state, slider_places
@@ -282,7 +283,9 @@ def simulate_network(
                 AccuracyWarning,
                 stacklevel=2,
             )
-    for doubt in line_doubts(network, step * first_step):
+    doubts = [*line_doubts(network, step * first_step)]
+    doubts += liquid_doubts(rows, channels, step * grid.looks * grid.look_steps)
+    for doubt in doubts:
         warnings.warn(doubt, AccuracyWarning, stacklevel=2)
     if network.moving is None:
         rising = _rising(network) if sizes.near > 1 else ()

@@ -1,0 +1,204 @@
+r"""What a finished run says of liquid that its bodies displace through passages without inertia.
+
+A body of the speed ``v`` displaces ``A_b v`` of the liquid on its faces, which leaves through
+passages of length ``l`` and area ``A``.  The kinetic energy there is that of a mass on the body,
+
+.. math:: m = \varrho\,\frac{l}{A}\,A_b^2 \quad\text{or}\quad
+          m = \sum_e L_e\,\Bigl|\frac{Q_e}{v}\Bigr|^2, \qquad L = \varrho\,\frac{l}{A},
+
+with the flows ``Q_e`` that share the displaced one: the amplitudes at the pace of the motion,
+``omega = 2 v_max / travel``, by
+
+.. math:: i\omega \frac{V_n}{K} p_n + A_n v + \sum_e Q_e = 0, \qquad
+          p_n - p_m = (i\omega L_e + R_e + C_e |Q_e|)\,Q_e .
+
+So parallel passages share the flow, a guide that is too tight leaves it to others, and a chamber
+that is large enough takes it.  Where chambers swing at that pace they would multiply it; the mass
+is at most that in rigid ones.  The sum is over passages whose inertia the rows leave out, except
+those behind an inertance or a line that has it: at a volume without a moving wall.
+
+Limits: seats, edges and other restrictions that move, and accumulators, take any flow without
+inertia, which makes the mass a lower limit; liquid within chambers is left out.  Source: Lamb,
+Hydrodynamics, 1932, art. 136 (kinetic energy as an added mass); Merritt 1967, sec. 3-8.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from klack.arrays import Vector
+from klack.network.rows import AMBIENT, BodyRow, BranchRow, Liquid, Rows
+from klack.simulation.network_result import ChannelData
+from klack.units import format_si
+
+__all__ = ["liquid_doubts"]
+
+_SHARE = 0.05  # of the mass of a body, from which on liquid without inertia is doubted
+_NAMED = 0.1  # of the liquid that is missing, for a passage to be named
+_KEPT = 0.5  # of the inertance of passages, in an inertance before them, that stands for them
+_OPEN, _RIGID = 1e-5, 1e-4  # of the least inertance; of the compliance of chambers
+_SETTLED = 6  # repetitions of the resistance at the amplitude
+
+
+@dataclass(frozen=True, slots=True)
+class _Passage:
+    """Ends, and what is there; ``missing`` [kg/m^4] is the inertance that the rows leave out."""
+
+    row: BranchRow | None
+    a: int
+    b: int
+    liquid: Liquid
+    missing: float = 0.0
+
+
+def liquid_doubts(rows: Rows, channels: Mapping[str, ChannelData], record: float) -> Iterator[str]:
+    """Sentences on bodies whose displaced liquid lacks inertia of 5 % of their mass or more.
+
+    ``record`` [s] is the time between two values of the channels.
+    """
+    if rows.fluid is None or not rows.walls:
+        return
+    passages = tuple(_passages(rows))
+    for row in rows.bodies:
+        if row.body.rigid_count == 0 or row.course is not None:
+            continue
+        areas = _areas(rows, row)
+        limit = _SHARE * row.body.mass
+        widest = sum(map(abs, areas.values())) ** 2
+        if all(passage.missing * widest < limit for passage in passages):
+            continue
+        speed = channels[f"{row.component} velocity"].values
+        travel = float(np.ptp(np.cumsum(speed))) * record
+        fastest = float(np.max(np.abs(speed)))
+        if not travel > 0.0:
+            continue
+        masses = _masses(rows, passages, areas, 2.0 * fastest / travel, fastest)
+        if masses.sum() >= limit:
+            yield _sentence(rows, row, passages, masses)
+
+
+def _areas(rows: Rows, row: BodyRow) -> dict[int, float]:
+    """By node: volume that opens there per displacement of the whole body [m^2]."""
+    rigid = row.body.port_shapes[: row.body.rigid_count].T @ row.body.rigid_axial
+    moves = dict(zip(row.ports, map(float, rigid), strict=True))
+    areas: dict[int, float] = {}
+    for wall in rows.walls:
+        if wall.port in moves:
+            areas[wall.node] = areas.get(wall.node, 0.0) + wall.area * moves[wall.port]
+    return areas
+
+
+def _passages(rows: Rows) -> Iterator[_Passage]:
+    """All ways of the liquid but walls that yield and sources of flow."""
+    branches = [
+        row
+        for row in rows.branches
+        if row.label != "wall" and not any(book.kind == "supply" for book in row.books)
+    ]
+    known = [row.liquid.inertance for row in branches if row.liquid is not None]
+    open_way = Liquid(inertance=_OPEN * min(known, default=1.0), length=0.0)
+    lines = [
+        _Passage(None, line.a, line.b, Liquid(inertance=line.delay * line.impedance, length=0.0))
+        for line in rows.lines
+    ]
+    columns = [row for row in branches if row.column is not None and row.liquid is not None]
+    kept = [(row.a, row.b, row.liquid.inertance) for row in columns if row.liquid is not None]
+    kept += [(line.a, line.b, line.liquid.inertance) for line in lines]
+    moved = {wall.node for wall in rows.walls}
+    counted = set[int]()  # nodes at which a column stands for the passages that meet there
+    for node in {end for a, b, _ in kept for end in (a, b)} - moved - {AMBIENT}:
+        if rows.nodes[node].prescribed:
+            continue
+        column = _parallel(inertance for a, b, inertance in kept if node in (a, b))
+        others = [
+            row.liquid.inertance
+            for row in branches
+            if row.column is None and row.liquid is not None and node in (row.a, row.b)
+        ]
+        if others and column >= _KEPT * _parallel(others):
+            counted.add(node)
+    yield from lines
+    yield from (_Passage(None, wave.a, wave.b, open_way) for wave in rows.waves)
+    for row in branches:
+        if row.liquid is None:
+            yield _Passage(row, row.a, row.b, open_way)
+        elif row.column is not None:
+            yield _Passage(row, row.a, row.b, row.liquid)
+        else:
+            is_counted = not counted.isdisjoint((row.a, row.b))
+            missing = 0.0 if is_counted else row.liquid.inertance
+            yield _Passage(row, row.a, row.b, row.liquid, missing)
+
+
+def _parallel(inertances: Iterator[float] | Sequence[float]) -> float:
+    return 1.0 / sum(1.0 / inertance for inertance in inertances)
+
+
+def _masses(
+    rows: Rows,
+    passages: Sequence[_Passage],
+    areas: Mapping[int, float],
+    omega: float,
+    speed: float,
+) -> Vector:
+    """Mass that each passage leaves out [kg]: the lesser of those with real and rigid chambers."""
+    assert rows.fluid is not None
+    free = [node for node, row in rows.nodes.items() if node != AMBIENT and not row.prescribed]
+    place = {node: i for i, node in enumerate(free)}
+    ends = np.zeros((len(passages), len(free)))
+    for e, passage in enumerate(passages):
+        for node, sign in ((passage.a, 1.0), (passage.b, -1.0)):
+            if node in place:
+                ends[e, place[node]] += sign
+    moved = np.array([areas.get(node, 0.0) for node in free])
+    held = [rows.nodes[node] for node in free]
+    stiff = rows.fluid.bulk_modulus(np.array([row.at_start for row in held]))
+    compliance = np.array([row.volume for row in held]) / stiff
+    inertance = np.array([passage.liquid.inertance for passage in passages])
+    resistance = np.array([passage.liquid.resistance for passage in passages])
+    loss = np.array([passage.liquid.loss for passage in passages])
+    missing = np.array([passage.missing for passage in passages])
+    found = []
+    for share in (1.0, _RIGID):
+        flow = np.zeros(len(passages), dtype=complex)
+        store = 1j * omega * (share * compliance + _RIGID * _RIGID * compliance.sum())
+        for _ in range(_SETTLED):
+            drop = 1j * omega * inertance + resistance + loss * speed * np.abs(flow)
+            balance = np.diag(store) + (ends.T / drop) @ ends
+            flow = (ends @ np.linalg.solve(balance, -moved)) / drop
+        found.append(missing * np.abs(flow) ** 2)
+    return min(found, key=np.sum)
+
+
+def _sentence(rows: Rows, row: BodyRow, passages: Sequence[_Passage], masses: Vector) -> str:
+    total = float(masses.sum())
+    ways: dict[frozenset[int], list[_Passage]] = {}
+    for passage, mass in zip(passages, masses, strict=True):
+        if mass >= _NAMED * total:
+            ways.setdefault(frozenset((passage.a, passage.b)), []).append(passage)
+    named = [passage for way in ways.values() for passage in way]
+    names = " and ".join(f"'{passage.row.component}'" for passage in named if passage.row)
+    thin = ""
+    if any(passage.liquid.thin for passage in named):
+        thin = " A hole counts as one in a thin plate: longer ones hold more."
+    return (
+        f"'{row.component}' displaces liquid through {names}, whose inertia is left out: it would "
+        f"act like {format_si(1e3 * total, 'g', 2)} on its {format_si(1e3 * row.body.mass, 'g', 3)}"
+        f", so its motion is too fast.{thin}\n"
+        f"Try: {'; '.join(_advice(rows, way) for way in ways.values())}."
+    )
+
+
+def _advice(rows: Rows, way: Sequence[_Passage]) -> str:
+    node = way[0].a
+    ports = [f"{p.row.component}.{'a' if p.a == node else 'b'}" for p in way if p.row]
+    density = float(rows.fluid.density(rows.ambient.pressure)) if rows.fluid else 0.0
+    length = max(passage.liquid.length for passage in way)
+    area = density * length / _parallel([passage.liquid.inertance for passage in way])
+    beside = "ambient" if node == AMBIENT else f"'{rows.nodes[node].component}'"
+    return (
+        f"join {' and '.join(ports)} to a chamber of their own, {{type: chamber, volume: "
+        f"{1e9 * length * area:.2g} mm^3}}, and that to {beside} by {{type: inertance, "
+        f"length: {1e3 * length:.3g} mm, area: {1e6 * area:.3g} mm^2}}"
+    )

@@ -1,0 +1,148 @@
+"""Liquid that a body displaces: its added mass in a run, and in the note of a run without it.
+
+Truth: closed formulas, ``sqrt(k/(m + rho l A_b^2/A))`` and two masses on springs.  Inertances in
+parallel.
+"""
+
+from math import pi, sqrt
+
+import numpy as np
+import pytest
+
+from klack.hydraulics.annulus import Annulus
+from klack.hydraulics.chamber import Chamber
+from klack.hydraulics.fluid_library import library_fluid
+from klack.hydraulics.inertance import Inertance
+from klack.hydraulics.orifice import Orifice
+from klack.hydraulics.pressure_face import PressureFace
+from klack.hydraulics.pressure_source import PressureSource
+from klack.mechanics.rigid_mass import RigidMass
+from klack.mechanics.spring import Spring
+from klack.network.network import Network
+from klack.simulation.displaced_liquid import liquid_doubts
+from klack.simulation.network_result import ChannelData
+from klack.simulation.network_run import simulate_network
+from klack.units import MASS as MASSES
+from klack.units import parse_quantity
+
+pytestmark = pytest.mark.filterwarnings("ignore::klack.network.checks.LooseBodyWarning")
+
+HEPTANE = library_fluid("n-heptane").at(293.15)
+AMBIENT = 101_325.0
+RHO = float(HEPTANE.density(AMBIENT))
+BULK = float(HEPTANE.bulk_modulus(AMBIENT))
+MASS, STIFFNESS, PUSH = 3e-3, 1e5, 1.0
+FACE = 5e-3  # diameter
+AREA = pi / 4.0 * FACE**2
+VOLUME = 20e-9
+GAP = Annulus(diameter=4e-3, length=5e-3, clearance=150e-6)
+HOLE = Orifice(diameter=1.2e-3)
+
+
+def network(passages, volume=VOLUME, before=None):
+    """A mass on a spring whose face displaces a chamber between passages and a tank."""
+    parts = {
+        "mass": RigidMass(mass=MASS),
+        "spring": Spring(stiffness=STIFFNESS, preload=PUSH),
+        "face": PressureFace(direction="opening", outer_diameter=FACE),
+        "room": Chamber(volume=volume, pressure=AMBIENT),
+        "tank": PressureSource(pressure=AMBIENT),
+        **passages,
+    }
+    room, tank = ["room.fluid", "face.fluid"], ["tank.fluid"]
+    joints = [["mass.body", "spring.end", "face.body"]]
+    mouth = room
+    if before is not None:
+        parts |= {"liquid": before, "mouth": Chamber(volume=VOLUME, pressure=AMBIENT)}
+        room.append("liquid.a")
+        mouth = ["liquid.b", "mouth.fluid"]
+        joints.append(mouth)
+    for name, part in passages.items():
+        mouth.append(f"{name}.a")
+        tank.append(f"{name}.b")
+        if isinstance(part, Annulus):
+            joints.append([f"{name}.needle", "ground"])
+    return Network(parts, [*joints, room, tank], fluid=HEPTANE).rows()
+
+
+def swing(rows, duration=7e-3):
+    return simulate_network(
+        rows, duration=duration, step=0.1e-6, coarse=1, record=1e-6, start="free"
+    )
+
+
+def added_mass(result):
+    """From the time of whole periods, less the mass of the body."""
+    y = result.channels["mass.body displacement"].values + PUSH / STIFFNESS
+    i = np.flatnonzero((y[:-1] > 0.0) & (y[1:] <= 0.0))
+    times = result.time[i] + np.diff(result.time)[i] * y[i] / (y[i] - y[i + 1])
+    omega = 2.0 * pi * (len(times) - 1) / (times[-1] - times[0])
+    return STIFFNESS / omega**2 - MASS
+
+
+def notes(passages, pace=5e3, speed=0.05, **more):
+    """Notes on a motion of that pace [rad/s] and greatest speed."""
+    record = 1e-3 / pace
+    time = record * np.arange(int(2.0 * pi / pace / record))
+    moved = {"mass velocity": ChannelData(unit="m/s", values=speed * np.cos(pace * time))}
+    return list(liquid_doubts(network(passages, **more), moved, record))
+
+
+def stated(note):
+    """Added mass of a note [kg]."""
+    return parse_quantity(note.split("act like ")[1].split(" on its")[0], MASSES)
+
+
+def test_column_swings_as_an_added_mass() -> None:
+    length, bore = 5e-3, 2e-3
+    column = Inertance(length=length, diameter=bore, friction="none")
+    inertance = RHO * length / (pi / 4.0 * bore**2)
+    found = swing(network({"column": column}))
+    # stiff liquid: sqrt(k/(m + m_eq)); its compliance as exactly: m and m_eq with a spring between
+    spring = BULK * AREA**2 / VOLUME
+    pair = np.array([[STIFFNESS + spring, -spring], [-spring, spring]])
+    weights = np.array([MASS, inertance * AREA**2])
+    omega = sqrt(np.linalg.eigvals(pair / weights[:, None]).real.min())
+    exact = STIFFNESS / omega**2 - MASS
+    assert exact == pytest.approx(inertance * AREA**2, rel=0.01, abs=0.0)
+    # 3e-6 of the time by the other mode, 5e-7 by the steps, 2e-5 by the volume that changes
+    assert added_mass(found) == pytest.approx(exact, rel=2e-3, abs=0.0)
+
+
+@pytest.mark.parametrize("name", ["gap", "hole"])
+def test_mass_of_the_note_is_what_its_inertance_adds(name) -> None:
+    part = {"gap": GAP, "hole": HOLE}[name]
+    with pytest.warns(UserWarning, match="inertia is left out") as warned:
+        bare = swing(network({name: part}))
+    note = next(str(w.message) for w in warned if "displaces" in str(w.message))
+    length, area = (float(note.split(f"{key}: ")[1].split(" mm")[0]) for key in ("length", "area"))
+    column = Inertance(length=1e-3 * length, area=1e-6 * area, friction="none")
+    whole = swing(network({name: part}, before=column))
+    # two digits of the note, 1 %; the compliance of both rooms, 1 %
+    assert added_mass(whole) - added_mass(bare) == pytest.approx(stated(note), rel=0.02, abs=0.0)
+
+
+def test_passages_share_what_is_displaced() -> None:
+    (note,) = notes({"gap": GAP, "hole": HOLE}, speed=1e-4)  # no loss, little friction
+    gap = RHO * GAP.length / (pi * GAP.diameter * GAP.clearance)
+    hole = RHO / HOLE.diameter  # Rayleigh
+    assert stated(note) == pytest.approx(AREA**2 / (1.0 / gap + 1.0 / hole), rel=0.02, abs=0.0)
+    assert "through 'gap' and 'hole'" in note
+    assert "join gap.a and hole.a to a chamber of their own" in note
+    assert "that to 'room' by {type: inertance, length: 5 mm" in note
+
+
+def test_no_note_where_the_liquid_does_not_matter() -> None:
+    column = Inertance(length=5e-3, area=2e-6)
+    assert notes({"gap": GAP}) != []
+    assert notes({"gap": GAP}, before=column) == []  # it has its inertia
+    assert notes({"gap": GAP}, before=column.model_copy(update={"area": 8e-6})) != []  # too little
+    assert notes({"gap": GAP}, volume=1e-3) == []  # the chamber takes it
+    assert notes({"gap": GAP}, pace=2e6) == []  # before the column answers
+    assert notes({"hole": Orifice(diameter=4e-3)}) == []  # 3 % of the mass
+    tight = Annulus(diameter=5e-3, length=10e-3, clearance=4e-6)
+    locked = sqrt(BULK * AREA**2 / VOLUME / MASS)  # pace of the mass on the closed chamber
+    assert notes({"guide": tight}, pace=locked) == []  # squeezed, it does not pass
+    (note,) = notes({"gap": GAP, "guide": tight})
+    assert "'guide'" not in note
+    assert notes({"gap": GAP}, speed=0.0) == []
