@@ -104,9 +104,9 @@ def test_column_swings_as_an_added_mass() -> None:
     weights = np.array([MASS, inertance * AREA**2])
     omega = sqrt(np.linalg.eigvals(pair / weights[:, None]).real.min())
     exact = STIFFNESS / omega**2 - MASS
-    assert exact == pytest.approx(inertance * AREA**2, rel=0.01, abs=0.0)
-    # 3e-6 of the time by the other mode, 5e-7 by the steps, 2e-5 by the volume that changes
-    assert added_mass(found) == pytest.approx(exact, rel=2e-3, abs=0.0)
+    assert exact == pytest.approx(inertance * AREA**2, rel=1e-3, abs=0.0)
+    # found 4e-5: the other mode, at 0.07 % of the amplitude, shifts the times of the periods
+    assert added_mass(found) == pytest.approx(exact, rel=2e-4, abs=0.0)
 
 
 @pytest.mark.parametrize("name", ["gap", "hole"])
@@ -129,7 +129,8 @@ def test_passages_share_what_is_displaced() -> None:
     assert stated(note) == pytest.approx(AREA**2 / (1.0 / gap + 1.0 / hole), rel=0.02, abs=0.0)
     assert "through 'gap' and 'hole'" in note
     assert "join gap.a and hole.a to a chamber of their own" in note
-    assert "that to 'room' by {type: inertance, length: 5 mm" in note
+    area = 1e6 * RHO * GAP.length * (1.0 / gap + 1.0 / hole)  # one column with both inertances
+    assert f"'room' by {{type: inertance, length: 5 mm, area: {area:.3g} mm^2}}" in note
 
 
 def test_no_note_where_the_liquid_does_not_matter() -> None:

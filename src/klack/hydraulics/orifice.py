@@ -264,7 +264,7 @@ class Orifice(Component):
         """Liquid in and about the holes as if in a thin plate, ``rho/d`` each.
 
         Exact for potential flow through a circular hole in an infinite thin wall (Rayleigh, Theory
-        of Sound II, 1878, art. 306): a column ``pi/4 d`` long.  A wall adds its thickness.
+        of Sound II, 1878, sec. 306): a column ``pi/4 d`` long.  A wall adds its thickness.
         """
         area = self.count * self.hole_area
         length = 0.25 * pi * sqrt(4.0 * self.hole_area / pi)

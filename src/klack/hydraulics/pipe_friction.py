@@ -11,7 +11,7 @@ from klack.input.problem import CaseProblem
 from klack.machine.compiling.jit import njit
 from klack.network.component import Component
 from klack.network.port import FLOW, Port
-from klack.network.rows import Channel, Rows
+from klack.network.rows import Channel, Liquid, Rows
 from klack.network.step_function import step_function
 from klack.units import Length, format_si
 
@@ -189,11 +189,25 @@ class PipeFriction(Component):
 
     def add_rows(self, rows: Rows) -> None:
         """Add one branch."""
-        _, viscosity = fixed_viscosity(rows)
-        self.add_between(rows, rows.port("a"), rows.port("b"), viscosity)
+        fluid, viscosity = fixed_viscosity(rows)
+        area = pi / 4.0 * self.diameter**2
+        liquid = Liquid(
+            inertance=float(fluid.density(rows.ambient.pressure)) * self.length / area,
+            length=self.length,
+            resistance=8.0 * pi * viscosity * self.length / area**2,
+        )
+        self.add_between(rows, rows.port("a"), rows.port("b"), viscosity, liquid=liquid)
 
-    def add_between(self, rows: Rows, a: int, b: int, viscosity: float, label: str = "") -> None:
-        """Add the branch between two nodes of the present component."""
+    def add_between(
+        self,
+        rows: Rows,
+        a: int,
+        b: int,
+        viscosity: float,
+        label: str = "",
+        liquid: Liquid | None = None,
+    ) -> None:
+        """Add the branch between two nodes of the present component; ``liquid`` of a whole pipe."""
         rows.branch(
             pipe_friction_step,
             a=a,
@@ -202,4 +216,5 @@ class PipeFriction(Component):
             state=(0.0,),
             channels=(Channel("Reynolds number", "-", 0, derived=True),),
             label=label,
+            liquid=liquid,
         )

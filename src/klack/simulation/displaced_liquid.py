@@ -19,7 +19,7 @@ those behind an inertance or a line that has it: at a volume without a moving wa
 
 Limits: seats, edges and other restrictions that move, and accumulators, take any flow without
 inertia, which makes the mass a lower limit; liquid within chambers is left out.  Source: Lamb,
-Hydrodynamics, 1932, art. 136 (kinetic energy as an added mass); Merritt 1967, sec. 3-8.
+Hydrodynamics, 1932, ch. VI (kinetic energy as an added mass); Merritt 1967, sec. 3-8.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -196,9 +196,10 @@ def _advice(rows: Rows, way: Sequence[_Passage]) -> str:
     density = float(rows.fluid.density(rows.ambient.pressure)) if rows.fluid else 0.0
     length = max(passage.liquid.length for passage in way)
     area = density * length / _parallel([passage.liquid.inertance for passage in way])
+    whose = "its" if len(ports) == 1 else "their"
     beside = "ambient" if node == AMBIENT else f"'{rows.nodes[node].component}'"
     return (
-        f"join {' and '.join(ports)} to a chamber of their own, {{type: chamber, volume: "
-        f"{1e9 * length * area:.2g} mm^3}}, and that to {beside} by {{type: inertance, "
+        f"join {' and '.join(ports)} to a chamber of {whose} own, {{type: chamber, volume: "
+        f"{1e9 * length * area:.3g} mm^3}}, and that to {beside} by {{type: inertance, "
         f"length: {1e3 * length:.3g} mm, area: {1e6 * area:.3g} mm^2}}"
     )
