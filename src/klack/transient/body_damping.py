@@ -133,13 +133,11 @@ class DampingMatrix:
             if damping.alpha > 0.0:
                 columns = np.hstack([columns, loads])
                 rate = np.append(rate, np.full(loads.shape[1], -damping.alpha))
-        sparse = csr_array(damping.alpha * M + damping.beta * csr_array(body.K))
         ends = None
         if damping.ends is not None:
-            sparse = csr_array(sparse + damping.ends)
             ends = csr_array(damping.ends[free][:, free])
         return cls(
-            sparse=csr_array(sparse[free][:, free]),
+            sparse=csr_array(sparse_damping(damping, body, M)[free][:, free]),
             columns=columns[free],
             rate=rate,
             ends=ends,
@@ -148,6 +146,12 @@ class DampingMatrix:
     def force(self, v: NDArray[np.float64]) -> NDArray[np.float64]:
         """C v of a velocity, shape (n,) [N]."""
         return self.sparse @ v + self.columns @ (self.rate * (self.columns.T @ v))
+
+
+def sparse_damping(damping: BodyDamping, body: ElasticBody, M: csr_array) -> csr_array:
+    """Sparse part of C on all degrees of freedom [N s/m]."""
+    sparse = csr_array(damping.alpha * M + damping.beta * csr_array(body.K))
+    return sparse if damping.ends is None else csr_array(sparse + damping.ends)
 
 
 class LowRankSolve:

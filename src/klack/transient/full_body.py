@@ -28,9 +28,15 @@ from klack.arrays import Floats
 from klack.bodies.elasticity.body import ElasticBody
 from klack.bodies.elasticity.condensation import condensed_inverse
 from klack.bodies.elasticity.eigen import Modes
-from klack.bodies.elasticity.factorization import Backend, Factorization, Precision, factorize
+from klack.bodies.elasticity.factorization import (
+    Backend,
+    Factorization,
+    Precision,
+    chosen_backend,
+    factorize,
+)
 from klack.errors import InputError
-from klack.transient.body_damping import BodyDamping, DampingMatrix, LowRankSolve
+from klack.transient.body_damping import BodyDamping, DampingMatrix, LowRankSolve, sparse_damping
 from klack.transient.interface_solve import InterfaceSolve, interface_solve
 
 __all__ = [
@@ -240,11 +246,11 @@ class FullBody:
         self.G_axis = self.G @ self.axis
         self.mobility = np.zeros((self.G.shape[0],) * 2)
         self.mobility_known = False
-        S = self.M * (4.0 / step**2) + self.K
+        S = csr_array(M * (4.0 / step**2) + self.body.K)
         if self.damping is not None:
             self.C = DampingMatrix.of(self.damping, self.body, csr_array(M))
-            S = S + self.C.sparse * (2.0 / step)
-        self.factor = factorize(csr_array(S), backend=backend, threads=threads, precision=precision)
+            S = csr_array(S + sparse_damping(self.damping, self.body, csr_array(M)) * (2.0 / step))
+        self.factor = self._factorise(S, backend, precision, threads)
         self.solve: InterfaceSolve = interface_solve(self.factor, self.rows)
         columns, weight = [np.zeros((len(self.free), 0))], [np.zeros(0)]
         if self.C is not None:
@@ -256,6 +262,19 @@ class FullBody:
         if sum(len(part) for part in weight):
             Z, D = np.hstack(columns), np.concatenate(weight)
             self.solve = LowRankSolve(self.solve, self.factor, self.rows, Z, D)
+
+    def _factorise(
+        self, S: csr_array, backend: Backend, precision: Precision, threads: int
+    ) -> Factorization:
+        """Factorise S in equal sectors where it has them, else its free part as a whole."""
+        if self.dimension == 3 and chosen_backend(backend) == "pardiso":
+            from klack.bodies.elasticity.cyclic import cyclic_factorization
+
+            factor = cyclic_factorization(S, self.body.mesh.points, self.body.fixed, precision)
+            if factor is not None:
+                return factor
+        S = csr_array(S[self.free][:, self.free])
+        return factorize(S, backend=backend, threads=threads, precision=precision)
 
     def learn(self, points: NDArray[np.int64], rows: NDArray[np.int64]) -> None:
         """Compute the response to contact points, with these rows, that come near first."""

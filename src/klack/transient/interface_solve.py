@@ -73,7 +73,7 @@ class SplitSolve:
         self._half = np.zeros((G.shape[0], len(self._rows)), dtype=factorization.dtype)
         self._known = np.empty(0, dtype=np.int64)
         self.compliance = np.zeros((G.shape[0],) * 2)
-        self._selected = self._half[self._known]
+        self.select(self._known)
         self._y = np.empty(0)
         self._free = np.empty(0)
 
@@ -90,6 +90,7 @@ class SplitSolve:
     def select(self, points: NDArray[np.int64]) -> None:
         """See :class:`InterfaceSolve`."""
         self._selected = self._half[points]
+        self._carrying, self._carried = self._known[:0], self._selected[:0]
 
     def predict(self, b: NDArray[np.float64]) -> None:
         """See :class:`InterfaceSolve`."""
@@ -103,8 +104,11 @@ class SplitSolve:
     def complete(self, lam: NDArray[np.float64]) -> NDArray[np.float64]:
         """See :class:`InterfaceSolve`."""
         self._y[self._rows] = self._free
-        if np.any(lam):
-            self._y[self._rows] += lam.astype(self._half.dtype, copy=False) @ self._selected
+        carrying = np.flatnonzero(lam)
+        if len(carrying):
+            if not np.array_equal(carrying, self._carrying):
+                self._carrying, self._carried = carrying, self._selected[carrying]
+            self._y[self._rows] += lam[carrying].astype(self._half.dtype) @ self._carried
         return self._factorization.backward(self._y)
 
 

@@ -31,7 +31,7 @@ from klack.files.closing import Closing
 
 __all__ = ["LoadedFactorization", "PardisoFactorization"]
 
-_SPD, _INDEFINITE = 2, -2
+_SPD, _INDEFINITE, _HERMITIAN = 2, -2, 4
 _ANALYSE, _FACTOR, _SOLVE, _FORWARD, _BACKWARD, _RELEASE = 11, 22, 33, 331, 333, -1
 _ERRORS = {-3: "reordering failed", -8: "more than 2^31 entries"}
 _NO_MEMORY = (-2, -9)
@@ -47,6 +47,8 @@ class PardisoFactorization(Closing):
 
     Parameters
     ----------
+    A
+        Real and symmetric, or complex, Hermitian and positive definite.
     definite
         Whether A is positive definite.
     border
@@ -67,11 +69,13 @@ class PardisoFactorization(Closing):
         budget: Budget = WITHOUT,
     ) -> None:
         self._mkl = _library()
-        self._kind = _SPD if definite and not border else _INDEFINITE
+        wave = np.iscomplexobj(A)
+        self._kind = _INDEFINITE if not definite or border else _HERMITIAN if wave else _SPD
         # a factor of two levels is laid out for its threads: a solve with another number of them is
         # wrong, without an error
         self._threads = int(self._mkl.MKL_Get_Max_Threads()) if threads is None else threads
-        self._type = np.float32 if precision == "single" else np.float64
+        single, double = (np.complex64, np.complex128) if wave else (np.float32, np.float64)
+        self._type = single if precision == "single" else double
         self._handle = np.zeros(64, dtype=np.int64)
         self._settings = _settings(precision, definite, bordered=border > 0)
         self.size, self._border = A.shape[0], border
@@ -152,7 +156,7 @@ class PardisoFactorization(Closing):
             error = self._call(phase, right, X, 1 if right.ndim == 1 else right.shape[1])
             if error:
                 raise _failure(error)
-        return X.astype(np.float64, copy=False)
+        return X if np.iscomplexobj(X) else X.astype(np.float64, copy=False)
 
     def close(self) -> None:
         """Give the memory back to the system."""

@@ -1,0 +1,128 @@
+"""Factor of a body in equal sectors, and an impact with it, against the factor of the whole matrix.
+
+Truth: the same linear system.  Tolerances: round-off at a condition of some 1e4.
+"""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_array, diags_array
+
+from klack.bodies.elasticity.body import ElasticBody, elastic_body
+from klack.bodies.elasticity.cyclic import cyclic_factorization
+from klack.bodies.elasticity.factorization import available_backends, factorize
+from klack.mesh.meridian import mesh_meridian
+from klack.mesh.profile import Line, Profile
+from klack.mesh.sizing import MeshSizing
+from klack.mesh.swept import sweep
+from klack.transient.full_order import simulate_full_order
+from klack.verification.transient import STEEL, needle_over_seat
+
+pytestmark = pytest.mark.skipif(
+    "pardiso" not in available_backends(), reason="MKL is not installed here"
+)
+MM, STEP = 1e-3, 100e-9
+
+
+@cache
+def body(bore: float, layers: int, support: str) -> ElasticBody:
+    """A disc, or a ring, held at the foot: nowhere, all round, along z, in part, on the axis."""
+    lines = [
+        Line((4 * MM, 0), "foot"),
+        Line((4 * MM, 2 * MM), "outside"),
+        Line((bore, 2 * MM), "top"),
+        Line((bore, 0), "bore" if bore else "axis"),
+    ]
+    meridian = mesh_meridian({"disc": Profile((bore, 0), tuple(lines))}, MeshSizing(size=1.5 * MM))
+    mesh = sweep(meridian, layers, start_angle=0.3)
+    foot = mesh.surface("foot").nodes
+    x, y, _ = mesh.points[foot].T
+    fixed = {
+        "none": foot[:0],
+        "round": 3 * foot[:, None] + np.arange(3),
+        "along": 3 * foot + 2,
+        "part": 3 * foot[y > 1 * MM, None] + np.arange(3),
+        "axis": 3 * foot[np.hypot(x, y) < 1e-9, None] + np.arange(3),
+    }[support]
+    made = elastic_body("disc", mesh, {"disc": STEEL})
+    return replace(made, fixed=np.sort(fixed.ravel()))
+
+
+def dynamic(made: ElasticBody) -> csr_array:
+    return csr_array(made.M * (4.0 / STEP**2) + made.K)
+
+
+@pytest.mark.parametrize(
+    ("bore", "layers", "support"),
+    [
+        (0.0, 6, "none"),
+        (0.0, 7, "round"),
+        (0.0, 8, "part"),
+        (0.0, 7, "axis"),
+        (0.0, 6, "along"),
+        (2 * MM, 7, "part"),
+        (2 * MM, 8, "round"),
+    ],
+)
+def test_solves_are_those_of_the_whole_matrix(bore, layers, support):
+    made = body(bore, layers, support)
+    S, free = dynamic(made), made.free
+    B = np.random.default_rng(4).standard_normal((len(free), 3))
+    whole = csr_array(S[free][:, free])
+    with factorize(whole) as plain:
+        expected = plain.solve(B)
+
+    for precision, tolerance in (("double", 1e-12), ("single", 1e-4)):
+        factor = cyclic_factorization(S, made.mesh.points, made.fixed, precision)
+        assert factor is not None
+        assert factor.size == len(free)
+        with factor:
+            halves, one = factor.forward(B), factor.solve(B[:, 1])
+            X = factor.backward(halves)
+        scale = abs(expected).max()
+        assert abs(X - expected).max() < tolerance * scale
+        assert abs(one - expected[:, 1]).max() < tolerance * scale
+        # G S^-1 b is the product of two halves
+        shared = halves.T @ halves
+        assert abs(shared - B.T @ expected).max() < tolerance * abs(shared).max()
+
+
+def test_bodies_that_do_not_repeat_are_left_alone():
+    made = body(0.0, 7, "none")
+    S, points, none = dynamic(made), made.mesh.points, made.fixed
+    heavier = np.zeros(S.shape[0])
+    heavier[-3:] = 1e-6 * S.diagonal()[-3:]
+
+    assert cyclic_factorization(S, points, none) is not None
+    assert cyclic_factorization(csr_array(S + diags_array(heavier)), points, none) is None
+    assert cyclic_factorization(S, points + 1e-6, none) is None
+    moved = points.copy()
+    moved[len(points) // 2] *= 1.0 + 1e-6
+    assert cyclic_factorization(S, moved, none) is None
+
+
+@pytest.mark.slow
+def test_an_impact_in_sectors_is_that_of_whole_factors(monkeypatch):
+    """Forces, velocities and losses to round-off; energy as exact; two bodies turned apart."""
+    a, b, space = needle_over_seat(size=60e-6, bulk=2e-3, layers=8)
+
+    def impact(**options):
+        return simulate_full_order(
+            a, b, space, speed=0.5, duration=6e-6, step=STEP, energy_interval=1, **options
+        )
+
+    ours, single = impact(), impact(precision="single")
+    monkeypatch.setattr("klack.bodies.elasticity.cyclic.cyclic_factorization", lambda *given: None)
+    plain = impact()
+
+    assert "sectors" in ours.statistics.backend
+    assert "sectors" not in plain.statistics.backend
+    assert ours.statistics.factor_entries < 0.4 * plain.statistics.factor_entries
+    peak = plain.history.force.max()
+    assert peak > 1.0
+    assert abs(ours.history.force - plain.history.force).max() < 1e-9 * peak
+    assert abs(single.history.force - plain.history.force).max() < 1e-6 * peak
+    assert abs(ours.history.velocity_a - plain.history.velocity_a).max() < 1e-10
+    assert abs(ours.history.ledger.residual) < 1e-11
