@@ -14,8 +14,21 @@ from matplotlib.axes import Axes
 
 __all__ = ["draw_figures"]
 
-_COLOURS = ("#1b4f72", "#b9770e", "#117a65", "#943126", "#5b2c6f", "#515a5a", "#2e86c1", "#7d6608")
-_MARKERS = "osD^vP*X"
+_COLOURS = (
+    "#1b4f72",
+    "#b9770e",
+    "#117a65",
+    "#943126",
+    "#5b2c6f",
+    "#515a5a",
+    "#2e86c1",
+    "#7d6608",
+    "#c2185b",
+    "#00838f",
+)
+_MARKERS = "osD^vP*X<>"
+_GROWING = ("growth", "modes", "volumes")
+_GROWS = (", loop", "kernel in flight", "kernel in contact", "full order, one step")
 
 
 def draw_figures(folder: Path, numbers: Sequence[Number]) -> dict[str, str]:
@@ -69,12 +82,18 @@ def _modes(axes: Axes, numbers: Sequence[Number]) -> bool:
     return bool(curves)
 
 
-def _volumes(axes: Axes, numbers: Sequence[Number]) -> bool:
-    curves = _curves(numbers)
+def _scaling(axes: Axes, numbers: Sequence[Number]) -> bool:
+    """Everything in the time loop that can grow, over its first points."""
+    grows = (n for n in numbers if n.series.endswith(_GROWS) and n.part in _GROWING)
+    curves = _curves(grows)
     for (name, points), look in zip(curves.items(), _looks(), strict=False):
-        axes.loglog(*zip(*points, strict=True), label=name, **look)
-    _finish(axes, "volumes added", "time of 2 ms [s]")
-    axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+        x, y = (list(axis) for axis in zip(*points, strict=True))
+        slope = f" ({exponent(x[-2:], y[-2:]):.2f})" if len(x) > 1 else ""
+        label = f"{name.removesuffix(', loop')}{slope}"
+        axes.loglog([v / x[0] for v in x], [v / y[0] for v in y], label=label, **look)
+    _finish(axes, "number over the first", "time over the first")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(lambda value, _: f"{value:g}")
     return bool(curves)
 
 
@@ -155,7 +174,12 @@ _FIGURES: dict[str, tuple[str | None, Callable[[Axes, Sequence[Number]], bool], 
         "Processor time over degrees of freedom; the fitted exponent in brackets.",
     ),
     "modes": ("modes", _modes, "Time of a step over the number of modes."),
-    "volumes": ("volumes", _volumes, "Time of a wet stroke over the volumes added to it."),
+    "scaling": (
+        None,
+        _scaling,
+        "Time of loops over volumes, stops, bodies, contact points, duration, modes and degrees of "
+        "freedom, each over its first point; in brackets the exponent of the last two.",
+    ),
     "ratios": (
         None,
         _ratios,

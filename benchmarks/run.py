@@ -38,7 +38,7 @@ PARTS = {
     "ngsolve_peer": "NGSolve: assembly and modes on the same mesh",
     "calculix": "CalculiX: an impact in 3-D on the same mesh",
     "growth": "every stage over degrees of freedom",
-    "volumes": "the time loop over the number of volumes: chain, ring, star",
+    "volumes": "the time loop over volumes, stops, bodies, contact points and duration",
     "stroke": "a whole valve in time; CVODE beside a small one",
     "stroke_off_axis": "a wet stroke in three dimensions, point by point",
     "many_strokes": "strokes per hour at many points, on threads",

@@ -220,7 +220,8 @@ def _candidates(points: Floats) -> Iterator[_Sectors]:
             continue
         tree = KDTree(points) if tree is None else tree
         turned = points @ _turn(2.0 * np.pi / N).T
-        distance, image = tree.query(turned, distance_upper_bound=size)
+        distance, found = tree.query(turned, distance_upper_bound=size)
+        image = np.asarray(found)
         if not np.all(np.isfinite(distance)) or len(np.unique(image)) != len(points):
             continue
         axis = image == np.arange(len(points))
@@ -237,10 +238,10 @@ def _supports(sectors: _Sectors, fixed: NDArray[np.int64], count: int) -> _Suppo
     held = np.zeros((count // 3, 3), dtype=bool)
     held.ravel()[fixed] = True
     free = np.flatnonzero(~held.ravel())
-    ring = held[sectors.around].all(axis=0)
+    ring = np.asarray(held[sectors.around].all(axis=0))
     ring[:, :2] = ring[:, :2].all(axis=1, keepdims=True)  # they turn into each other
     axis = held[sectors.axis]
-    across = axis[:, :2].all(axis=1)
+    across = np.asarray(axis[:, :2].all(axis=1))
     held[sectors.around] &= ~ring
     held[sectors.axis] &= np.column_stack([~across, ~across, np.zeros(len(axis), dtype=bool)])
     return _Supports(free, ring, np.concatenate([axis[:, 2], across]), np.flatnonzero(held))
