@@ -23,7 +23,7 @@ An :class:`InputError` comes before the first run, with file, line and key.
 
 import json
 from base64 import b64encode
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from html import escape
@@ -32,7 +32,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from klack.analyses.analysis import StoredAnalysis
 from klack.analyses.catalogue import analysis_in
-from klack.analyses.measures import Measure, json_of
+from klack.analyses.measures import Measure, Value, json_of
 from klack.analyses.point_table import PointTable, RunsInterrupted
 from klack.analyses.sensitivities.record import SensitivityRecord
 from klack.case.any_case import CaseTree, read_any_case, read_case_tree, tree_of
@@ -167,30 +167,49 @@ class CaseOnHand:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class Number:
-    """Value of a measure; a number with a unit and a definition.
+class Number(float):
+    """Value of a measure in SI: a float that knows its unit, nan where the run has no value.
+
+    It computes, compares, sorts, hashes and converts as the float that it is; what is computed from
+    it is a plain float.  Only ``repr`` and ``str`` show the unit: ``123.5 N``.
 
     Parameters
     ----------
     value
-        In ``unit``; None where the run does not have it.
+        As in JSON: None without a value, whole numbers and truths as such.
     unit
         SI, ``"1"`` for a pure number.
     measure
         Name, symbol, definition, source.
     """
 
-    value: float | int | bool | None
+    __slots__ = ("measure", "unit", "value")
+
+    value: Value
     unit: str
     measure: Measure[Any]
 
-    def __float__(self) -> float:
-        return float("nan") if self.value is None else float(self.value)
+    def __new__(cls, value: Value, unit: str, measure: Measure[Any]) -> "Number":
+        """Take None as nan."""
+        number = super().__new__(cls, float("nan") if value is None else value)
+        number.value, number.unit, number.measure = value, unit, measure
+        return number
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle what describes the measure, without the functions that read it from a record."""
+        words = {key: getattr(self.measure, key) for key in _DESCRIBING}
+        return _number_from, (self.value, self.unit, words)
 
     def __repr__(self) -> str:
         unit = "" if self.unit == "1" else f" {self.unit}"
-        return f"{self.value!r}{unit}" if self.value is not None else "none"
+        return "none" if self.value is None else f"{self.value!r}{unit}"
+
+
+_DESCRIBING = ("key", "definition", "name", "symbol", "unit", "source", "kind", "form", "digits")
+
+
+def _number_from(value: Value, unit: str, words: Mapping[str, Any]) -> Number:
+    return Number(value, unit, Measure(**words))
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,7 +258,7 @@ class Result:
             write_pdf(content, place / "report.pdf")
         return place
 
-    def to_xarray(self, run: str | None = None) -> Any:
+    def to_xarray(self, run: str | None = None, axis: str | None = None) -> Any:
         """Curves and numbers of one level or variant as an ``xarray.Dataset``.
 
         Coordinates are the axes of the run; ``units``, ``long_name`` and ``comment`` are attributes
@@ -248,23 +267,106 @@ class Result:
         Parameters
         ----------
         run
-            Level or variant; the one that is the answer by default.
+            Level, variant or design; the one that is the answer by default.
+        axis
+            Only the curves over this one; all axes and numbers by default.
 
         Raises
         ------
         MissingExtraError
             Without the package xarray.
         InputError
-            For a record without curves, or a run that it does not have.
+            For a record without curves, or a run or axis that it does not have.
         """
         from klack.exchange.results.dataset import dataset_of
 
-        return dataset_of(self.record, self.analysis.measured(self.record), run)
+        data = dataset_of(self.record, self.analysis.measured(self.record), run)
+        if axis is None:
+            return data
+        from klack.exchange.results.curves import over_axis
+
+        return over_axis(data, axis)
+
+    def to_dataframe(self, run: str | None = None, axis: str | None = None) -> Any:
+        """Curves over one axis as the columns of a ``pandas.DataFrame``.
+
+        The first axis by default: time of impacts and strokes, shots, points of a study, bands of
+        noise.  Names of columns are those of :meth:`to_xarray`, their units
+        ``frame.attrs["units"]``.
+        """
+        data = self.to_xarray(run)
+        from klack.exchange.results.curves import frame_of
+
+        return frame_of(data, axis)
+
+    def plot(self, chart: str | None = None) -> Any:
+        """Draw a chart of the report with matplotlib, the first one by default.
+
+        Returns its axes: one, or an array of them from top to bottom.  The figure is that of
+        pyplot: a notebook shows it, ``matplotlib.pyplot.show`` too.
+
+        Raises
+        ------
+        InputError
+            For another name than those of :attr:`charts`.
+        """
+        from klack.report.printed import shown_chart
+
+        charts = self._charts()
+        name = next(iter(charts), "") if chart is None else chart
+        if name not in charts:
+            raise InputError(
+                "plot",
+                got=f"'{name}'" if name else "a result without charts",
+                expected=f"one of: {', '.join(charts)}" if charts else "a chart in its report",
+                hint="result.charts lists the names.",
+            )
+        return shown_chart(charts[name])
+
+    @property
+    def charts(self) -> tuple[str, ...]:
+        """Names of the charts of the report."""
+        return tuple(self._charts())
+
+    def _charts(self) -> dict[str, Any]:
+        sections = self.analysis.content(self.record).sections
+        return {chart.name: chart for section in sections for chart in section.charts}
+
+    def __getitem__(self, name: str | tuple[str, str]) -> Any:
+        """Curve of the answer, an ``xarray.DataArray`` with its axis and units.
+
+        ``impact["force"]``, ``stroke["lift"]``, ``stroke["needle.tip velocity"]``, or words that
+        only one name has, ``stroke["current"]``; of another level, variant or design
+        ``stroke["dry", "lift"]``.  ``list(result)`` has the names.
+
+        Raises
+        ------
+        InputError
+            Also a :class:`KeyError`: for a name that no curve has, or several.
+        """
+        run, curve = name if isinstance(name, tuple) else (None, name)
+        data = self.to_xarray(run)
+        from klack.exchange.results.curves import curve_of
+        from klack.exchange.results.dataset import short_names
+
+        return curve_of(data, curve, short_names(self.record))
+
+    def __iter__(self) -> Iterator[str]:
+        """Names of the curves and numbers of the answer."""
+        return iter(map(str, self.to_xarray().data_vars))
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return list(self)
 
     def __repr__(self) -> str:
+        every = self.measures
+        keys = next(iter(every.values()), {}).keys()
+        alike = [name for name, numbers in every.items() if numbers.keys() == keys][:_LINES]
         lines = [f"{self.analysis.form.command}: {self.record.title or self.record.case}"]
-        lines += [f"  {name}: {_short(numbers)}" for name, numbers in self.measures.items()]
-        return "\n".join(lines[:20])
+        lines += [f"  {name}: {_short(every[name])}" for name in alike]
+        if len(every) > len(alike):
+            lines.append(f"  and {len(every) - len(alike)} more in measures")
+        return "\n".join(lines)
 
     def _repr_html_(self) -> str:
         """Key numbers, warnings and the first figure, as a notebook shows them."""
@@ -288,6 +390,9 @@ class Result:
             + (f"<ul>{warnings}</ul>" if warnings else "")
             + f"<table><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table>{figure}"
         )
+
+
+_LINES = 6  # of a result on a terminal
 
 
 def _short(numbers: Mapping[str, Number]) -> str:

@@ -1,5 +1,8 @@
 """What a notebook imports: cases with other values, runs, results, datasets."""
 
+import copy
+import json
+import pickle
 import subprocess
 import sys
 from pathlib import Path
@@ -84,6 +87,105 @@ class TestValues:
             klack.run_impact("demo-stroke")
         with pytest.raises(InputError, match="run_impact"):
             klack.run_stroke("two-rods")
+
+
+class TestNumbers:
+    """Truth = the float that a measure is."""
+
+    @pytest.fixture
+    def peak(self, rods: klack.Result) -> klack.Number:
+        return rods.measures["reduced"]["peak_force"]
+
+    def test_it_computes_as_the_float_that_it_is(self, peak: klack.Number):
+        plain = float(peak)
+        assert type(plain) is float
+        assert f"{peak:.1f}" == f"{plain:.1f}"
+        assert (peak + 1, 2 * peak, -peak, peak**2) == (plain + 1, 2 * plain, -plain, plain**2)
+        assert {type(item) for item in (peak + 1, peak / peak, -peak, abs(peak))} == {float}
+        assert peak == plain != peak + 1 > peak
+        assert {peak: 1}[plain] == 1
+        assert round(peak, 1) == round(plain, 1)
+        assert np.array([peak, peak]).dtype == np.float64
+        assert np.sqrt(peak) == np.sqrt(plain)
+        assert json.loads(json.dumps({"peak": peak})) == {"peak": plain}
+
+    def test_only_its_text_has_the_unit(self, peak: klack.Number):
+        assert repr(peak) == str(peak) == f"{peak}" == f"{float(peak)!r} N"
+
+    def test_a_copy_and_a_pickle_keep_what_it_means(self, peak: klack.Number):
+        for again in (pickle.loads(pickle.dumps(peak)), copy.deepcopy(peak)):
+            assert again == peak
+            assert repr(again) == repr(peak)
+            assert again.measure.definition == peak.measure.definition
+            assert again.measure.printed(again) == peak.measure.printed(peak)
+
+    def test_whole_numbers_truths_and_none_stay_what_they_are(self, peak: klack.Number):
+        count, truth, none = (klack.Number(item, "1", peak.measure) for item in (3, True, None))
+        assert (repr(count), count.value, count + 0.5) == ("3", 3, 3.5)
+        assert (repr(truth), truth.value) == ("True", True)
+        assert (repr(none), none.value) == ("none", None)
+        assert np.isnan(none)
+
+
+class TestCurves:
+    """Truth = arrays of the record."""
+
+    def test_a_curve_has_short_full_and_plain_names(self, rods: klack.Result):
+        pytest.importorskip("xarray")
+        history = rods.record.levels["reduced"].history
+        for name in ("force", "contact force", "contact_force", ("reduced", "force")):
+            np.testing.assert_array_equal(rods[name], history.force)
+        force = rods["force"]
+        np.testing.assert_array_equal(force.time, history.time)
+        assert force.attrs["units"] == "N"
+        np.testing.assert_array_equal(rods["velocity short"], history.velocity_a)
+        assert float(rods["peak_force"]) == rods.measures["reduced"]["peak_force"]
+        # the impulse is the integral of the force, which is a mean over each interval
+        impulse = float(force.integrate("time"))
+        assert impulse == pytest.approx(rods.measures["reduced"]["impulse"], rel=1e-3)
+
+    def test_an_unknown_or_ambiguous_name_lists_those_it_could_be(self, rods: klack.Result):
+        pytest.importorskip("xarray")
+        with pytest.raises(KeyError, match="short_velocity, long_velocity"):
+            _ = rods["velocity"]
+        with pytest.raises(InputError, match="does not have, expected one of: contact_force"):
+            _ = rods["conact_force"]
+        assert {"contact_force", "short_velocity", "peak_force"} <= set(rods)
+
+    def test_every_axis_has_a_table(self, rods: klack.Result):
+        pytest.importorskip("xarray")
+        history = rods.record.levels["reduced"].history
+        frame = rods.to_dataframe()
+        assert frame.index.name == "time"
+        np.testing.assert_array_equal(frame["contact_force"], history.force)
+        assert frame.attrs["units"]["gap"] == "m"
+        edges = rods.to_dataframe("reduced", axis="time_edge")
+        np.testing.assert_array_equal(edges.index, history.edges)
+        assert {"short_velocity", "long_velocity"} < set(edges)
+        with pytest.raises(InputError, match=r"one of: time, time_edge"):
+            rods.to_dataframe(axis="seat_time")
+
+    def test_all_axes_in_one_table_are_one_error(self, rods: klack.Result):
+        pytest.importorskip("xarray")
+        data = rods.to_xarray()
+        with pytest.raises(InputError, match=r'to_dataframe\(axis="time"\)'):
+            data.to_dataframe()
+        np.testing.assert_array_equal(
+            data[["contact_force", "gap"]].to_dataframe(),
+            rods.to_dataframe()[["contact_force", "gap"]],
+        )
+
+    def test_the_first_figure_and_others_by_name(self, rods: klack.Result):
+        from matplotlib import pyplot
+
+        axes = rods.plot()
+        assert axes.get_xlabel().startswith("time")
+        assert axes.figure.number in pyplot.get_fignums()
+        assert rods.charts[0] == "force"
+        assert len(rods.plot("approach")) == 2
+        pyplot.close("all")
+        with pytest.raises(InputError, match="one of: force"):
+            rods.plot("forse")
 
 
 class TestResults:

@@ -76,4 +76,6 @@ class TestNotebook:
 
 
 def test_the_list_of_notebooks_is_not_empty() -> None:
-    assert {path.stem for path in NOTEBOOKS} >= {"first-impact", "stroke-and-spectrum", "own-valve"}
+    assert {path.stem for path in NOTEBOOKS} >= {
+        "first-hour", "first-impact", "stroke-and-spectrum", "own-valve"
+    }  # fmt: skip

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.assembling.modes import elastic_count
 from klack.bodies.elasticity.body import ElasticBody
 from klack.bodies.elasticity.plausible_material import estimate_material
-from klack.bodies.reduction.reduced_body import ReducedBody
+from klack.bodies.reduction.reduced_body import ReducedBody, elastic_count
 from klack.case.bodies import CaseFile
 
 __all__ = ["BodySummary", "summarise_body"]

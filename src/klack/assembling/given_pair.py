@@ -10,13 +10,13 @@ from klack.assembling.assembled_bodies import assembled_from_matrices
 from klack.assembling.bodies import assemble_body, mesh_body
 from klack.assembling.body_summary import BodySummary, summarise_body
 from klack.assembling.given_bodies import reduced_from_file
-from klack.assembling.modes import damping_of, elastic_count, mode_pool, selection_of
+from klack.assembling.modes import damping_of, mode_pool, selection_of
 from klack.assembling.reduced_pair import hertz_coefficient, impact_system
 from klack.bodies.elasticity.body import ElasticBody
 from klack.bodies.elasticity.statics import Flexibility
 from klack.bodies.reduction.ports import Port, node_set_port, surface_port
 from klack.bodies.reduction.reduce import reduce_body
-from klack.bodies.reduction.reduced_body import ReducedBody
+from klack.bodies.reduction.reduced_body import ReducedBody, elastic_count
 from klack.case.bodies import CaseBody, SurfaceName
 from klack.case.impact_sections import HertzLocalLaw, LinearLocalLaw
 from klack.case.schema import Case

@@ -13,7 +13,6 @@ from klack.bodies.elasticity.statics import Flexibility
 from klack.bodies.reduction.damping import Damping, LossFactor, ModalDamping, RayleighDamping
 from klack.bodies.reduction.ports import Port
 from klack.bodies.reduction.reduce import kept_modes as chosen_modes
-from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.bodies.reduction.selection import ByCount, ByFrequency, ByParticipation, ModeSelection
 from klack.case.bodies import BodyDamping, ModeChoice
 from klack.case.schema import Case
@@ -23,7 +22,6 @@ from klack.machine.progress import Progress
 __all__ = [
     "PARTICIPATION_POOL",
     "damping_of",
-    "elastic_count",
     "is_damped",
     "kept_modes",
     "mode_pool",
@@ -133,11 +131,6 @@ def participating(pair_names: tuple[str, str]) -> dict[str, ModeSelection]:
         name: ByParticipation(count, PARTICIPATION_POOL)
         for name, count in zip(pair_names, _PARTICIPATING, strict=True)
     }
-
-
-def elastic_count(body: ReducedBody) -> int:
-    """Number of elastic modes without attachment modes."""
-    return body.mode_count - body.rigid_count - body.attachment_count
 
 
 Floats = NDArray[np.float64]

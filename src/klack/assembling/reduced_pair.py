@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.assembling.modes import damping_of, elastic_count, selection_of
+from klack.assembling.modes import damping_of, selection_of
 from klack.assembling.problem import ContactProblem
 from klack.assembling.rubbing import fitted_loops
 from klack.assembling.yielding import law_with_yield
 from klack.bodies.elasticity.eigen import Modes
 from klack.bodies.reduction.ports import Observer, Port
 from klack.bodies.reduction.reduce import Correction, reduce_body
-from klack.bodies.reduction.reduced_body import ReducedBody
+from klack.bodies.reduction.reduced_body import ReducedBody, elastic_count
 from klack.bodies.reduction.selection import ByCount, ModeSelection
 from klack.case.impact_sections import (
     ConsistentLocalLaw,

@@ -3,7 +3,7 @@
 SVG has letters as outlines.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from io import BytesIO
 from math import log
 from pathlib import Path
@@ -37,7 +37,7 @@ from klack.report.chart import (
     ticks_of,
 )
 
-__all__ = ["STYLE", "plain", "png_chart", "svg", "svg_chart", "write_charts"]
+__all__ = ["STYLE", "plain", "png_chart", "shown_chart", "svg", "svg_chart", "write_charts"]
 
 
 _SHOWN, _COLUMNS = 10, 5
@@ -45,11 +45,15 @@ _INNER = 0.5
 _GREY = "#8A8F98"
 
 
-def printed_ring(chart: RingFrames, width: float) -> Figure:
+Blank = Callable[..., Figure]
+"""Makes an empty figure: :class:`Figure`, or that of pyplot."""
+
+
+def printed_ring(chart: RingFrames, width: float, blank: Blank = Figure) -> Figure:
     """Draw the moments that :func:`_shown` chooses."""
     shown = _shown(chart)
     rows = -(-len(shown) // _COLUMNS)
-    figure = Figure(figsize=(width, 0.55 + 1.42 * rows), layout="constrained")
+    figure = blank(figsize=(width, 0.55 + 1.42 * rows), layout="constrained")
     grid = figure.subplots(rows, min(_COLUMNS, len(shown)), squeeze=False).ravel()
     low, high = (float(v) for v in squeezed(chart, np.array(chart.ends)))
     norm = Normalize(low, high)
@@ -166,6 +170,16 @@ def png_chart(chart: AnyChart) -> bytes:
         return stream.getvalue()
 
 
+def shown_chart(chart: AnyChart) -> Any:
+    """Draw a chart in a figure of pyplot, and return its axes: one, or an array of them."""
+    from matplotlib import pyplot
+
+    with rc_context(STYLE):
+        figure = _drawn(chart, _WIDTH, pyplot.figure)
+    axes = [item for item in figure.axes if item.get_label() != "<colorbar>"]
+    return axes[0] if len(axes) == 1 else np.array(axes)
+
+
 def write_charts(charts: Iterable[AnyChart], folder: Path) -> tuple[str, ...]:
     """Write charts as SVG and pixels; return the file names."""
     names = []
@@ -176,20 +190,20 @@ def write_charts(charts: Iterable[AnyChart], folder: Path) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _drawn(chart: AnyChart, width: float) -> Figure:
+def _drawn(chart: AnyChart, width: float, blank: Blank = Figure) -> Figure:
     if isinstance(chart, ParallelChart):
-        return _parallel(chart, width)
+        return _parallel(chart, width, blank)
     if isinstance(chart, RingFrames):
-        return printed_ring(chart, width)
-    return _bars(chart) if isinstance(chart, BarChart) else _curves(chart, width)
+        return printed_ring(chart, width, blank)
+    return _bars(chart, blank) if isinstance(chart, BarChart) else _curves(chart, width, blank)
 
 
-def _parallel(chart: ParallelChart, width: float) -> Figure:
+def _parallel(chart: ParallelChart, width: float, blank: Blank) -> Figure:
     lines, ends = chart.lines, np.array([axis.ends for axis in chart.axes])
     heights = (lines - ends[:, 0]) / (ends[:, 1] - ends[:, 0])
     order = np.argsort(-heights[:, chart.coloured])
     with rc_context({"axes.grid": False}):
-        figure = Figure(figsize=(width, 3.4), layout="constrained")
+        figure = blank(figsize=(width, 3.4), layout="constrained")
         axes = figure.subplots()
         x = np.arange(len(chart.axes))
         shown = LineCollection(
@@ -220,9 +234,9 @@ def _parallel(chart: ParallelChart, width: float) -> Figure:
         return figure
 
 
-def _curves(chart: Chart, width: float) -> Figure:
+def _curves(chart: Chart, width: float, blank: Blank) -> Figure:
     shares = [panel.share for panel in chart.panels]
-    figure = Figure(figsize=(width, 0.7 + 1.9 * sum(shares)), layout="constrained")
+    figure = blank(figsize=(width, 0.7 + 1.9 * sum(shares)), layout="constrained")
     grid = figure.subplots(
         len(shares), 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": shares}
     )[:, 0]
@@ -233,10 +247,10 @@ def _curves(chart: Chart, width: float) -> Figure:
     return figure
 
 
-def _bars(chart: BarChart) -> Figure:
+def _bars(chart: BarChart, blank: Blank) -> Figure:
     """Horizontal stacked bars; wide shares carry their number."""
     with rc_context({"axes.grid.axis": "x"}):
-        figure = Figure(figsize=(_WIDTH, 1.1 + 0.36 * len(chart.rows)), layout="constrained")
+        figure = blank(figsize=(_WIDTH, 1.1 + 0.36 * len(chart.rows)), layout="constrained")
         axes = figure.subplots()
         left = [0.0] * len(chart.rows)
         whole = max(sum(part.values[i] for part in chart.parts) for i in range(len(left)))

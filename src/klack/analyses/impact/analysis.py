@@ -17,7 +17,6 @@ from klack.analyses.impact.measures import (
     PEAK_FORCE,
 )
 from klack.analyses.impact.record import ImpactStudy
-from klack.analyses.impact.running_in import running_in_columns, running_in_rows
 from klack.analyses.json_parts import JsonForm, Key, Real, measured_keys, schema_key
 from klack.analyses.measures import text_table
 from klack.analyses.store import RecordFormat
@@ -146,8 +145,8 @@ def study_told(study: ImpactStudy) -> Iterator[TextTable | str]:
     if found := study.running_in:
         yield TextTable(
             title="Running in",
-            columns=running_in_columns(found),
-            rows=running_in_rows(found, format_si),
+            columns=found.heads,
+            rows=found.rows(format_si),
         )
 
 

@@ -13,7 +13,6 @@ from klack.analyses.impact.figures import charts
 from klack.analyses.impact.measures import DEVIATION_MEASURES, LEVEL_MEASURES
 from klack.analyses.impact.pressure_view import friction_views, pressure_rows, study_views
 from klack.analyses.impact.record import ImpactStudy, LevelResult
-from klack.analyses.impact.running_in import running_in_columns, running_in_rows
 from klack.analyses.impact.wording import (
     ESTIMATE_COLUMNS,
     answer,
@@ -315,7 +314,7 @@ def _running_in(study: ImpactStudy) -> Section:
     return Section(
         title=title,
         paragraphs=(text,),
-        tables=(Table(columns=running_in_columns(found), rows=running_in_rows(found, quantity)),),
+        tables=(Table(columns=found.heads, rows=found.rows(quantity)),),
     )
 
 

@@ -22,7 +22,7 @@ from klack.analyses.impact.trust import best_level, trust_notes
 from klack.analyses.incomplete import Attempts, IncompleteImpactError, failure_notes
 from klack.analyses.record import case_fields, run_fields
 from klack.assembling.given_pair import GivenPair, build_given_pair
-from klack.assembling.modes import elastic_count
+from klack.bodies.reduction.reduced_body import elastic_count
 from klack.case.consistency import GIVEN_LEVELS
 from klack.case.schema import Case
 from klack.contact.history import ImpactHistory

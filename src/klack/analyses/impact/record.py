@@ -1,6 +1,6 @@
 """Record of an impact study."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Self
 
@@ -328,6 +328,34 @@ class RunningIn:
     opening: NDArray[np.float64]
     worn_by: float
     level: str = "reduced"
+
+    @property
+    def heads(self) -> tuple[str, ...]:
+        """Heads of :meth:`rows`: first impact, last asked for, last of all."""
+        last = len(self.peak_force) - 1
+        ends = {last: ", run in"} if self.run_in else {}
+        return ("", *(f"impact {i + 1}{ends.get(i, '')}" for i in self._shown))
+
+    def rows(self, told: Callable[[float, str, int], str]) -> tuple[tuple[str, ...], ...]:
+        """A row for each quantity; ``told`` writes value, unit and digits."""
+
+        def row(title: str, values: np.ndarray, unit: str, digits: int) -> tuple[str, ...]:
+            return (title, *(told(float(values[i]), unit, digits) for i in self._shown))
+
+        land = [row("width of the land", self.land, "m", 3)] if np.isfinite(self.land[0]) else []
+        return (
+            row("peak force", self.peak_force, "N", 5),
+            row("contact time", self.contact_time, "s", 4),
+            ("restitution", *(f"{self.restitution[i]:.4f}" for i in self._shown)),
+            row("lost in yield", self.lost, "J", 3),
+            row("set after it", self.set, "m", 3),
+            *land,
+        )
+
+    @property
+    def _shown(self) -> list[int]:
+        last = len(self.peak_force) - 1
+        return sorted({0, min(self.asked - 1, last), last})
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -63,7 +63,6 @@ from klack.analyses.record import case_fields, run_fields
 from klack.assembling.body_summary import BodySummary, summarise_body
 from klack.assembling.modes import (
     PARTICIPATION_POOL,
-    elastic_count,
     kept_modes,
     mode_pools,
     participating,
@@ -88,6 +87,7 @@ from klack.assembling.structures import impact_structures
 from klack.bodies.elasticity.eigen import Modes
 from klack.bodies.elasticity.loads import NearLoads
 from klack.bodies.reduction.reduce import Correction
+from klack.bodies.reduction.reduced_body import elastic_count
 from klack.bodies.reduction.structure import Structure
 from klack.bodies.reduction.transfer import TransferComparison
 from klack.case.impact_sections import SubmodelLocalLaw

@@ -7,7 +7,7 @@ falls geometrically.
 """
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,8 +38,6 @@ __all__ = [
     "asks_for_more",
     "points_running_in",
     "running_in",
-    "running_in_columns",
-    "running_in_rows",
     "worn_text",
 ]
 
@@ -184,42 +182,6 @@ def _repeated(case: Case, hit: Callable[[int], _Impact | None]) -> tuple[NDArray
         if measures.cut_off or (settled and len(rows) >= case.run.impacts):
             break
     return np.array(rows).T, settled
-
-
-def running_in_columns(found: RunningIn) -> tuple[str, ...]:
-    """Heads: first impact, last asked for, last of all."""
-    return ("", *(_name(found, i) for i in _shown(found)))
-
-
-def running_in_rows(
-    found: RunningIn, told: Callable[[float, str, int], str]
-) -> tuple[tuple[str, ...], ...]:
-    """A row for each quantity; ``told`` writes value, unit and digits."""
-    shown = _shown(found)
-
-    def row(title: str, values: np.ndarray, unit: str, digits: int) -> tuple[str, ...]:
-        return (title, *(told(float(values[i]), unit, digits) for i in shown))
-
-    land = [row("width of the land", found.land, "m", 3)] if np.isfinite(found.land[0]) else []
-    return (
-        row("peak force", found.peak_force, "N", 5),
-        row("contact time", found.contact_time, "s", 4),
-        ("restitution", *(f"{found.restitution[i]:.4f}" for i in shown)),
-        row("lost in yield", found.lost, "J", 3),
-        row("set after it", found.set, "m", 3),
-        *land,
-    )
-
-
-def _shown(found: RunningIn) -> Sequence[int]:
-    last = len(found.peak_force) - 1
-    return sorted({0, min(found.asked - 1, last), last})
-
-
-def _name(found: RunningIn, place: int) -> str:
-    name = f"impact {place + 1}"
-    is_last = place == len(found.peak_force) - 1
-    return f"{name}, run in" if is_last and found.run_in else name
 
 
 WORN = "worn.yaml"

@@ -12,8 +12,7 @@ from klack.analyses.json_parts import JsonForm, Key, measured_keys, schema_key
 from klack.analyses.measures import Column, Measure, described_in, text_table
 from klack.analyses.reduction.one_node import corrected_label, place_words
 from klack.analyses.reduction.run import ReductionStudy
-from klack.assembling.modes import elastic_count
-from klack.bodies.reduction.reduced_body import ReducedBody
+from klack.bodies.reduction.reduced_body import ReducedBody, elastic_count
 from klack.bodies.reduction.transfer import TransferComparison
 from klack.terminal.tables import TextTable
 

@@ -17,13 +17,13 @@ from klack.analyses.reduction.one_node import (
 )
 from klack.assembling.bending import bending_body
 from klack.assembling.given_pair import build_given_pair
-from klack.assembling.modes import elastic_count, mode_pools
+from klack.assembling.modes import mode_pools
 from klack.assembling.problem import ContactProblem, build_problem
 from klack.assembling.reduced_pair import first_stiffness, own_pair
 from klack.assembling.yielding import tell_elastic
 from klack.bodies.elasticity.eigen import Modes, eigenmodes
 from klack.bodies.elasticity.statics import Flexibility
-from klack.bodies.reduction.reduced_body import ReducedBody
+from klack.bodies.reduction.reduced_body import ReducedBody, elastic_count
 from klack.bodies.reduction.transfer import TransferComparison
 from klack.case.placed_errors import tells_place
 from klack.case.schema import Case

@@ -19,6 +19,7 @@ __all__ = [
     "Recovery",
     "ReducedBody",
     "StateSpace",
+    "elastic_count",
     "port_among",
     "read_arrays",
     "surface_faces",
@@ -364,3 +365,8 @@ _ARRAYS = (
 _NAMES = ("port_names", "observer_names")
 _SCALARS = ("name", "mass", "rigid_count", "dof_count", "correction", "attachment_count")
 _RECOVERY = ("nodes", "points", "shapes", "faces")
+
+
+def elastic_count(body: ReducedBody) -> int:
+    """Number of elastic modes without attachment modes."""
+    return body.mode_count - body.rigid_count - body.attachment_count

@@ -24,7 +24,7 @@ from klack.exchange.results.study_table import about_study, result_table
 from klack.exchange.results.table import ResultChannel, ResultRun, ResultScalar, identifiers
 from klack.signals.sampled import TimeSeries
 
-__all__ = ["dataset_of"]
+__all__ = ["dataset_of", "short_names"]
 
 
 class Variable(NamedTuple):
@@ -234,7 +234,7 @@ def dataset_of(record: object, measured: Iterable[Measured], run: str | None = N
     InputError
         For another record or run.
     """
-    xarray = optional_package("xarray", "datasets of results", "exchange")
+    optional_package("xarray", "datasets of results", "exchange")
     about: dict[str, str]
     if isinstance(record, ImpactStudy | StrokeStudy):
         table = result_table(record)
@@ -278,8 +278,19 @@ def dataset_of(record: object, measured: Iterable[Measured], run: str | None = N
             expected="the record of an impact, a stroke, shots, a study or noise",
             hint="its arrays are fields of the record: result.record.",
         )
+    from klack.exchange.results.curves import Curves
+
     shown = {key: text for key, text in about.items() if text}
-    return xarray.Dataset(variables, coords=coordinates, attrs=shown)
+    return Curves(variables, coords=coordinates, attrs=shown)
+
+
+def short_names(record: object) -> Mapping[str, str]:
+    """Channels that a record itself calls by one word."""
+    if isinstance(record, ImpactStudy):
+        return {"force": "contact force"}
+    if isinstance(record, StrokeStudy):
+        return {"lift": record.channels.lift, "velocity": record.channels.velocity}
+    return {"force": "contact_force"} if isinstance(record, ShotsStudy) else {}
 
 
 def _named(run: str | None, usual: str, known: Iterable[str]) -> str:

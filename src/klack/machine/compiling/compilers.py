@@ -34,7 +34,7 @@ class _Code(CPUCodeLibrary):
 
     def __init__(self, codegen: Any, name: str) -> None:
         super().__init__(codegen, name)
-        self._reload_init = getattr(self, "_reload_init", set())  # numba 0.60 has none
+        self._reload_init: set[Any] = getattr(self, "_reload_init", set())  # numba 0.60 has none
         self._beside: dict[str, Any] = {}  # each after its callers: LLVM links what is called
 
     def add_linking_library(self, library: Any) -> None:
