@@ -64,7 +64,7 @@ def said(capsys: pytest.CaptureFixture[str], *words: object) -> dict:
 
 def test_every_command_takes_it(capsys):
     for command in COMMANDS:
-        if command.__name__ == "app":  # a server: it ends with Ctrl-C
+        if command.__name__ in ("app", "completion"):  # a server until Ctrl-C; a script
             continue
         capsys.readouterr()
         assert main([command.__name__, "--help"]) == 0
@@ -124,8 +124,14 @@ def test_the_schema_is_printed(capsys):
     }
     commands = {kind.removeprefix("klack-").split("-")[0].split("/")[0] for kind in kinds}
     assert len(kinds) == len(schema["oneOf"])
-    # demo writes what impact writes, optimise what study writes, app serves until Ctrl-C
-    own = {command.__name__ for command in COMMANDS} - {"demo", "optimise", "schema", "app"}
+    # demo writes what impact writes, optimise what study writes; app and completion write none
+    own = {command.__name__ for command in COMMANDS} - {
+        "demo",
+        "optimise",
+        "schema",
+        "app",
+        "completion",
+    }
     assert commands == own
 
 

@@ -18,6 +18,7 @@ from klack.analyses.json_parts import Real
 from klack.analyses.measures import described
 
 __all__ = [
+    "AboutJson",
     "CacheJson",
     "ComponentsJson",
     "ExportJson",
@@ -54,6 +55,13 @@ class VerificationJson(TypedDict):
     schema: Literal["klack-verify/1"]
     about: Annotated[dict[str, str], Field(description="Versions and machine.")]
     checks: list[CheckJson]
+
+
+class AboutJson(TypedDict):
+    """``klack about``."""
+
+    schema: Literal["klack-about/1"]
+    about: Annotated[dict[str, str], Field(description="By name; for people.")]
 
 
 class CacheJson(TypedDict):
@@ -192,6 +200,7 @@ _OTHERS = (
     VerificationJson,
     CacheJson,
     WarmJson,
+    AboutJson,
 )
 
 

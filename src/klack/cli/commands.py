@@ -16,6 +16,7 @@ from cyclopts import App, Parameter
 from klack import __version__
 from klack.analyses.catalogue import commands
 from klack.analyses.impact.command import run_case
+from klack.cli.about import about, completion
 from klack.cli.compare import compare
 from klack.cli.export import export
 from klack.cli.show import show
@@ -443,7 +444,9 @@ def _of_groups(done: "list[Warmed]", folder: str, count: int, size: int) -> "War
 
 parser = App(
     name="klack",
-    help="Predict how a valve needle hits its end stops.",
+    help="Predict how a valve needle hits its end stops.\n\n"
+    "Exit codes: 0 done; 1 a check failed, or no convergence; 2 bad input;\n"
+    "70 internal error; 130 Ctrl-C; 143 SIGTERM.",
     version=f"klack {__version__}",
     version_flags=["--version"],
     help_format="plaintext",
@@ -461,6 +464,8 @@ COMMANDS: Mapping[Callable[..., int], str] = {
     schema: "klack schema --kind stroke --json valve.schema.json",
     cache: "klack cache --clear",
     warm: "klack warm",
+    about: "klack about",
+    completion: "klack completion bash",
     app: "klack app my-valves",
 }
 

@@ -119,7 +119,10 @@ def _bug(name: str) -> int:
     import traceback
 
     traceback.print_exc()
-    text = "internal error, not caused by your input; please report the text above."
+    text = (
+        "internal error, not caused by your input; please report the text above, with that of "
+        "`klack about`."
+    )
     return _complain(f"{name}: {text}", EXIT_BUG)
 
 

@@ -1,0 +1,86 @@
+"""``klack about`` and ``klack completion``: what is installed, and completion of what is typed."""
+
+import subprocess
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from cyclopts import Parameter
+
+from klack.terminal.options import SHOWN, Shown
+from klack.terminal.tables import TextTable
+
+if TYPE_CHECKING:
+    from klack.analyses.json_results import AboutJson
+
+__all__ = ["about", "completion"]
+
+_PACKAGES = (
+    "llvmlite", "netgen-mesher", "ngsolve", "pypardiso", "mkl", "pydantic", "zarr", "cyclopts",
+    "matplotlib", "plotly", "typst", "mosqito", "xarray", "pandas", "fmpy", "nicegui",
+)  # fmt: skip
+
+
+def about(*, wanted: Shown = SHOWN) -> int:
+    """Show versions of klack and its libraries, processor, solvers and folders.
+
+    For the report of a fault: copy all of it.
+    """
+    from klack.machine.cache.result_cache import result_cache
+    from klack.machine.compiling.compiled_folder import compiled_folder
+    from klack.verification.run_conditions import run_conditions
+
+    results, compiled = result_cache(), compiled_folder()
+    found: dict[str, str] = {
+        **run_conditions(),
+        "commit": _commit() or "-",
+        "packages": ", ".join(filter(None, map(_with_version, _PACKAGES))),
+        "installed in": str(Path(__file__).parents[1]),
+        "results kept in": "nowhere" if results is None else str(results.folder),
+        "compiled code in": "nowhere" if compiled is None else str(compiled),
+    }
+    wanted.show(
+        [TextTable(title="klack", columns=("what", "is"), rows=tuple(found.items()), left=2)]
+    )
+    written: AboutJson = {
+        "schema": "klack-about/1",
+        "about": {key.replace(" ", "_"): text for key, text in found.items()},
+    }
+    wanted.write(lambda: written)
+    return 0
+
+
+def completion(
+    shell: Annotated[Literal["bash", "zsh", "fish"], Parameter(name="SHELL")],
+    /,
+) -> int:
+    """Print the script that completes commands and options in a shell.
+
+    In bash, for good: klack completion bash > ~/.local/share/bash-completion/completions/klack
+    In zsh: into a file _klack of a folder of fpath. In fish: into
+    ~/.config/fish/completions/klack.fish.
+    """
+    from klack.cli.commands import parser
+
+    print(parser.generate_completion(shell=shell))
+    return 0
+
+
+def _with_version(package: str) -> str:
+    try:
+        return f"{package} {version(package)}"
+    except PackageNotFoundError:
+        return ""
+
+
+def _commit() -> str:
+    """Commit of a checkout, with a mark where files differ from it; empty for an installed one."""
+    root = Path(__file__).parents[3]
+    if not (root / ".git").exists():
+        return ""
+    command = ["git", "-C", str(root), "describe", "--always", "--dirty", "--abbrev=12"]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=10)
+    except (OSError, subprocess.TimeoutExpired):
+        return ""
+    return done.stdout.strip()
