@@ -183,7 +183,7 @@ def test_without_the_library_nothing_is_computed(tmp_path, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "sklearn", None)
     out = tmp_path / "out"
     assert main(["study", str(SMALL), "--study", str(write(tmp_path)), "--out", str(out)]) == 2
-    assert "klack[surrogate]" in capsys.readouterr().err
+    assert "uv sync --extra surrogate" in capsys.readouterr().err
     assert not (out / "result.zarr").exists()
 
 

@@ -137,5 +137,5 @@ def _command(name: str) -> list[str]:
         f"compiling an FMU for {name}",
         got="no C compiler for it",
         expected=f"one of: {one_of([*programs, 'the Python package ziglang'])}",
-        hint=f"install {target.package}, or pip install 'klack[exchange]', which brings ziglang.",
+        hint=f"install {target.package}, or the extra 'exchange' of klack, which brings ziglang.",
     )
