@@ -2,16 +2,19 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import warnings
 from collections.abc import Callable
+from importlib.metadata import version
 from pathlib import Path
 from shlex import quote
 from types import ModuleType, SimpleNamespace
 
 import pytest
 
+import klack
 import klack.cli.commands as demo_module
 from klack import verification
 from klack.cli.commands import COMMANDS
@@ -63,6 +66,37 @@ def test_version(capsys):
 
     assert main(["--version"]) == 0
     assert capsys.readouterr().out == f"klack {__version__}\n"
+
+
+def test_about_lists_what_is_installed(capsys):
+    """Truth = what Python itself knows of its packages."""
+    assert main(["about", "--json", "-"]) == 0
+    about = json.loads(capsys.readouterr().out)["about"]
+    for name in ("numpy", "scipy", "numba"):
+        assert about[name] == version(name)
+    assert about["klack"] == klack.__version__
+    assert f"zarr {version('zarr')}" in about["packages"]
+    assert Path(about["installed_in"]) == Path(klack.__file__).parent
+
+
+@pytest.mark.parametrize(("words", "offered"), [("imp", "impact"), ("impact --lev", "--level")])
+def test_bash_completes_commands_and_options(words, offered, capsys, tmp_path):
+    """Truth = what bash itself offers."""
+    bash = shutil.which("bash")
+    if bash is None:
+        pytest.skip("no bash here")
+    assert main(["completion", "bash"]) == 0
+    script = tmp_path / "klack.bash"
+    script.write_text(capsys.readouterr().out)
+    typed = ["klack", *words.split()]
+    asked = f"source {script}; COMP_WORDS=({' '.join(typed)}); COMP_CWORD={len(typed) - 1}; _klack"
+    done = subprocess.run(
+        [bash, "-c", f'{asked}; echo "${{COMPREPLY[@]}}"'],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert offered in done.stdout.split()
 
 
 def test_module_is_the_command():

@@ -112,7 +112,7 @@ class PointTable:
     def to_pandas(self) -> Any:
         """Return a ``pandas.DataFrame``; units are in its ``attrs["units"]``."""
         try:
-            from pandas import DataFrame  # type: ignore[import-untyped]
+            from pandas import DataFrame
         except ImportError:
             raise MissingExtraError("pandas", "A table of points as a DataFrame", None) from None
         frame = DataFrame(self.arrays())
