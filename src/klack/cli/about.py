@@ -1,11 +1,9 @@
-"""``klack about`` and ``klack completion``: what is installed, and completion of what is typed."""
+"""``klack about``: what is installed."""
 
 import subprocess
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
-
-from cyclopts import Parameter
+from typing import TYPE_CHECKING
 
 from klack.terminal.options import SHOWN, Shown
 from klack.terminal.tables import TextTable
@@ -13,7 +11,7 @@ from klack.terminal.tables import TextTable
 if TYPE_CHECKING:
     from klack.analyses.json_results import AboutJson
 
-__all__ = ["about", "completion"]
+__all__ = ["about"]
 
 _PACKAGES = (
     "llvmlite", "netgen-mesher", "ngsolve", "pypardiso", "mkl", "pydantic", "zarr", "cyclopts",
@@ -47,22 +45,6 @@ def about(*, wanted: Shown = SHOWN) -> int:
         "about": {key.replace(" ", "_"): text for key, text in found.items()},
     }
     wanted.write(lambda: written)
-    return 0
-
-
-def completion(
-    shell: Annotated[Literal["bash", "zsh", "fish"], Parameter(name="SHELL")],
-    /,
-) -> int:
-    """Print the script that completes commands and options in a shell.
-
-    In bash, for good: klack completion bash > ~/.local/share/bash-completion/completions/klack
-    In zsh: into a file _klack of a folder of fpath. In fish: into
-    ~/.config/fish/completions/klack.fish.
-    """
-    from klack.cli.commands import parser
-
-    print(parser.generate_completion(shell=shell))
     return 0
 
 

@@ -16,7 +16,7 @@ from cyclopts import App, Parameter
 from klack import __version__
 from klack.analyses.catalogue import commands
 from klack.analyses.impact.command import run_case
-from klack.cli.about import about, completion
+from klack.cli.about import about
 from klack.cli.compare import compare
 from klack.cli.export import export
 from klack.cli.show import show
@@ -440,6 +440,20 @@ def _of_groups(done: "list[Warmed]", folder: str, count: int, size: int) -> "War
             for group in done
         },
     }
+
+
+def completion(
+    shell: Annotated[Literal["bash", "zsh", "fish"], Parameter(name="SHELL")],
+    /,
+) -> int:
+    """Print the script that completes commands and options in a shell.
+
+    In bash, for good: klack completion bash > ~/.local/share/bash-completion/completions/klack
+    In zsh: into a file _klack of a folder of fpath. In fish: into
+    ~/.config/fish/completions/klack.fish.
+    """
+    print(parser.generate_completion(shell=shell))
+    return 0
 
 
 parser = App(
