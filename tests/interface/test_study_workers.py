@@ -417,7 +417,9 @@ class TestRefused:
     def test_another_version_of_klack(self, cluster: str, monkeypatch: pytest.MonkeyPatch):
         other = dict(versions_here()) | {"klack": "9.9"}
         monkeypatch.setattr("klack.analyses.study.processes.versions_here", lambda: other)
-        with pytest.raises(InputError, match=r"worker tcp://.*got klack 0.1.0, expected klack 9.9"):
+        with pytest.raises(
+            InputError, match=rf"worker tcp://.*got klack {klack.__version__}, expected klack 9.9"
+        ):
             klack.run_many(SMALL, [{}], ["impacts"], dask=cluster)
 
     @pytest.mark.parametrize(
