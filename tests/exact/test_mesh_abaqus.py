@@ -426,6 +426,17 @@ def test_quadrilaterals_of_meshio_are_named_as_such(tmp_path):
         read(tmp_path / "cube.inp", text)
 
 
+@pytest.mark.parametrize("tag", ["-3", "100", "99"])
+def test_tags_of_gmsh_that_meshio_stores_as_a_set_are_left_out(tmp_path, tag):
+    """They are numbers of bounding entities; some are those of elements too."""
+    with doubts() as texts:
+        mesh = read(tmp_path / "row.inp", f"{ROW}*ELSET, ELSET=gmsh:bounding_entities\n{tag}\n")
+
+    assert mesh.solids == ("row",)
+    (told,) = texts
+    assert "ignored: *ELSET, ELSET=gmsh:bounding_entities (" in told
+
+
 # A box 1 x 2 x 3 and a tetrahedron, as Abaqus/CAE writes parts: numbers from 1 in each.
 BOX = """*Part, name=Box
 *Node

@@ -14,6 +14,7 @@ import pytest
 
 from klack.bodies.elasticity.body import elastic_body
 from klack.bodies.elasticity.eigen import eigenmodes
+from klack.errors import AccuracyWarning, InputError
 from klack.materials.material import Material
 from klack.mesh.families import FAMILIES
 from klack.mesh.files.mesh_file import read_mesh_file
@@ -482,6 +483,37 @@ def test_same_body_from_every_format(form: str, quadratic: bool, tmp_path: Path)
         assert len(ground) == len(b.ground)
     truth = reference(tmp_path / "a.inp", b)
     np.testing.assert_allclose(frequencies(mesh), frequencies(truth.mesh), rtol=accuracy)
+
+
+def netgen_file(path: Path, quadratic: bool) -> None:
+    """A box of 1 x 2 x 3 as netgen writes it, all tetrahedra mirrored."""
+    from netgen.occ import Box, OCCGeometry, Pnt
+
+    found = OCCGeometry(Box(Pnt(0, 0, 0), Pnt(1, 2, 3))).GenerateMesh(maxh=1.0)
+    if quadratic:
+        found.SecondOrder()
+    found.Export(str(path), "Gmsh2 Format")
+
+
+@pytest.mark.parametrize("quadratic", [False, True], ids=["linear", "quadratic"])
+def test_mirrored_tetrahedra_of_netgen_are_turned(quadratic: bool, tmp_path: Path) -> None:
+    netgen_file(tmp_path / "box.msh", quadratic)
+    with pytest.warns(AccuracyWarning, match="netgen has written all tetrahedra mirrored"):
+        mesh = read_mesh_file(tmp_path / "box.msh", MM).mesh
+
+    assert corner_volume(mesh) == pytest.approx(6e-9, rel=1e-12)
+    assert worst_middle(mesh) <= 1e-9 * MM  # netgen writes six decimals, here exact ones
+    assert sum(area(mesh, surface) for surface in mesh.surfaces.values()) == pytest.approx(22e-6)
+
+
+def test_a_single_inverted_tetrahedron_of_netgen_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "box.msh"
+    netgen_file(path, False)
+    *lines, last, end = path.read_text().rstrip().splitlines()
+    *row, one, two = last.split()
+    path.write_text("\n".join([*lines, " ".join([*row, two, one]), end, ""]))
+    with pytest.raises(InputError, match="element"):
+        read_mesh_file(path, MM)
 
 
 @pytest.mark.parametrize("form", ["cdb", "bdf large", "bdf free"])

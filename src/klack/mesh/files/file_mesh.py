@@ -4,6 +4,7 @@ Readers give numbers of the file and the node order of :mod:`klack.mesh.families
 same for all formats.
 """
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -11,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError, require_positive
+from klack.errors import AccuracyWarning, InputError, require_positive
 from klack.mesh.families import FAMILIES
 from klack.mesh.files.mesh_model import FileMaterial, MeshModel
 from klack.mesh.files.named_faces import LOOSE, MarkedFaces, loose_faces, named_faces
@@ -142,6 +143,8 @@ class FileMesh:
         Surface elements on no solid are ignored, since they have no stiffness.
     solids_only
         Surface elements on no solid are left out and counted.
+    of_netgen
+        Tetrahedra that are all mirrored are turned, with a warning.
     left_out
         Elements of other kinds left out by the reader, by type.
     foreign_materials, materials, sections
@@ -156,6 +159,7 @@ class FileMesh:
     faces_of_sets: bool = False
     loose_faces: bool = False
     solids_only: bool = False
+    of_netgen: bool = False
     left_out: Mapping[str, int] = field(default_factory=dict)
     foreign_materials: Mapping[str, str] = field(default_factory=dict)
     materials: Mapping[str, FileMaterial] = field(default_factory=dict)
@@ -200,6 +204,17 @@ def mesh_model(
     blocks = tuple(
         _turned(points, ElementBlock(b.family, new[b.connectivity], b.solid)) for b in blocks
     )
+    if raw.of_netgen and _all_mirrored(points, blocks):
+        warnings.warn(
+            f"{path.name}: netgen has written all tetrahedra mirrored ('Gmsh2 Format'); their "
+            "nodes are reordered, and the shape stays.",
+            AccuracyWarning,
+            stacklevel=4,
+        )
+        blocks = tuple(
+            ElementBlock(b.family, b.connectivity[:, _TETRAHEDRA[b.family]], b.solid)
+            for b in blocks
+        )
     sets = {name: own for name, members in sets.items() if len(own := _renumbered(new, members))}
     surfaces, inner = named_faces(
         str(path),
@@ -332,6 +347,20 @@ _MIRRORED = {
     "wedge6": (0, 2, 1, 3, 5, 4),
     "wedge15": (0, 2, 1, 3, 5, 4, 8, 7, 6, 11, 10, 9, 12, 14, 13),
 }
+
+
+_TETRAHEDRA = {"tet4": (0, 2, 1, 3), "tet10": (0, 2, 1, 3, 6, 5, 4, 7, 9, 8)}
+
+
+def _all_mirrored(points: NDArray[np.float64], blocks: Sequence[ElementBlock]) -> bool:
+    """Whether there are tetrahedra alone, all of negative volume."""
+    if not all(block.family in _TETRAHEDRA for block in blocks):
+        return False
+    for block in blocks:
+        a, b, c, d = np.moveaxis(points[block.connectivity[:, :4]], 1, 0)
+        if ((np.cross(b - a, c - a) * (d - a)).sum(axis=1) >= 0).any():
+            return False
+    return True
 
 
 def _turned(points: NDArray[np.float64], block: ElementBlock) -> ElementBlock:

@@ -238,6 +238,7 @@ _READ = (
     *("MATERIAL", "ELASTIC", "DENSITY", "PART", "INSTANCE", "ASSEMBLY", "HEADING"),
 )
 _ALIKE = {"PLASTIC"}  # other keywords that are one letter away from one of them
+_TAGS = "gmsh:bounding_entities"
 _END_OF_MATERIAL = {"MATERIAL", "STEP", "PART", "ASSEMBLY", "SOLID SECTION", "NODE", "ELEMENT"}
 
 
@@ -257,7 +258,8 @@ def read_deck(path: Path, *, solids_only: bool = False) -> Deck:
     Warns
     -----
     AccuracyWarning
-        Once, of *TRANSFORM or constraints between nodes, which are ignored.
+        Once, of *TRANSFORM or constraints between nodes, which are ignored, and of what meshio
+        makes of the boundaries of Gmsh.
     """
     reader = _Reader(path, Scope(solids_only=solids_only))
     in_step = False
@@ -292,6 +294,7 @@ class _Reader:
     materials: dict[str, FileMaterial] = field(default_factory=dict)
     foreign: dict[str, str] = field(default_factory=dict)
     ignored: dict[str, str] = field(default_factory=dict)
+    tags: str = ""  # place of the set of meshio that holds none of elements
 
     def take(self, keyword: Keyword) -> None:
         """Process one keyword."""
@@ -309,6 +312,8 @@ class _Reader:
                 self.material = _Material(keyword.parameter("NAME"))
             case "ELASTIC" | "DENSITY":
                 self._take_value(keyword)
+            case "ELSET" if keyword.parameters.get("ELSET", "").lower() == _TAGS:
+                self.tags = keyword.place
             case name if name in _GENERATING:
                 raise InputError(
                     f"{keyword.place}: *{keyword.name}",
@@ -434,6 +439,13 @@ class _Reader:
         add_instance(self.root, name, part, placement, str(self.path))
 
     def _warn(self) -> None:
+        if self.tags:
+            warnings.warn(
+                f"ignored: *ELSET, ELSET={_TAGS} ({self.tags}), in which meshio stores tags of "
+                "Gmsh in place of numbers of elements.",
+                AccuracyWarning,
+                stacklevel=4,
+            )
         if self.ignored:
             found = ", ".join(f"*{name} ({place})" for name, place in self.ignored.items())
             warnings.warn(

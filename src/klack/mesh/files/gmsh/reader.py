@@ -3,9 +3,9 @@
 Physical groups of volumes are solids, of surfaces on them surfaces; all others are node sets. A
 plane mesh in z = 0 is axisymmetric: x is r, y is z.
 
-meshio (5.3.5) loses node numbers and all physical groups of an entity but the first, takes another
-node for an undefined one, and reads no quadratic wedges and no entity without group; nor is it
-faster (477 000 tetrahedra: 3.5 s against 2.3 s as text, 0.4 s against 0.1 s binary).
+meshio (5.3.5) loses node numbers, takes another node for an undefined one, and rejects quadratic
+wedges, and entities without group beside others; nor is it faster (477 000 tetrahedra: 3.5 s
+against 2.3 s as text, 0.4 s against 0.1 s binary).
 """
 
 from collections.abc import Sequence
@@ -64,6 +64,11 @@ def read_gmsh(
     MeshModel
         Solids, surfaces and node sets are called as their physical groups, or ``volume_7``,
         ``surface_3``; elements in no group are one solid called as the file.
+
+    Warns
+    -----
+    AccuracyWarning
+        Of the elements of netgen's "Gmsh2 Format", which are all mirrored, and turned here.
     """
     path = Path(path)
     unit_length = require_unit(path, unit_length)
@@ -85,6 +90,7 @@ def read_gmsh(
             ),
             node_sets=_node_sets(content, dimension),
             solids_only=solids_only,
+            of_netgen=content.of_netgen,
         ),
         unit_length,
         solids,

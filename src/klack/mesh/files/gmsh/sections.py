@@ -167,6 +167,7 @@ class GmshContent:
     elements: list[GmshElements] = field(default_factory=list)
     names: dict[tuple[int, int], str] = field(default_factory=dict)  # by dimension and number
     groups: dict[tuple[int, int], tuple[int, ...]] = field(default_factory=dict)  # by entity
+    of_netgen: bool = False
 
     @cached_property
     def node_numbers(self) -> Ints:
@@ -243,7 +244,8 @@ class _Reader:
         if not match:
             refuse(place, repr(self._data[start : start + 20]), "version, kind and size")
         version = match[1].decode()
-        if version not in ("2", "2.1", "2.2", "4", "4.1"):
+        self._content.of_netgen = version == "2.000000"  # no other program writes it so
+        if version not in ("2", "2.000000", "2.1", "2.2", "4.1"):
             raise InputError(
                 place,
                 got=f"version {version}",

@@ -4,8 +4,8 @@ VTK has no names for parts.  An integer array of the cells tells the solids (``s
 ``material``, ...) or surfaces apart; arrays of 0 and 1 are sets.  A plane grid in z = 0 is
 axisymmetric: x is r, y is z.
 
-The reader of VTK (9.7, 560 MB installed) ends the process on a legacy file that lacks a line;
-meshio (5.3.5) does not know VTK's integers of type ``long``, and leaves out pixels and voxels.
+The reader of VTK (9.7, 560 MB installed) does not survive every damaged legacy file; meshio
+(5.3.5) rejects pixels and voxels.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
