@@ -59,7 +59,7 @@ def test_constant_force(bodies, tmp_path, name, fmi):
         "start_values": {model.inputs[0].name: FORCE},
         "output": outputs,
     }
-    stepped = fmpy.simulate_fmu(path, fmi_type="CoSimulation", step_size=1e-6, **common)
+    stepped = fmpy.simulate_fmu(path, fmi_type="CoSimulation", **common)
     exchanged = fmpy.simulate_fmu(
         path, fmi_type="ModelExchange", solver="CVode", relative_tolerance=1e-10, **common
     )
