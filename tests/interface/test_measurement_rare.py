@@ -73,11 +73,21 @@ def test_universal_files(tmp_path):
     [
         ({"x": TIME[::-1]}, "50 values with steps of -1e-05 s"),
         ({"data": LIFT * 1j, "ord_data_type": 6}, "50 values of type complex"),
+        # the format has six digits of uneven times
+        ({"x": 100.0 + 0.01 * TIME, "binary": 0, "abscissa_spacing": 0}, "with steps of 0 s"),
     ],
 )
 def test_universal_sets_that_cannot_be(tmp_path, other, message):
     with pytest.raises(InputError, match=message):
         opened(uff(tmp_path / "a.uff", **other))
+
+
+def test_a_universal_file_of_an_end_mark_alone(tmp_path):
+    """What pyuff leaves where a binary set is to overwrite a file."""
+    path = tmp_path / "a.uff"
+    path.write_text("    -1\n")
+    with pytest.raises(InputError, match="no channel of numbers over time"):
+        opened(path)
 
 
 def test_a_universal_file_that_is_too_large(tmp_path, monkeypatch):

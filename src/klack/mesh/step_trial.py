@@ -1,9 +1,8 @@
 """First reading of a STEP file in a separate process.
 
-Of files with a few wrong digits or a lost line, one in six ends OpenCASCADE with a segmentation
-fault, some keep it busy without end; neither may happen in the process that holds the work of a
-user. The second reading takes as long as the first; meshing takes far longer. A file that passed
-is not tried again until it changes.
+OpenCASCADE does not survive every damaged file, and some keep it busy without end; neither may
+happen in the process that holds the work of a user. The second reading takes as long as the first;
+meshing takes far longer. A file that passed is not tried again until it changes.
 """
 
 import re

@@ -12,8 +12,7 @@ from klack.files.closing import Closing
 
 __all__ = ["NgsolveFactorization"]
 
-# NGSolve starts workers of its own for a factorisation; of two that two threads began side by side
-# one was once seen never to end
+# NGSolve starts workers of its own for a factorisation: one at a time
 _factorising = Lock()
 
 

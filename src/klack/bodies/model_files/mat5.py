@@ -1,8 +1,7 @@
 """MATLAB files of version 5 to 7.2 (Octave ``save -v6`` and ``-v7``), read without trust.
 
-Of 300 damaged files ``scipy.io.loadmat`` of SciPy 1.17 takes 14 to 33 whose sparse matrix, when
-used, reaches for foreign memory and ends the process. Here every count is checked against the
-bytes that are there. Objects are ignored.
+Of 300 damaged files ``scipy.io.loadmat`` of SciPy 1.17 takes 14 to 33 whose sparse matrix is not
+sound. Here every count is checked against the bytes that are there. Objects are ignored.
 """
 
 import struct

@@ -36,7 +36,7 @@ def write_netcdf(table: ResultTable, path: Path) -> Path:
         Without the package h5netcdf.
     """
     h5netcdf = optional_package("h5netcdf", "writing netCDF", "exchange")
-    # HDF5 writes to memory: it ends the process where the disk is full when it closes a file
+    # HDF5 writes to memory: a full disk is an error of ours then, and no end of the process
     memory = BytesIO()
     with h5netcdf.File(memory, "w", invalid_netcdf=False) as file:
         file.attrs["Conventions"] = "CF-1.11"
