@@ -144,11 +144,13 @@ def ball_on_rock() -> Figure:
     steep = [one for one in measured_pulses() if one.angle < STEEP]
     shapes = np.array([one.velocity / one.velocity[one.extremes[0]] for one in steep])
     time = 1e6 * steep[0].time
-    axes.plot(time, shapes.T, color=COLOURS["blue"], lw=0.4, alpha=0.5)
     axes.plot(time, shapes.mean(axis=0), color=COLOURS["blue"], lw=2.0,
-              label=f"measured at {len(steep)} places, and their mean")  # fmt: skip
+              label=f"measured, mean of {len(steep)} places")  # fmt: skip
+    axes.fill_between(time, *np.percentile(shapes, [10, 90], axis=0), color=COLOURS["blue"],
+                      alpha=0.25, lw=0, label="80 % of them")  # fmt: skip
     pulse = computed_pulse()
-    axes.plot(1e6 * pulse.time, pulse.velocity / pulse.velocity[pulse.extremes[0]],
+    seen = slice(None, None, 5)
+    axes.plot(1e6 * pulse.time[seen], pulse.velocity[seen] / pulse.velocity[pulse.extremes[0]],
               color=COLOURS["black"], lw=1.3, ls="--", label="computed")  # fmt: skip
     axes.set(xlabel="time since the P wave [us]", xlim=(-1.0, 8.0), ylim=(-0.9, 1.1),
              ylabel="velocity over its first extreme")  # fmt: skip
