@@ -27,6 +27,11 @@ from scipy.sparse import csr_array, diags_array, eye_array, kron, vstack
 from klack.arrays import Floats
 from klack.bodies.elasticity.body import ElasticBody
 from klack.bodies.elasticity.condensation import condensed_inverse
+from klack.bodies.elasticity.cyclic import (
+    CyclicFactorization,
+    CyclicProducts,
+    cyclic_factorization,
+)
 from klack.bodies.elasticity.eigen import Modes
 from klack.bodies.elasticity.factorization import (
     Backend,
@@ -223,6 +228,7 @@ class FullBody:
         self.elastic_rate = np.zeros(len(self.free))  # K v
         self.defect = np.zeros(len(self.free))  # that all steps so far have left [N]
         self.factor: Factorization | None = None
+        self._sectors: CyclicProducts | None = None
         self.inverse_mass: InverseMass | None = None
         self.light = np.empty(0, dtype=np.int64)
 
@@ -251,6 +257,8 @@ class FullBody:
             self.C = DampingMatrix.of(self.damping, self.body, csr_array(M))
             S = csr_array(S + sparse_damping(self.damping, self.body, csr_array(M)) * (2.0 / step))
         self.factor = self._factorise(S, backend, precision, threads)
+        if isinstance(self.factor, CyclicFactorization):
+            self._sectors = self.factor.products([csr_array(self.body.K), csr_array(M)])
         self.solve: InterfaceSolve = interface_solve(self.factor, self.rows)
         columns, weight = [np.zeros((len(self.free), 0))], [np.zeros(0)]
         if self.C is not None:
@@ -268,8 +276,6 @@ class FullBody:
     ) -> Factorization:
         """Factorise S in equal sectors where it has them, else its free part as a whole."""
         if self.dimension == 3 and chosen_backend(backend) == "pardiso":
-            from klack.bodies.elasticity.cyclic import cyclic_factorization
-
             factor = cyclic_factorization(S, self.body.mesh.points, self.body.fixed, precision)
             if factor is not None:
                 return factor
@@ -333,8 +339,8 @@ class FullBody:
             Energy that the defect of the solve gave.
         """
         moved, change = self.next - self.u, self.change
-        elastic = self.K @ change
-        defect = (4.0 / self.step**2) * (self.M @ change) + elastic
+        elastic, inertia = self._sectors(change) if self._sectors else self._products(change)
+        defect = (4.0 / self.step**2) * inertia + elastic
         defect -= self.right + self.rows_transposed @ lam
         damped = radiated = 0.0
         if self.C is not None:
@@ -357,6 +363,9 @@ class FullBody:
             self.v[self.light] = moved[self.light] / self.step
             self.refresh()
         return damped, radiated, rounded
+
+    def _products(self, x: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+        return [self.K @ x, self.M @ x]
 
     def across(self, velocity: tuple[float, float]) -> NDArray[np.float64]:
         """Rigid motion along x and y [m/s].

@@ -14,14 +14,14 @@ constraints :math:`C u = 0`: with :math:`S = L L^H`, :math:`\hat Y = L^{-1} C^T`
 D. L. Thomas, Int. J. Numer. Meth. Engng 14 (1979) 81.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
-from scipy.sparse import block_array, block_diag, csr_array
+from scipy.sparse import block_array, block_diag, csr_array, eye_array, kron
 from scipy.spatial import KDTree
 from threadpoolctl import threadpool_limits
 
@@ -30,7 +30,7 @@ from klack.bodies.elasticity.factorization import Precision
 from klack.bodies.elasticity.pardiso import PardisoFactorization
 from klack.files.closing import Closing
 
-__all__ = ["CyclicFactorization", "cyclic_factorization"]
+__all__ = ["CyclicFactorization", "CyclicProducts", "cyclic_factorization"]
 
 _FEWEST = 5
 """Sectors; fewer gain little over the whole matrix."""
@@ -164,6 +164,12 @@ class CyclicFactorization(Closing):
         """Both halves, for one or several columns."""
         return self.backward(self.forward(B))
 
+    def products(self, matrices: Sequence[csr_array]) -> "CyclicProducts | None":
+        """Products with the free parts of matrices (3 n, 3 n) that repeat themselves like S."""
+        if not all(_repeats(A, self._sectors) for A in matrices):
+            return None
+        return CyclicProducts(matrices, self._sectors, self._free)
+
     def close(self) -> None:
         """Give the memory back to the system."""
         self._factor.close()
@@ -206,6 +212,82 @@ class CyclicFactorization(Closing):
         across = packed[rest + len(axis) :]
         nodes[axis, 0], nodes[axis, 1] = across.real, -across.imag
         return nodes.reshape(3 * self._nodes, k)
+
+
+class CyclicProducts:
+    """Products of several matrices with one motion: what one sector has serves all of them."""
+
+    def __init__(
+        self, matrices: Sequence[csr_array], sectors: _Sectors, free: NDArray[np.int64]
+    ) -> None:
+        N, m = sectors.around.shape
+        self._count, self._free, self._size = len(matrices), free, matrices[0].shape[0]
+        angle = sectors.turn * np.arange(N)
+        self._cos, self._sin = np.cos(angle), np.sin(angle)
+        self._nodes = np.ascontiguousarray(sectors.around.T)
+        # of the nodes around the axis: sector (-1 on it), and number in the sector
+        sector, number = np.full(self._size // 3, -1), np.zeros(self._size // 3, dtype=np.int64)
+        sector[sectors.around] = np.arange(N)[:, None]
+        number[sectors.around] = np.arange(m)
+        first = (3 * sectors.around[0][:, None] + np.arange(3)).ravel()
+        rows = [csr_array(A[first]).tocoo() for A in matrices]
+        self._shifts = np.unique(np.concatenate([sector[A.col // 3] for A in rows]))
+        self._shifts = self._shifts[self._shifts >= 0]
+        self._first = block_array(
+            [[self._beside(A, sector, number, k, sectors) for k in self._shifts] for A in rows],
+            format="csr",
+        )
+        on_axis = np.repeat(sector < 0, 3)
+        self._axis = [_touching(A, on_axis) for A in matrices]
+
+    def _beside(
+        self,
+        A: Any,
+        sector: NDArray[np.int64],
+        number: NDArray[np.int64],
+        shift: int,
+        sectors: _Sectors,
+    ) -> csr_array:
+        """Columns of the sector further by ``shift``, in its frame."""
+        node, direction = np.divmod(A.col, 3)
+        here = sector[node] == shift
+        m = len(self._nodes)
+        block = csr_array(
+            (A.data[here], (A.row[here], 3 * number[node[here]] + direction[here])),
+            shape=(3 * m, 3 * m),
+        )
+        turn = csr_array(_turn(sectors.turn * shift))
+        return csr_array(block @ kron(eye_array(m), turn, format="csr"))
+
+    def __call__(self, x: Floats) -> list[Floats]:
+        """One product (n_free,) for each matrix."""
+        whole = np.zeros(self._size)
+        whole[self._free] = x
+        given = whole.reshape(-1, 3)[self._nodes]
+        m, N = self._nodes.shape
+        local = np.empty((m, 3, N))
+        local[:, 0] = self._cos * given[..., 0] + self._sin * given[..., 1]
+        local[:, 1] = self._cos * given[..., 1] - self._sin * given[..., 0]
+        local[:, 2] = given[..., 2]
+        local = local.reshape(3 * m, N)
+        near = np.concatenate([np.roll(local, -k, axis=1) for k in self._shifts])
+        results = []
+        for part, axis in zip(np.split(self._first @ near, self._count), self._axis, strict=True):
+            out, found = (axis @ whole).reshape(-1, 3), part.reshape(m, 3, N)
+            turned = np.empty((m, N, 3))
+            turned[..., 0] = self._cos * found[:, 0] - self._sin * found[:, 1]
+            turned[..., 1] = self._sin * found[:, 0] + self._cos * found[:, 1]
+            turned[..., 2] = found[:, 2]
+            out[self._nodes] += turned
+            results.append(out.ravel()[self._free])
+        return results
+
+
+def _touching(A: csr_array, chosen: NDArray[np.bool_]) -> csr_array:
+    """Entries in the chosen rows or columns."""
+    entries = A.tocoo()
+    here = chosen[entries.row] | chosen[entries.col]
+    return csr_array((entries.data[here], (entries.row[here], entries.col[here])), shape=A.shape)
 
 
 def _candidates(points: Floats) -> Iterator[_Sectors]:
