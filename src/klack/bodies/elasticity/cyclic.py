@@ -269,8 +269,8 @@ class CyclicProducts:
         local[:, 0] = self._cos * given[..., 0] + self._sin * given[..., 1]
         local[:, 1] = self._cos * given[..., 1] - self._sin * given[..., 0]
         local[:, 2] = given[..., 2]
-        local = local.reshape(3 * m, N)
-        near = np.concatenate([np.roll(local, -k, axis=1) for k in self._shifts])
+        flat = local.reshape(3 * m, N)
+        near = np.concatenate([np.roll(flat, -k, axis=1) for k in self._shifts])
         results = []
         for part, axis in zip(np.split(self._first @ near, self._count), self._axis, strict=True):
             out, found = (axis @ whole).reshape(-1, 3), part.reshape(m, 3, N)
