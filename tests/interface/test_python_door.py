@@ -236,6 +236,10 @@ class TestResults:
         force = design.stops[0]
         np.testing.assert_array_equal(data.contact_force_energy, force.bands.energy)
         np.testing.assert_array_equal(data.contact_force_level, force.level)
+        frame = heard.to_dataframe()
+        assert frame.index.name == "band"
+        np.testing.assert_array_equal(frame["sound_exposure"], data.sound_exposure)
+        np.testing.assert_array_equal(heard["sound pressure"], sound.pressure.values)
         with pytest.raises(InputError, match=f"one of: {design.name}"):
             heard.to_xarray("loud")
 

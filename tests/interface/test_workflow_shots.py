@@ -296,6 +296,13 @@ def test_shots_as_a_dataset(study):
         float(data.impulse.sel(shot=0)), rel=1e-3
     )
     assert data.peak_force.attrs["units"] == "N"
+    shots = Result(study, SHOTS)
+    np.testing.assert_array_equal(shots["force"], data.contact_force)
+    frame = shots.to_dataframe()
+    assert frame.index.name == "shot"
+    np.testing.assert_array_equal(frame["restitution"], data.restitution)
+    heights = shots.to_dataframe(axis="time")["height"]
+    np.testing.assert_array_equal(heights.loc[2], study.shot_traces.height[1])
     with pytest.raises(InputError, match="one of: shots"):
         Result(study, SHOTS).to_xarray("1")
 
