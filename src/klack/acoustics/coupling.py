@@ -25,6 +25,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from klack.acoustics.interface import (
     Complexes,
@@ -464,7 +465,7 @@ def _solved(Z: Complexes, right: Complexes) -> Complexes:
         scaled *= row[:, None, :]
         with suppress(np.linalg.LinAlgError), np.errstate(all="ignore"):
             inverse = np.linalg.inv(scaled)
-            worst = float(np.max(_norm(scaled) * _norm(inverse)))
+            worst = float(np.max(np.multiply(_norm(scaled), _norm(inverse))))
     refuse_if(
         not worst < 1.0 / np.finfo(float).eps,
         "coupling",
@@ -485,6 +486,6 @@ def _solved(Z: Complexes, right: Complexes) -> Complexes:
     return np.asarray(row[..., None] * found)
 
 
-def _norm(A: Complexes) -> Vector:
+def _norm(A: NDArray[np.complexfloating]) -> Vector:
     """Largest sum of a column, (k,)."""
     return np.asarray(np.abs(A).sum(axis=1).max(axis=1))
