@@ -313,3 +313,24 @@ def test_the_checker_names_the_line():
     assert f"{PATH}:{line}: " in found.error
     assert found.fields == ()
     assert Path(str(PATH)).read_text("utf-8") == TEXT
+
+
+@pytest.mark.slow
+def test_a_valve_in_its_machine_is_heard_at_every_ear(tmp_path):
+    """Twice as far on the normal: half the pressure, later; moves answer as a fresh page does."""
+    text = find_case("demo-mounted").read_text(encoding="utf-8").replace("12 ms", "1 ms")
+    text = text.replace("[0 m, 0 m, 1 m]}", "[0 m, 0 m, 1 m], far: [0 m, 0 m, 2 m]}")
+    explorer, path = Explorer(), str(tmp_path / "case.yaml")
+    first = explorer.open(text, path).first
+    assert first.ears == ("listener", "far")
+    moved = {"network.components.spring.preload": 12.6}
+    near, far = (explorer.move(moved, ear=ear) for ear in first.ears)
+    level = [answer.numbers[-1].value for answer in (near, far)]
+    assert level[0] - level[1] == pytest.approx(20.0 * np.log10(2.0), abs=0.02)
+    then = [answer.ghost_level[0].value for answer in (near, far)]
+    assert then[0] == first.numbers[-1].value
+    assert then[0] - then[1] == pytest.approx(20.0 * np.log10(2.0), abs=0.02)
+    assert near.wav != far.wav
+    assert explorer.listen(moved, "far").number.value < explorer.listen(moved).number.value
+    fresh = Explorer().open(explorer.text_at(moved), path).first  # with a machine of its own
+    assert fresh.numbers[-1].value == pytest.approx(near.numbers[-1].value, rel=1e-12)

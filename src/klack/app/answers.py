@@ -92,6 +92,10 @@ class Answer:
         Clicks now and of the pinned design, to one full scale; empty if nothing radiates.
     scale
         Full scale of both in words.
+    ghost_level
+        Of the pinned click at the same ear.
+    ears
+        Of the machine, by name; of a result with their clicks in ``ear_wavs``.
     doubts
         Shown at once.
     seconds
@@ -109,6 +113,9 @@ class Answer:
     wav: bytes = b""
     ghost_wav: bytes = b""
     scale: str = ""
+    ghost_level: tuple[Number, ...] = ()
+    ears: tuple[str, ...] = ()
+    ear_wavs: tuple[bytes, ...] = ()
     doubts: tuple[str, ...] = ()
     seconds: float = 0.0
     run: str = ""

@@ -30,7 +30,7 @@ from klack.analyses.impact.run import ImpactBodies, impact_bodies, impact_of_bod
 from klack.analyses.impact.wording import FAIR, GOOD, estimate_sentence, worst_error
 from klack.analyses.measures import json_of
 from klack.analyses.noise.body import Transfers
-from klack.analyses.noise.run import click_sound
+from klack.analyses.noise.run import click_sounds
 from klack.analyses.noise.source import NoiseSource, SourceStop, impact_sources, stroke_sources
 from klack.analyses.stroke.analysis import first_impact
 from klack.analyses.stroke.missing import missing_notes
@@ -345,7 +345,7 @@ _REFERENCE = 20e-6  # [Pa]
 class _Computed:
     source: NoiseSource
     bands: tuple[ThirdOctaves, ...]
-    pressure: TimeSeries | None
+    pressures: Mapping[str, TimeSeries]
     force: tuple[Curve, ...]
     lift: tuple[Curve, ...]
     numbers: tuple[Number, ...]
@@ -362,9 +362,10 @@ class Explorer:
         self._design: _Impacts | _Strokes | None = None
         self._sliders: dict[str, Slider] = {}
         self._parts: tuple[set[Key], CaseTree] | None = None  # of the sliders that move
-        self._pinned: TimeSeries | None = None
+        self._pinned: Mapping[str, TimeSeries] = {}
         self._last: tuple[dict[str, float], _Computed] | None = None
-        self._pinned_loudness: Number | None = None
+        self._pinned_loudness: dict[str, Number] = {}
+        self._pinned_level: dict[str, tuple[Number, ...]] = {}
         self._pools = ThreadpoolController()
 
     def open(self, text: str, path: str) -> Opened:
@@ -382,7 +383,7 @@ class Explorer:
                 self._design = _Strokes(case)
             else:
                 self._design = _Impacts(case, self._hardest(found))
-        self._pinned = self._last = None
+        self._pinned, self._last = {}, None
         self._pools = ThreadpoolController()  # with libraries that came since
         first = self.move({}, pin=True)
         return Opened(
@@ -393,11 +394,11 @@ class Explorer:
             first=first,
         )
 
-    def move(self, values: Values, pin: bool = False) -> Answer:
+    def move(self, values: Values, pin: bool = False, ear: str = "") -> Answer:
         """Force, motion, bands and click at a position of the sliders.
 
         ``values`` are of sliders that are off their place in the case; ``pin`` compares later
-        positions with this one.
+        positions with this one. The click is at the ``ear``, or the first one.
         """
         begin = perf_counter()
         design = self._require_open()
@@ -405,18 +406,21 @@ class Explorer:
             found = self._computed(values)
         bands = found.bands
         if pin:
-            self._pinned, self._pinned_loudness = found.pressure, None
-        wav, ghost, scale = _sounds(found.pressure, self._pinned)
+            self._pinned, self._pinned_loudness, self._pinned_level = found.pressures, {}, {}
+        pressure = _at(found.pressures, ear)
+        wav, ghost, scale = _sounds(pressure, _at(self._pinned, ear))
         return Answer(
             force=found.force,
             lift=found.lift,
             time_unit=design.time_unit,
             bands=bands[0].middle,
             levels=force_levels(bands),
-            numbers=(*found.numbers, *level_numbers(found.pressure)),
+            numbers=(*found.numbers, *level_numbers(pressure)),
             wav=wav,
             ghost_wav=ghost,
             scale=scale,
+            ears=tuple(filter(None, found.pressures)),
+            ghost_level=self._level_pinned(ear),
             doubts=found.doubts,
             seconds=perf_counter() - begin,
         )
@@ -428,22 +432,23 @@ class Explorer:
             grade, words = design.judged(self._case_at(values))
         return Judgement(grade=grade, words=words)
 
-    def listen(self, values: Values) -> Hearing | None:
+    def listen(self, values: Values, ear: str = "") -> Hearing | None:
         """Loudness, spectrogram and drive pattern, once the sliders rest."""
         with self._one_thread():
             found = self._computed(values)
-            pressure, drive = found.pressure, found.source.noise.drive
+            pressure, drive = _at(found.pressures, ear), found.source.noise.drive
             if pressure is None:
                 return None
             pattern = drive_pattern(pressure, drive.rate, min(drive.duration, _LONGEST))
             now = _loudness(pressure)
-            if self._pinned_loudness is None and self._pinned is not None:
-                self._pinned_loudness = _loudness(self._pinned)
+            pinned = _at(self._pinned, ear)
+            if ear not in self._pinned_loudness and pinned is not None:
+                self._pinned_loudness[ear] = _loudness(pinned)
         return Hearing(
             number=now,
-            pinned=self._pinned_loudness or now,
+            pinned=self._pinned_loudness.get(ear, now),
             spectrogram=_spectrogram(pressure),
-            pattern_wav=wav_bytes(pattern, full_scale=common_scale(pattern, self._pinned)),
+            pattern_wav=wav_bytes(pattern, full_scale=common_scale(pattern, pinned)),
         )
 
     def text_at(self, values: Values) -> str:
@@ -463,6 +468,11 @@ class Explorer:
             doubts = tuple(filter(None, dict.fromkeys((*notes, *found.doubts))))
             self._last = dict(values), replace(found, doubts=doubts)
         return self._last[1]
+
+    def _level_pinned(self, ear: str) -> tuple[Number, ...]:
+        if ear not in self._pinned_level:
+            self._pinned_level[ear] = level_numbers(_at(self._pinned, ear))
+        return self._pinned_level[ear]
 
     def _one_thread(self) -> Any:
         """Small matrices: threads would wait for each other."""
@@ -546,7 +556,7 @@ class _Impacts:
         return _Computed(
             source=source,
             bands=bands,
-            pressure=click_sound(source, self._transfers, bands),
+            pressures=click_sounds(source, self._transfers, bands),
             force=force,
             lift=lift,
             numbers=impact_numbers(level),
@@ -601,7 +611,7 @@ class _Strokes:
         return _Computed(
             source=source,
             bands=bands,
-            pressure=click_sound(source, self._transfers, bands),
+            pressures=click_sounds(source, self._transfers, bands),
             force=force,
             lift=lift,
             numbers=stroke_numbers(found, study.channels),
@@ -622,6 +632,11 @@ class _Strokes:
 
 
 # --------------------------------------------------------------------------- sounds
+
+
+def _at(pressures: Mapping[str, TimeSeries], ear: str) -> TimeSeries | None:
+    """At an ear, or the first one."""
+    return pressures.get(ear, next(iter(pressures.values()), None))
 
 
 def _loudness(pressure: TimeSeries) -> Number:

@@ -13,7 +13,7 @@ from klack.analyses.catalogue import analysis_in
 from klack.analyses.contact_doubts import MeshedContact, contact_doubt
 from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.noise.body import Transfers
-from klack.analyses.noise.run import click_sound
+from klack.analyses.noise.run import click_sounds
 from klack.analyses.noise.source import sources_of
 from klack.analyses.stroke.record import StrokeStudy
 from klack.analyses.study.point_case import case_of_point
@@ -118,13 +118,17 @@ class Reader:
             _answer(analysis.load(Path(folder)))
             for analysis, folder in zip(analyses, (first, second), strict=True)
         ]
-        known = [pressure for _, pressure in found if pressure is not None]
+        known = [pressure for _, pressures in found for pressure in pressures.values()]
         scale = full_scale_of(*known) if known else 1.0
-        wavs = [b"" if p is None else wav_bytes(p, full_scale=scale) for _, p in found]
         words = level_statement(scale) if known else ""
         one, other = (
-            replace(answer, wav=wav, ghost_wav=wavs[0], scale=words)
-            for (answer, _), wav in zip(found, wavs, strict=True)
+            replace(
+                answer,
+                ears=tuple(pressures),
+                ear_wavs=tuple(wav_bytes(p, full_scale=scale) for p in pressures.values()),
+                scale=words,
+            )
+            for answer, pressures in found
         )
         return one, other
 
@@ -151,12 +155,13 @@ def _numbers(record: Any) -> tuple[Number, ...]:
     return ()
 
 
-def _answer(record: ImpactStudy | StrokeStudy) -> tuple[Answer, TimeSeries | None]:
+def _answer(record: ImpactStudy | StrokeStudy) -> tuple[Answer, dict[str, TimeSeries]]:
     doubts = list(_doubts(record))
-    pressure, bands, levels = None, np.zeros(0), np.zeros(0)
+    pressures: dict[str, TimeSeries] = {}
+    bands, levels = np.zeros(0), np.zeros(0)
     try:
         source = sources_of(record)[0]
-        pressure = click_sound(source, Transfers())
+        pressures = click_sounds(source, Transfers())
         found = [force_bands(stop.force) for stop in source.stops]
         bands = found[0].middle
         levels = force_levels(found)
@@ -177,8 +182,8 @@ def _answer(record: ImpactStudy | StrokeStudy) -> tuple[Answer, TimeSeries | Non
         time_unit=unit,
         bands=bands,
         levels=levels,
-        numbers=(*_numbers(record), *level_numbers(pressure)),
+        numbers=(*_numbers(record), *level_numbers(next(iter(pressures.values()), None))),
         doubts=tuple(doubts),
         run=run,
     )
-    return answer, pressure
+    return answer, pressures

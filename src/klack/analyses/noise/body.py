@@ -27,12 +27,20 @@ from klack.acoustics.boundary.over_frequency import SurfaceRadiation
 from klack.acoustics.force_bands import force_bands
 from klack.acoustics.force_response import modal_response, port_forces
 from klack.acoustics.injected import injected_density, injected_energy
+from klack.acoustics.interface import (
+    Complexes,
+    Freedom,
+    InterfacePoint,
+    Receiver,
+    ReceiverResponse,
+)
 from klack.acoustics.mobility import transfer_mobility
 from klack.acoustics.mount import Mount, mounted
 from klack.acoustics.plate import Air, Plate
 from klack.acoustics.radiation import Efficiency, power_transfer
 from klack.acoustics.surface_bands import Pushed, surface_spectra
 from klack.acoustics.third_octave import ThirdOctaves
+from klack.analyses.noise.machine import Machine
 from klack.analyses.noise.record import BodyNoise, Surface
 from klack.bodies.reduction.structure import Structure
 from klack.signals.sampled import TimeSeries
@@ -197,12 +205,40 @@ def body_noise(
     )
 
 
+class _Remembered:
+    """A receiver that answers the same ``s`` again at once."""
+
+    def __init__(self, receiver: Receiver) -> None:
+        self.points, self.freedoms = receiver.points, receiver.freedoms
+        self.ears = receiver.ears
+        self._receiver, self._last = receiver, None
+
+    points: tuple[InterfacePoint, ...]
+    freedoms: tuple[Freedom, ...]
+    ears: tuple[str, ...]
+    _last: tuple[Complexes, ReceiverResponse] | None
+
+    def at(self, s: Complexes) -> ReceiverResponse:
+        """As the receiver does."""
+        if self._last is None or not np.array_equal(self._last[0], s):
+            self._last = s, self._receiver.at(s)
+        return self._last[1]
+
+
 class Transfers:
-    """Radiated power per force of ports, kept for runs of the same bodies."""
+    """Radiated power per force of ports, and the machine, kept for runs of the same bodies."""
 
     def __init__(self) -> None:
+        self._machine: tuple[tuple[object, ...], Machine] | None = None
         self._found: dict[tuple[object, ...], tuple[Floats, Floats]] = {}
         self._elements: dict[tuple[object, ...], Elements] = {}
+
+    def machine(self, described: tuple[object, ...], make: Callable[[], Machine]) -> Machine:
+        """The machine of a case, made and answered once while what describes it stays."""
+        if self._machine is None or self._machine[0] != described:
+            made = make()
+            self._machine = described, replace(made, receiver=_Remembered(made.receiver))
+        return self._machine[1]
 
     def elements(
         self, structures: tuple[Structure, ...], sound_speed: float, compute: Callable[[], Elements]

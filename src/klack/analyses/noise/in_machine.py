@@ -126,8 +126,11 @@ def ear_pressures(signal: CoupledSignal) -> tuple[TimeSeries, ...]:
     return tuple(replace(signal.ear(name), start=signal.start - _LEAD) for name in signal.ears)
 
 
-def installed(source: NoiseSource) -> Installed | None:
-    """The source of a run on the machine of its case, if there is one."""
+def installed(
+    source: NoiseSource,
+    kept: Callable[[tuple[object, ...], Callable[[], Machine]], Machine] = (lambda _, make: make()),
+) -> Installed | None:
+    """The source of a run on the machine of its case, if there is one; ``kept`` may keep that."""
     if source.held is None or source.noise.receiver is None:
         return None
     at = source_of(source.structures, source.held)
@@ -135,7 +138,10 @@ def installed(source: NoiseSource) -> Installed | None:
     points = at(np.array([100.0, 200.0]), 0.0).points
     return Installed(
         at=at,
-        machine=machine_of(source.noise, source.materials, points),
+        machine=kept(
+            (source.noise, source.materials, [(p.name, *p.position.tolist()) for p in points]),
+            lambda: machine_of(source.noise, source.materials, points),
+        ),
         span=held.step * next(iter(held.forces.values())).shape[0],
         top=min(_HIGHEST, 0.1 / held.step),
         moves=source.run.endswith("mounted"),

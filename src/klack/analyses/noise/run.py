@@ -56,7 +56,7 @@ from klack.materials.material import Material
 from klack.signals.sampled import TimeSeries
 from klack.units import format_si
 
-__all__ = ["click_sound", "noise_design", "run_noise"]
+__all__ = ["click_sound", "click_sounds", "noise_design", "run_noise"]
 
 _LOWEST, _HIGHEST, _POINTS = 20.0, 200e3, 600  # [Hz] of spectra that are drawn
 _HEARING = 20e3  # [Hz]
@@ -99,17 +99,28 @@ def run_noise(
 def click_sound(
     source: NoiseSource, transfers: Transfers, bands: Sequence[ThirdOctaves] | None = None
 ) -> TimeSeries | None:
-    """Sound pressure of one click, if anything radiates.
+    """Sound pressure of one click, if anything radiates: at the first ear of a machine."""
+    return next(iter(click_sounds(source, transfers, bands).values()), None)
 
-    A part of :func:`noise_design`, in a fifth of its time; ``transfers`` of its structures and
-    ``bands`` of the forces of its stops are used where known.
+
+def click_sounds(
+    source: NoiseSource, transfers: Transfers, bands: Sequence[ThirdOctaves] | None = None
+) -> dict[str, TimeSeries]:
+    """Sound pressure of one click at each ear of a machine; estimated without a name.
+
+    A part of :func:`noise_design`, in a fifth of its time; ``transfers`` of its structures, its
+    machine, and ``bands`` of the forces of its stops are used where known.
     """
+    found = installed(source, transfers.machine)
+    if found is not None:
+        return dict(zip(source.noise.ears or (), found.pressures()[0], strict=False))
     if bands is None:
         bands = [force_bands(stop.force) for stop in source.stops]
     around = _surroundings(
         source, net_share(source.net, bands), bands[0], _boundary_elements(source, transfers)
     )
-    return _pressure(source, _acting(source), around, transfers)
+    pressure = _pressure(source, _acting(source), around, transfers)
+    return {} if pressure is None else {"": pressure}
 
 
 def noise_design(source: NoiseSource) -> NoiseDesign:
@@ -400,10 +411,7 @@ def _pressure(
     around: Surroundings,
     transfers: Transfers,
 ) -> TimeSeries | None:
-    """At the first ear of a machine, or estimated at the distance of the case."""
-    found = installed(source)
-    if found is not None:
-        return next(iter(found.pressures()[0]), None)
+    """Estimated at the distance of the case."""
     parts = [
         click_pressure(
             force,

@@ -20,6 +20,7 @@ from klack.app.pages.frame import (
     player,
     read_first,
     row,
+    sound_name,
     table,
 )
 from klack.app.state import State
@@ -230,13 +231,17 @@ def _show(state: State, ghost: Answer, now: Answer, names: tuple[str, str]) -> N
             DescribedChart(title, figure)
         with ui.element("section").classes("k-sheet k-chart"):
             heading("Hear it")
-            for name, wav in ((names[1], ghost.wav), (names[0], now.wav)):
-                if wav:
+            for name, answer in ((names[1], ghost), (names[0], now)):
+                for ear, wav in zip(answer.ears, answer.ear_wavs, strict=True):
+                    where = f"{name}, at {ear}" if ear else name
                     with ui.element("figure").style("margin:8px 0"):
                         src = state.sounds.add(wav)
-                        player(name, src=src, aria_label=f"click of {name}").style("width:100%")
+                        player(where, src=src, aria_label=f"click of {where}").style("width:100%")
+                        save = plain("Save WAV", "a").classes("k-soft k-save-sound")
+                        save.props["href"] = src
+                        save.props["download"] = sound_name(name, ear)
             plain(
-                f"Both at the same scale: {now.scale}." if now.scale else "Nothing radiates.", "p"
+                f"All at the same scale: {now.scale}." if now.scale else "Nothing radiates.", "p"
             ).classes("k-note")
     for name, answer in ((names[1], ghost), (names[0], now)):
         if answer.doubts:

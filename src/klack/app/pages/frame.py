@@ -1,8 +1,10 @@
 """Parts of every page."""
 
 import asyncio
+import re
 from collections.abc import Awaitable, Callable, Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import PurePath
 from typing import Any, TypeVar
 from urllib.parse import urlencode
 
@@ -35,6 +37,7 @@ __all__ = [
     "row",
     "set_off",
     "show_error",
+    "sound_name",
     "table",
     "text_field",
     "tick",
@@ -271,6 +274,17 @@ def player(words: str, **props: object) -> ui.element:
     """A player of a sound, with words above it."""
     plain(words, "figcaption").classes("k-soft")
     return element("audio", "", controls=True, preload="none", **props)
+
+
+def sound_name(of: str, ear: str, what: str = "") -> str:
+    """Name of a saved sound: valve or result, machine's ear, and what it is.
+
+    >>> sound_name("valves/pump.yaml", "driver's ear", "pinned")
+    'pump-at-driver-s-ear-pinned.wav'
+    """
+    words = [PurePath(of).name.removesuffix(".yaml").removesuffix(".yml")]
+    words += [f"at {ear}"] * bool(ear) + [what] * bool(what)
+    return re.sub(r"[^A-Za-z0-9_.]+", "-", " ".join(words)).strip("-") + ".wav"
 
 
 # --------------------------------------------------------------------------- fields

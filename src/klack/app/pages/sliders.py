@@ -22,6 +22,7 @@ from klack.app.pages.frame import (
     address,
     asking,
     button,
+    choice_field,
     differing,
     element,
     frame,
@@ -32,6 +33,7 @@ from klack.app.pages.frame import (
     player,
     read_first,
     show_error,
+    sound_name,
 )
 from klack.app.state import State
 from klack.app.worker import Worker
@@ -64,7 +66,7 @@ class _Sliders:
         self._values: dict[str, float] = {}
         self._moved = asyncio.Event()
         self._pinned: Answer | None = None
-        self._is_pinned, self._pins = True, False
+        self._is_pinned, self._pins, self._ear = True, False, ""
 
     def build(self, text: str) -> None:
         path = str(self._state.folder.path / self._case)
@@ -171,6 +173,9 @@ class _Sliders:
             self._spectrogram = DescribedChart("Spectrogram of the click", EMPTY)
         with ui.element("section").classes("k-sheet k-pad").style("margin-top:16px"):
             heading("Hear it")
+            if len(opened.first.ears) > 1:
+                ears = {name: name for name in opened.first.ears}
+                choice_field("At the ear", ears, opened.first.ears[0], self._hear_at)
             self._sound = ui.element("div").classes("k-sound").style("margin-top:8px")
             self._scale = plain("", "p").classes("k-note")
         self._words = plain("", "p").classes("k-note")
@@ -204,7 +209,9 @@ class _Sliders:
             begin = perf_counter()
             pins, self._pins = self._pins, False
             try:
-                answer: Answer = await self._worker.call("move", dict(self._values), pins)
+                answer: Answer = await self._worker.call(
+                    "move", dict(self._values), pins, self._ear
+                )
             except KlackError as error:
                 self._refuse(error)
                 continue
@@ -233,7 +240,7 @@ class _Sliders:
             return
         self._show_judgement(found)
         try:
-            heard: Hearing | None = await self._worker.call("listen", values)
+            heard: Hearing | None = await self._worker.call("listen", values, self._ear)
         except KlackError as error:
             heard = None
             self._words.set_text(f"{found.words}\n{error}")
@@ -274,6 +281,8 @@ class _Sliders:
         self._words.set_text("")
         ghost = self._pinned or answer
         self._is_pinned = ghost is answer
+        others = [number for number in ghost.numbers if number.key != "level"]
+        ghost = replace(ghost, numbers=(*others, *answer.ghost_level))
         self._doubts.set_text("\n".join(answer.doubts))
         for chart, figure in zip(self._charts, answer_figures(answer, ghost, _NAMES), strict=True):
             chart.update_figure(figure)
@@ -283,6 +292,7 @@ class _Sliders:
             f"All clicks at the same scale: {answer.scale}." if answer.wav else "Nothing radiates."
         )
         if answer.wav:
+            self._ear = self._ear or next(iter(answer.ears), "")
             self._play("now", answer.wav)
             self._play("pinned", answer.ghost_wav)
         else:  # no spectrogram follows
@@ -310,11 +320,17 @@ class _Sliders:
 
     def _play(self, name: str, wav: bytes) -> None:
         source = self._state.sounds.add(wav)
+        what = "" if name == "now" else name
+        self._players[name][1].props["download"] = sound_name(self._case, self._ear, what)
         for found, where in zip(self._players[name], ("src", "href"), strict=True):
             found.props[where] = source
             found.update()
 
     # ----------------------------------------------------------------------- what is asked
+
+    def _hear_at(self, ear: str) -> None:
+        self._ear = ear
+        self._moved.set()
 
     def _pin(self) -> None:
         """Pin the next answer, with all that follows it."""
@@ -365,5 +381,4 @@ class _Sliders:
 def _player(name: str) -> tuple[ui.element, ui.element]:
     with ui.element("figure"):
         made = player(name, aria_label=f"click, {name}")
-        save = plain("Save WAV", "a").classes("k-soft k-save-sound")
-        return made, save.props("download=klack-click.wav")
+        return made, plain("Save WAV", "a").classes("k-soft k-save-sound")
