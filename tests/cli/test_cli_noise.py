@@ -9,14 +9,17 @@ import re
 from dataclasses import replace
 from pathlib import Path
 from shutil import copytree
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.integrate import simpson
 
 from klack.acoustics.boundary import outline
 from klack.analyses.impact.analysis import IMPACT
 from klack.analyses.noise.analysis import NOISE
 from klack.analyses.noise.content import noise_content
+from klack.analyses.noise.figures import own_sound_charts
 from klack.analyses.noise.record import NoiseDesign
 from klack.analyses.noise.run import noise_design
 from klack.analyses.noise.source import load_sources
@@ -304,6 +307,23 @@ def test_boundary_elements_take_off_what_a_small_valve_cannot_radiate(impact):
     assert np.all(own_bands(found) > 0.0)
     plate = [b.radiated[-1] for d in (piston, found) for b in d.bodies]
     assert plate[0] == pytest.approx(plate[1], rel=1e-12)
+    # around the valve arrives what leaves its surface, over angle and over time
+    own = found.own_sound
+    assert own is not None
+    assert piston.own_sound is None
+    density = own.exposure * np.sin(own.angle)
+    settings = found.settings
+    around = 2.0 * np.pi * settings.distance**2 * simpson(density, x=own.angle, axis=1)
+    around /= settings.air_density * settings.sound_speed
+    heard = (own.middle > 500.0) & (own.middle < 18e3)
+    left = 10.0 * np.log10(around / own_bands(found)[: own.middle.size])
+    assert np.abs(left[heard]).max() < 0.3
+    for series, angle in ((own.axis, 0), (own.side, 18)):
+        energy = float((series.values**2).sum() * series.step)
+        assert own.exposure[:-1, angle].sum() < energy < 1.02 * own.exposure[:, angle].sum()
+        assert np.abs(series.values[-100:]).max() < 1e-4 * np.abs(series.values).max()
+    names = [chart.name for chart in own_sound_charts(SimpleNamespace(designs=[found]))]
+    assert names == ["directivity", "own-click"]
 
 
 def test_surfaces_that_enclose_nothing_radiate_as_pistons_and_say_so(impact):

@@ -9,7 +9,7 @@ gives the squared normal velocity of a face over time, :math:`\phi^T C \phi`, an
 :math:`\rho c\, \mathrm{tr}(G C)` that a group with the Gram matrix ``G`` radiates at efficiency 1.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +22,7 @@ from klack.acoustics.mount import Mount, support_mobility
 from klack.acoustics.plate import Air, Plate
 from klack.acoustics.radiation import PLATE, Efficiency, surface_efficiency
 from klack.acoustics.spectrum import force_spectrum
+from klack.arrays import Vector
 from klack.bodies.reduction.structure import Structure
 from klack.errors import InputError, require_positive
 from klack.signals.sampled import TimeSeries
@@ -31,6 +32,7 @@ __all__ = [
     "RadiatedBands",
     "SurfaceSpectra",
     "face_band_velocity",
+    "pushed_fields",
     "radiated_bands",
     "surface_spectra",
 ]
@@ -248,37 +250,61 @@ def _decade(
     structure, forces = pushed
     length = max(force.values.size * force.step for force in forces.values())
     spacing = _spacing(structure, edges, mount, length)
-    fields: Complexes | float = 0.0
-    support: Complexes | float = 0.0
-    carried: Complexes | float = 0.0
+    frequency, df = np.zeros(0), 0.0
 
-    def spectrum_of(force: TimeSeries) -> tuple[Floats, Complexes, float]:
+    def spectrum_of(force: TimeSeries) -> tuple[Vector, Complexes]:
+        nonlocal frequency, df
         spectrum = force_spectrum(force, high=float(edges[-1, 1]), resolution=spacing)
         df = spectrum.resolution
         first = max(int(edges[0, 0] / df), 1)  # not 0 Hz, where a force that stays has no spectrum
-        return spectrum.frequency[first:], np.asarray(spectrum.values[first:], dtype=complex), df
+        frequency = spectrum.frequency[first:]
+        return frequency, np.asarray(spectrum.values[first:], dtype=complex)
 
+    fields, support = pushed_fields(pushed, others, spectrum_of, mount, plate)
+    low = np.maximum(frequency - df / 2, edges[:, :1])
+    high = np.minimum(frequency + df / 2, edges[:, 1:])
+    return _Decade(
+        frequency=frequency,
+        fields=fields,
+        support_force=support,
+        weights=np.maximum(high - low, 0.0),
+    )
+
+
+def pushed_fields(
+    pushed: Pushed,
+    others: Sequence[Pushed],
+    spectrum_of: Callable[[TimeSeries], tuple[Vector, Complexes]],
+    mount: Mount | None,
+    plate: Plate | None,
+) -> tuple[Complexes, Complexes]:
+    """Spectra of the fields (k, b) of a structure and of the force on its support (k,).
+
+    Parameters
+    ----------
+    others
+        Bodies on the same mount, which push it by their blocked forces.
+    spectrum_of
+        Frequencies above 0 and Fourier integral of a force, the same for all.
+    """
+    structure, forces = pushed
+    fields: Complexes | float = 0.0
+    support: Complexes | float = 0.0
+    carried: Complexes | float = 0.0
     for port, force in forces.items():
-        frequency, own, df = spectrum_of(force)
+        frequency, own = spectrum_of(force)
         answer = harmonic_response(structure, frequency, port, mount=mount, plate=plate)
         fields = fields + answer.fields * own[:, None]
         support = support + answer.support_force * own
     for other, its_forces in others:
         for port, force in its_forces.items():
-            blocked = harmonic_response(other, frequency, port).support_force
-            carried = carried + blocked * spectrum_of(force)[1]
+            frequency, own = spectrum_of(force)
+            carried = carried + harmonic_response(other, frequency, port).support_force * own
     if others:
         answer = harmonic_response(structure, frequency, SUPPORT, mount=mount, plate=plate)
         fields = fields + answer.fields * np.asarray(carried)[:, None]
         support = support + answer.support_force * carried
-    low = np.maximum(frequency - df / 2, edges[:, :1])
-    high = np.minimum(frequency + df / 2, edges[:, 1:])
-    return _Decade(
-        frequency=frequency,
-        fields=np.asarray(fields),
-        support_force=np.asarray(support),
-        weights=np.maximum(high - low, 0.0),
-    )
+    return np.asarray(fields), np.asarray(support)
 
 
 def _spacing(structure: Structure, edges: Floats, mount: Mount | None, length: float) -> float:

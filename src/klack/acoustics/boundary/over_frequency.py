@@ -16,6 +16,11 @@ that falls with :math:`f^4`,
 and from twice the top on waves are plane. The top is 20 kHz, or where the largest element is a
 sixth of the wavelength. Matrices are per :math:`\rho c`; each group of the
 surface has its own, for the power that leaves through it, and their sum is the whole.
+
+The far pressure of a body of revolution, :math:`p = \rho c\, D\, e^{-ikr}/r`, is kept at even polar
+angles. Between two solutions :math:`D` is linear in frequency, once the delay that all fields
+share has been taken off it; below the lowest one its monopole is known, and the rest falls with
+:math:`f^2`.
 """
 
 from collections.abc import Sequence
@@ -27,8 +32,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.acoustics.boundary.outline import Outline, not_closed, revolved_outline
+from klack.acoustics.boundary.revolved import Meridian
 from klack.acoustics.boundary.solid_outline import solid_outline
-from klack.acoustics.boundary.solution import radiation
+from klack.acoustics.boundary.solution import Radiation, radiation
 from klack.arrays import Cube, Matrix, Vector
 from klack.bodies.reduction.structure import Structure
 from klack.errors import ConvergenceError
@@ -36,7 +42,7 @@ from klack.machine.cache.entry import Entry
 from klack.machine.cache.remember import remembered
 from klack.machine.cache.result_cache import ResultCache
 
-__all__ = ["TOP", "SurfaceRadiation", "surface_radiation"]
+__all__ = ["ANGLES", "TOP", "SurfaceRadiation", "surface_radiation"]
 
 Complexes = NDArray[np.complex128]
 
@@ -47,6 +53,9 @@ _LOWEST = 10.0  # [Hz]
 _PER_OCTAVE = 6
 _SMALL = 0.1  # ka below which the monopole and its rest are all
 _PER_WAVE = 6.0
+ANGLES = np.linspace(0.0, pi, 37)
+"""Polar angles [rad] of the far pressure, from the upper end of the axis."""
+
 _NOTHING = 1e-24  # of plane waves: motions that do not radiate
 _NEGATIVE = 1e-4  # of the largest eigenvalue: the loudest motion would be off by 0.0004 dB
 
@@ -71,6 +80,9 @@ class SurfaceRadiation:
         Share of the area that closes openings.
     elements
         Of the whole surface.
+    far (n - 1, angles, b) [m]
+        Far pressure per field and density and speed of sound, at :data:`ANGLES`, times r; of
+        solids there is none.
     """
 
     names: tuple[str, ...]
@@ -81,6 +93,28 @@ class SurfaceRadiation:
     residual: float
     covered: float
     elements: int
+    far: Complexes
+
+    def far_pressure(self, frequency: Vector, fields: Complexes) -> Complexes:
+        """Far pressure (k, angles) per density and speed of sound, times r, ``exp(-ikr)`` left out.
+
+        Parameters
+        ----------
+        frequency (k,) [Hz]
+        fields (k, b)
+        """
+        at = self.frequency[:-1]
+        found = np.zeros((len(frequency), self.far.shape[1]), dtype=complex)
+        node = np.clip(np.searchsorted(at, frequency) - 1, 0, len(at) - 2)
+        for n in np.unique(node):
+            own = np.flatnonzero(node == n)
+            w = np.clip((frequency[own] - at[n]) / (at[n + 1] - at[n]), 0.0, 1.0)[:, None]
+            one, other = self.far[n], self.far[n + 1]
+            turn = np.angle(np.einsum("ab,ab->a", one.conj(), other))
+            y = fields[own]
+            later = np.exp(-1j * turn) * (y @ other.T)
+            found[own] = ((1.0 - w) * (y @ one.T) + w * later) * np.exp(1j * w * turn)
+        return found
 
     def energy(self, frequency: Vector, fields: Complexes, weights: Matrix) -> Matrix:
         r""":math:`\int 2 y^H R_g\, y\, \mathrm df` (g, n) per density and speed of sound.
@@ -147,7 +181,7 @@ def surface_radiation(
     found = []
     solved = remembered(
         cache,
-        "surface radiation",
+        "surface radiation and far pressure",
         (outline.mesh, outline.motions, outline.group, sound_speed, min(TOP, holds_up_to)),
         lambda: _solved(outline, sound_speed, min(TOP, holds_up_to)),
         pack=lambda arrays: Entry(arrays=arrays),
@@ -165,6 +199,7 @@ def surface_radiation(
                 residual=float(solved["residual"][0]),
                 covered=outline.covered,
                 elements=len(outline.group),
+                far=solved[f"far {s}"],
             )
         )
     return tuple(found)
@@ -192,10 +227,12 @@ def _solved(outline: Outline, sound_speed: float, top: float) -> dict[str, NDArr
     columns = [slice(a, b) for a, b in pairwise(widths.tolist())]
     groups = [outline.group == g for g in range(len(outline.groups))]
     at: list[list[Cube]] = [[] for _ in columns]
+    away: list[Complexes] = []
     residuals = []
     for f in upper:
         found = radiation(mesh, 2.0 * pi * float(f) / sound_speed, velocity)
         residuals.append(found.residual)
+        away.append(_far(found))
         for own, kept in zip(columns, at, strict=True):
             p, v = found.pressure[:, own], velocity[:, own]
             kept.append(_by_group(p.real, v, mesh.weights, groups))
@@ -208,9 +245,21 @@ def _solved(outline: Outline, sound_speed: float, top: float) -> dict[str, NDArr
         power = np.maximum(np.einsum("ngii->ni", matrices), 0.0)
         scale = np.sqrt(np.maximum(power, _NOTHING))
         arrays[f"scale {s}"] = scale * size[own]
+        monopole = 1j * 2.0 * pi / sound_speed / (4.0 * pi) * (mesh.weights @ v)
+        rest = away[0][:, own] - first * monopole
+        low = [f * monopole + (f / first) ** 2 * rest for f in lower[:-1]]
+        arrays[f"far {s}"] = np.array([*low, *(one[:, own] for one in away)]) * size[own]
         arrays[f"correlation {s}"] = matrices / (scale[:, None, :, None] * scale[:, None, None, :])
     arrays["frequency"] = np.concatenate([lower[:-1], upper, [2.0 * top]])
     return arrays
+
+
+def _far(found: Radiation) -> Complexes:
+    """Far pressure (angles, b) of all motions; without angles of a solid."""
+    if not isinstance(found.mesh, Meridian):
+        return np.zeros((0, found.velocity.shape[1]), dtype=complex)
+    by_pressure, by_velocity = found.mesh.far_field(found.wave_number, ANGLES)
+    return np.asarray(by_pressure @ found.pressure + by_velocity @ found.velocity)
 
 
 def _by_group(p: Matrix, v: Matrix, weights: Vector, groups: Sequence[NDArray[np.bool_]]) -> Cube:

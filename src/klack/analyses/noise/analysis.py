@@ -370,6 +370,8 @@ NOISE = StoredAnalysis(
             "force": "N/Hz on a machine, of moments N m/Hz",
             "exposure_A": "Pa^2 s",
             "element_loss": "J",
+            "angle": "rad",
+            "exposure": "Pa^2 s",
         },
     ),
     page="noise.content:noise_content",

@@ -15,6 +15,7 @@ from klack.analyses.noise.figures import (
     heard_words,
     machine_charts,
     mobility_charts,
+    own_sound_charts,
     radiation_chart,
     source_charts,
     spectrum_chart,
@@ -390,7 +391,7 @@ def _radiation(study: NoiseStudy) -> Section:
             *dict.fromkeys(_RADIATED[design.settings.radiation] for design in study.designs),
             *[_BESIDE] * any(design.machine is not None for design in study.designs),
         ),
-        charts=(chart,),
+        charts=(chart, *own_sound_charts(study)),
         tables=(Table(columns=("surface", "area", *heads), rows=tuple(rows)),),
     )
 

@@ -36,6 +36,7 @@ __all__ = [
     "heard_words",
     "machine_charts",
     "mobility_charts",
+    "own_sound_charts",
     "radiation_chart",
     "source_charts",
     "spectrum_chart",
@@ -47,6 +48,7 @@ Floats = NDArray[np.float64]
 SOUND_ENERGY_REFERENCE = 1e-12  # [J], the reference of ISO 3740 for sound energy levels
 _SMALLEST = 1e-300
 _FREQUENCY = (0.02, 200.0)  # [kHz]
+_OCTAVES = (1e3, 2e3, 4e3, 8e3, 16e3)  # [Hz] of the directivity
 _UNSEEN = 0.01  # share of a path that a bar does not show
 _SILENCE = 60.0  # [dB] below the highest value that a level chart shows
 
@@ -573,6 +575,55 @@ def radiation_chart(study: NoiseStudy) -> Chart | None:
         note=(
             "Thick: as the case says. Thin dotted lines: radiation efficiency 1 in every band, "
             f"which is no bound. {_trusted_words(study)}"
+        ),
+    )
+
+
+def own_sound_charts(study: NoiseStudy) -> tuple[Chart, ...]:
+    """Level over polar angle in some bands, and pressure over time, by the valve's own surface."""
+    known = [(i, d, d.own_sound) for i, d in _designs(study) if d.own_sound is not None]
+    if not known:
+        return ()
+    curves: list[Curve] = []
+    axis: list[Curve] = []
+    side: list[Curve] = []
+    ends = []
+    for i, design, own in known:
+        whose = f"{design.name}, " if len(known) > 1 else ""
+        level = _level(own.exposure, EXPOSURE_REFERENCE)
+        for band in _OCTAVES:
+            n = int(np.argmin(np.abs(np.log(own.middle / band))))
+            label = f"{whose}{quantity(band, 'Hz', 2)}"
+            curves.append(look_of(len(curves)).curve(np.degrees(own.angle), level[n], label))
+        ends.append(_end(own.side.time, own.side.values))
+        ends.append(_end(own.axis.time, own.axis.values))
+        for found, series in ((axis, own.axis), (side, own.side)):
+            x, y = thinned(1e3 * series.time, 1e3 * series.values)
+            found.append(look_of(i).curve(x, y, design.label, listed=found is axis))
+    first = known[0][1]
+    where = quantity(first.settings.distance, "m", 3)
+    window = (1e3 * min(float(own.axis.time[0]) for *_, own in known), 1e3 * max(ends))
+    return (
+        Chart(
+            name="directivity",
+            title=f"Directivity of the valve's own surface at {where}",
+            x=AxisSpec(label="angle from +z", unit="degrees", range=(0.0, 180.0)),
+            panels=(
+                replace(_level_panel("level", "dB re (20 µPa)²s", curves, _SILENCE), share=1.0),
+            ),
+            note="Sound exposure of one click in third octaves, all bodies with their phases, far "
+            "field in the free. The same all round the axis.",
+        ),
+        Chart(
+            name="own-click",
+            title=f"Sound pressure of the valve's own surface at {where}",
+            x=AxisSpec(label="time", unit="ms", range=window),
+            panels=(
+                Panel(y=AxisSpec(label="on the axis", unit="mPa"), curves=tuple(axis), share=0.7),
+                Panel(y=AxisSpec(label="beside", unit="mPa"), curves=tuple(side), share=0.7),
+            ),
+            note="By boundary elements with phase, to 20 kHz, without the travel time; on the axis "
+            "at 0 degrees from +z, beside at 90.",
         ),
     )
 

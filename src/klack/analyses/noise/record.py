@@ -29,6 +29,7 @@ __all__ = [
     "PathSound",
     "StopForce",
     "Surface",
+    "SurfaceSound",
     "VirtualTestResult",
 ]
 
@@ -155,6 +156,28 @@ class BodyNoise:
     upper_bound: Floats
     surface: Surface
     support_energy: float = float("nan")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SurfaceSound:
+    """Sound of one click by the valve's own surface, in the far field at the distance of the case.
+
+    Parameters
+    ----------
+    angle (a,) [rad]
+        From +z.
+    middle (n,) [Hz]
+    exposure (n, a) [Pa^2 s]
+        By third octave.
+    axis, side [Pa]
+        Over time, at 0 and 90 degrees, without the travel time.
+    """
+
+    angle: Floats
+    middle: Floats
+    exposure: Floats
+    axis: TimeSeries
+    side: TimeSeries
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -455,6 +478,8 @@ class NoiseDesign:
         If mounts are described.
     machine
         If a receiver is described; with ears ``sound`` is that of the first one.
+    own_sound
+        Of bodies of revolution by boundary elements.
     """
 
     name: str
@@ -475,6 +500,7 @@ class NoiseDesign:
     own_components: Mapping[str, str] = field(default_factory=dict)
     at_mounts: MountSource | None = None
     machine: InMachine | None = None
+    own_sound: SurfaceSound | None = None
 
     @property
     def band_middle(self) -> Floats:

@@ -35,6 +35,7 @@ from klack.analyses.noise.body import (
 )
 from klack.analyses.noise.in_machine import in_machine, installed
 from klack.analyses.noise.mount_source import mount_source
+from klack.analyses.noise.own_sound import own_sound
 from klack.analyses.noise.reactions import acting_forces
 from klack.analyses.noise.record import (
     BodyNoise,
@@ -207,6 +208,7 @@ def _design(
         own_components=source.own_components,
         at_mounts=at_mounts,
         machine=machine,
+        own_sound=own_sound(source, acting, around, source.noise.distance),
     )
 
 
