@@ -57,8 +57,10 @@ def levels(former: NoiseDesign, machine: NoiseDesign) -> tuple[list[str], np.nda
         unity += own
         area = float(np.nansum(body.area))
         piston += own * piston_efficiency(f, area, settings.sound_speed)
-    sound, ear = former.own_sound, machine.machine.ears[0].bands
+    sound, found = former.own_sound, machine.machine
     assert sound is not None
+    assert found is not None
+    ear = found.ears[0].bands
     sine = np.sin(sound.angle)
     around = simpson(sound.exposure * sine, x=sound.angle, axis=1) / 2.0
     chosen = [n for n in range(sound.middle.size) if 95.0 < sound.middle[n] < 17e3]

@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 from klack.acoustics.boundary.outline import Outline, not_closed, revolved_outline
 from klack.acoustics.boundary.revolved import Meridian
 from klack.acoustics.boundary.solid_outline import solid_outline
-from klack.acoustics.boundary.solution import Radiation, radiation
+from klack.acoustics.boundary.solution import BoundaryMesh, Radiation, radiation
 from klack.arrays import Cube, Matrix, Vector
 from klack.bodies.reduction.structure import Structure
 from klack.errors import ConvergenceError
@@ -181,7 +181,7 @@ def surface_radiation(
     found = []
     solved = remembered(
         cache,
-        "surface radiation and far pressure",
+        "surface radiation, far pressure",
         (outline.mesh, outline.motions, outline.group, sound_speed, min(TOP, holds_up_to)),
         lambda: _solved(outline, sound_speed, min(TOP, holds_up_to)),
         pack=lambda arrays: Entry(arrays=arrays),
@@ -245,9 +245,7 @@ def _solved(outline: Outline, sound_speed: float, top: float) -> dict[str, NDArr
         power = np.maximum(np.einsum("ngii->ni", matrices), 0.0)
         scale = np.sqrt(np.maximum(power, _NOTHING))
         arrays[f"scale {s}"] = scale * size[own]
-        monopole = 1j * 2.0 * pi / sound_speed / (4.0 * pi) * (mesh.weights @ v)
-        rest = away[0][:, own] - first * monopole
-        low = [f * monopole + (f / first) ** 2 * rest for f in lower[:-1]]
+        low = _far_below(away[0][:, own], v, mesh, lower[:-1], float(first), sound_speed)
         arrays[f"far {s}"] = np.array([*low, *(one[:, own] for one in away)]) * size[own]
         arrays[f"correlation {s}"] = matrices / (scale[:, None, :, None] * scale[:, None, None, :])
     arrays["frequency"] = np.concatenate([lower[:-1], upper, [2.0 * top]])
@@ -260,6 +258,22 @@ def _far(found: Radiation) -> Complexes:
         return np.zeros((0, found.velocity.shape[1]), dtype=complex)
     by_pressure, by_velocity = found.mesh.far_field(found.wave_number, ANGLES)
     return np.asarray(by_pressure @ found.pressure + by_velocity @ found.velocity)
+
+
+def _far_below(
+    first: Complexes,
+    v: Matrix,
+    mesh: BoundaryMesh,
+    frequency: Vector,
+    lowest: float,
+    sound_speed: float,
+) -> list[Complexes]:
+    """Far pressure below the lowest frequency that is solved for, about the middle of the mesh."""
+    middle = float(mesh.areas @ mesh.centres[:, -1] / mesh.areas.sum())
+    delay = 2j * pi / sound_speed * middle * np.cos(ANGLES)[: len(first), None]
+    monopole = 0.5j / sound_speed * (mesh.weights @ v)  # per frequency
+    rest = first * np.exp(-lowest * delay) - lowest * monopole
+    return [(f * monopole + (f / lowest) ** 2 * rest) * np.exp(f * delay) for f in frequency]
 
 
 def _by_group(p: Matrix, v: Matrix, weights: Vector, groups: Sequence[NDArray[np.bool_]]) -> Cube:

@@ -15,13 +15,14 @@ import numpy as np
 import scipy
 
 from klack.acoustics.boundary.over_frequency import ANGLES
+from klack.acoustics.interface import Complexes
 from klack.acoustics.sound import audio_band
 from klack.acoustics.spectrum import change_spectrum
 from klack.acoustics.surface_bands import pushed_fields
 from klack.analyses.noise.body import Surroundings, damped
 from klack.analyses.noise.record import SurfaceSound
 from klack.analyses.noise.source import NoiseSource
-from klack.arrays import Floats, Vector
+from klack.arrays import Vector
 from klack.signals.sampled import TimeSeries
 
 __all__ = ["own_sound"]
@@ -55,9 +56,9 @@ def own_sound(
     count = min(int(np.ceil(2.0 * (span + _LEAD + _RINGS) * _RATE)), _MOST)
     f = np.linspace(0.0, 0.5 * _RATE, count + 1)
 
-    def spectrum_of(force: TimeSeries) -> tuple[Vector, Floats]:
+    def spectrum_of(force: TimeSeries) -> tuple[Vector, Complexes]:
         changes = change_spectrum(force, high=float(f[-1]), count=f.size, origin=begin)
-        return f[1:], changes[1:] / (2j * np.pi * f[1:])
+        return f[1:], np.asarray(changes[1:] / (2j * np.pi * f[1:]))
 
     together = source.held is not None
     pressure = np.zeros((count, ANGLES.size), dtype=complex)
