@@ -16,11 +16,13 @@ from klack.acoustics.receivers.modal import ModalReceiver, grounded, rigid_recei
 from klack.acoustics.receivers.plates import InfinitePlate
 from klack.acoustics.standing import StandingValve, standing_valve
 from klack.analyses.noise.in_machine import in_machine, installed
+from klack.analyses.noise.machine import machine_of
 from klack.analyses.noise.source import stroke_sources
 from klack.analyses.stroke.record import StrokeStudy
 from klack.analyses.stroke.run import run_stroke
 from klack.bodies.reduction.craig_bampton import CraigBampton
 from klack.case.any_case import read_valve_case
+from klack.case.noise import CaseNoise
 from klack.errors import InputError
 from klack.materials.material import Material
 from klack.mechanics.end_stop import EndStop
@@ -171,6 +173,32 @@ def test_what_has_no_law_in_time_is_refused() -> None:
                 isolators=isolators,
                 missing=missing,
             )
+
+
+def test_the_matrices_of_a_body_are_that_body_as_a_receiver(tmp_path: Path) -> None:
+    """In mm, t, s with a rotation, by the key of a case, against the mobility of its own mounts.
+
+    Undamped, of all modes: round-off.
+    """
+    own = body(4, (("flange", 3), ("flange", 5)))
+    M, K = own.matrices()
+    names = [*(f"q{i}" for i in range(4)), "z", "ry"]
+    scale = np.array([1.0, 1.0, 1.0, 1.0, 1e3, 1.0])  # displacements in mm, angles in radians
+    file = tmp_path / "cabin.npz"
+    to_file = np.outer(1.0 / scale, 1.0 / scale) * 1e3  # energies in mJ
+    np.savez(file, K=K * to_file, M=M * to_file, names=np.array(names))
+    rows = {"flange.z": "z", "flange.ry": 6}
+    given = {"file": str(file), "units": "mm t s", "rows": rows, "damping": 0.0}
+    data = {"mounts": {"flange": {"surface": "a.b"}}, "receiver": {"matrices": given}}
+    noise = CaseNoise.model_validate(data, context={})
+    machine = machine_of(noise, {}, (FLANGE,))
+    exact = source_at_mounts([own], [np.zeros((F.size, 2)) + 0j], (FLANGE,), F).mobility
+    found = machine.receiver.at(laplace(F)).mobility
+    assert machine.causal
+    assert np.abs(found - exact).max() <= 1e-9 * np.abs(exact).max()
+    given["rows"] = {"flange.z": "x"}
+    with pytest.raises(InputError, match="a number from 1 to 6, or one of: q0"):
+        machine_of(CaseNoise.model_validate(data, context={}), {}, (FLANGE,))
 
 
 # --------------------------------------------------------------------------- in time

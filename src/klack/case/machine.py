@@ -6,7 +6,8 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, StringConstraints, model_validator
 
 from klack.input.problem import CaseProblem, Key
-from klack.input.section import InputPath, Name, Number, Section, Text
+from klack.input.section import Count, InputPath, Name, Number, Section, Text
+from klack.input.unit_systems import UnitSystemName
 from klack.units import DampingCoefficient, Inertia, Length, Mass, Ratio, Stiffness
 
 __all__ = [
@@ -14,6 +15,7 @@ __all__ = [
     "NoiseElement",
     "NoiseFinitePlate",
     "NoiseInfinitePlate",
+    "NoiseMatrices",
     "NoiseReceiver",
     "NoiseRigidBody",
     "NoiseVirtualPoint",
@@ -122,6 +124,34 @@ class NoiseRigidBody(Section):
         return self
 
 
+class NoiseMatrices(Section):
+    """Reduced stiffness and mass of a machine, whose rows are motions of the mounts and modes."""
+
+    file: InputPath = Field(description="K and M: .mat, .npz, text, or Nastran .op4.")
+    units: UnitSystemName = Field(description="Consistent units of the matrices, e.g. mm t s.")
+    rows: dict[FreedomText, Count | Text] = Field(
+        min_length=1,
+        description="Freedom of a mount, flange.z or flange.rx (in radians): its row, by its "
+        "number from 1 or its name in the file.",
+    )
+    damping: Ratio = Field(
+        default=0.01, ge=0, lt=1, description="Damping ratio of all of its elastic modes."
+    )
+
+    @model_validator(mode="after")
+    def _freedoms(self) -> Self:
+        for name in self.rows:
+            if "." not in name:
+                raise CaseProblem(
+                    ("rows", name),
+                    got=f"'{name}'",
+                    expected="a direction of a mount",
+                    hint=f"write {name}.z, {name}.rx, ...",
+                    on_key=True,
+                )
+        return self
+
+
 class NoiseVirtualPoint(Section):
     """A mount between sensors: it moves as one rigid body with the nodes around it."""
 
@@ -155,6 +185,9 @@ class NoiseReceiver(Section):
     springs: dict[Along, Annotated[Stiffness, Field(gt=0)]] | None = Field(
         default=None, min_length=1, description="From each mount to the ground, by direction."
     )
+    matrices: NoiseMatrices | None = Field(
+        default=None, description="Reduced matrices of another program."
+    )
     points: dict[Name, Node | NoiseVirtualPoint] = Field(
         default_factory=dict,
         description="Mount: its node in the file, or a virtual point; default a node of its name.",
@@ -182,7 +215,7 @@ class NoiseReceiver(Section):
 
     @model_validator(mode="after")
     def _one(self) -> Self:
-        kinds = ("file", "infinite_plate", "plate", "body", "springs")
+        kinds = ("file", "infinite_plate", "plate", "body", "springs", "matrices")
         kind = self._exactly_one(kinds, "what the machine is")
         if kind != "file":
             for name in ("points", "quantity", "offset"):
@@ -227,3 +260,5 @@ def machine_mounts(
     ):
         for name in named:
             yield ("noise", "receiver", key, name), name.partition(".")[0]
+    for name in receiver.matrices.rows if receiver.matrices is not None else {}:
+        yield ("noise", "receiver", "matrices", "rows", name), name.partition(".")[0]

@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
 from klack.acoustics.interface import (
     DIRECTIONS,
@@ -25,8 +26,10 @@ from klack.arrays import Matrix, Vector
 from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.errors import refuse_if
 
-__all__ = ["ModalReceiver", "body_receiver", "grounded", "rigid_receiver"]
+__all__ = ["ModalReceiver", "body_receiver", "grounded", "matrix_receiver", "rigid_receiver"]
 
+_RIGID = 1e-12  # of the largest eigenvalue
+_SYMMETRIC = 1e-6
 _BLOCK = 1 << 16  # denominators at once: what a processor's cache holds
 
 
@@ -154,6 +157,52 @@ def rigid_receiver(
         damping=np.zeros(len(names)),
         shapes=(motions / np.sqrt(weights)).T,
         residual=np.zeros((len(rows), len(rows))),
+    )
+
+
+def matrix_receiver(
+    stiffness: Matrix,
+    mass: Matrix,
+    rows: Mapping[Freedom, int],
+    points: tuple[InterfacePoint, ...],
+    *,
+    damping: float,
+) -> ModalReceiver:
+    """Receiver of matrices in SI, free where they are, by all of their modes.
+
+    Parameters
+    ----------
+    rows
+        Freedom -> its row; radians for rotations.
+    damping [-]
+        Ratio of all elastic modes.
+    """
+    refuse_if(
+        not all(np.abs(A - A.T).max() <= _SYMMETRIC * np.abs(A).max() for A in (stiffness, mass))
+        or not np.linalg.eigvalsh(mass)[0] > 0.0,
+        "noise.receiver.matrices",
+        got="matrices that are not symmetric, or a mass that is not above 0",
+        expected="K and M of an elastic body",
+        hint="write them without constraints, contact and damping.",
+    )
+    squares, X = scipy.linalg.eigh(stiffness, mass)
+    rigid = np.abs(squares) <= _RIGID * squares[-1]
+    refuse_if(
+        bool(np.any(squares[~rigid] < 0.0)),
+        "noise.receiver.matrices",
+        got="a stiffness below 0",
+        expected="one of an elastic body at rest",
+        hint="check that K and M are not exchanged.",
+    )
+    omega = np.where(rigid, 0.0, np.sqrt(np.maximum(squares, 0.0)))
+    n = len(rows)
+    return ModalReceiver(
+        points=points,
+        freedoms=tuple(rows),
+        omega=omega,
+        damping=np.where(rigid, 0.0, damping),
+        shapes=X[list(rows.values())].T,
+        residual=np.zeros((n, n)),
     )
 
 

@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from klack.acoustics.coupling import (
     junction,
 )
 from klack.acoustics.interface import (
+    DIRECTIONS,
+    Freedom,
     InterfacePoint,
     Receiver,
     SourceAtMounts,
@@ -30,14 +32,15 @@ from klack.acoustics.receivers.measured import (
     heard_receiver,
     measured_receiver,
 )
-from klack.acoustics.receivers.modal import grounded, rigid_receiver
+from klack.acoustics.receivers.modal import grounded, matrix_receiver, rigid_receiver
 from klack.acoustics.receivers.opening import read_responses
 from klack.acoustics.receivers.plates import InfinitePlate, PlateSound, finite_plate
 from klack.acoustics.receivers.tables import read_isolator
 from klack.arrays import Matrix
+from klack.bodies.model_files.reduced_models import read_reduced_matrices
 from klack.bodies.reduction.structure import Structure
 from klack.case.bodies import CaseMaterial
-from klack.case.machine import NoiseReceiver, NoiseVirtualPoint
+from klack.case.machine import NoiseMatrices, NoiseReceiver, NoiseVirtualPoint
 from klack.case.noise import CaseNoise
 from klack.errors import InputError
 from klack.input.problem import one_of
@@ -299,11 +302,43 @@ def _model(
         stiffness = {"xyz".index(key) + 1: k for key, k in given.springs.items()}
         words = ", ".join(f"{format_si(k, 'N/m')} along {key}" for key, k in given.springs.items())
         return grounded(stiffness, points), f"springs to the ground, {words}"
+    if given.matrices is not None:
+        return _of_matrices(given.matrices, points)
     if given.body is not None:
         body = given.body
         found = rigid_receiver(body.mass, body.inertia, np.array(body.centre), points)
         return found, f"a free rigid body of {format_si(1e3 * body.mass, 'g')}"
     return _plate(noise, given, materials, points)
+
+
+def _of_matrices(given: NoiseMatrices, points: tuple[InterfacePoint, ...]) -> tuple[Receiver, str]:
+    """By all modes; translations of the file have its length, rotations are radians."""
+    held = read_reduced_matrices(given.file)
+    size, rows, scale = len(held.K), {}, []
+    for name, wanted in given.rows.items():
+        mount, _, direction = name.partition(".")
+        place = held.names.index(wanted) if wanted in held.names else wanted
+        if not isinstance(place, int) or (isinstance(wanted, int) and not 1 <= wanted <= size):
+            raise InputError(
+                f"noise.receiver.matrices.rows.{name}",
+                got=f"the row {wanted!r}",
+                expected=f"a number from 1 to {size}"
+                + (f", or one of: {one_of(held.names)}" if held.names else ""),
+                hint="name a row of the file.",
+            )
+        freedom = Freedom(mount, DIRECTIONS.index(direction) + 1)
+        rows[freedom] = place - 1 if isinstance(wanted, int) else place
+        scale.append(1.0 if freedom.is_rotation else given.units.length)
+    energy = given.units.length**2
+    found = matrix_receiver(
+        held.K * (given.units.stiffness * energy),
+        held.M * (given.units.mass * energy),
+        rows,
+        points,
+        damping=given.damping,
+    )
+    kept = replace(found, shapes=found.shapes * scale)
+    return kept, f"reduced matrices of {given.file.name}, {size} rows"
 
 
 def _plate(
