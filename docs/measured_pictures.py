@@ -3,7 +3,7 @@
 From the six shots of the case ``struck-bar``, with and without the dome on the striker's end, come
 struck-bar.svg and struck-bar-ends.svg; alumina.svg from the oblique impacts of spheres;
 bounce-in-liquid.svg and rebounds-in-oil.svg from bounces of spheres on a wall in a liquid;
-ball-on-rock.svg from the waves of a ball on rock.
+ball-on-rock.svg from the waves of a ball on rock; pole-in-yoke.svg from a magnet.
 """
 
 from pathlib import Path
@@ -17,6 +17,7 @@ from klack.report.printed import STYLE, svg
 from klack.verification.ball_on_rock import STEEP, computed_pulse, measured_pulses
 from klack.verification.half_space import oblique_spheres
 from klack.verification.measured import SHOTS, struck_bar
+from klack.verification.pole_in_yoke import FIELD, MEASURED, network_points
 from klack.verification.sphere_in_liquid import (
     GLASS,
     NYLON,
@@ -74,6 +75,7 @@ def figures() -> dict[str, Figure]:
         "bounce-in-liquid.svg": bounce_in_liquid(),
         "rebounds-in-oil.svg": rebounds_in_oil(),
         "ball-on-rock.svg": ball_on_rock(),
+        "pole-in-yoke.svg": pole_in_yoke(),
     }
 
 
@@ -156,6 +158,34 @@ def ball_on_rock() -> Figure:
              ylabel="velocity over its first extreme")  # fmt: skip
     axes.grid(visible=True, color="#dddddd", lw=0.5)
     axes.legend()
+    return figure
+
+
+def pole_in_yoke() -> Figure:
+    """Force on a pole and flux densities along it over the ampere turns of its coil."""
+    figure = Figure(figsize=(9.0, 3.4), layout="constrained")
+    force, flux = figure.subplots(1, 2)
+    kinds = (
+        ("measured", MEASURED, "blue", "o"),
+        ("finite elements in space", FIELD, "black", "-"),
+        ("klack's network, from the drawing", network_points(), "orange", "--"),
+    )
+    for label, points, colour, line in kinds:
+        turns = [one.ampere_turns for one in points]
+        style = {"color": COLOURS[colour], "lw": 1.3, "ms": 5, "label": label}
+        force.plot(turns, [one.force for one in points], line, **style)
+        for name in ("gap", "pole", "yoke"):
+            flux.plot(turns, [getattr(one, name) for one in points], line, **style)
+    for name in ("gap", "pole", "yoke"):
+        flux.text(5080.0, getattr(MEASURED[-1], name), name, va="center")
+    flux.set_xlim(700.0, 5700.0)
+    force.set_ylabel("force [N]")
+    flux.set_ylabel("flux density [T]")
+    for axes in (force, flux):
+        axes.set_xlabel("ampere turns")
+        axes.set_ylim(0.0, None)
+        axes.grid(visible=True, color="#dddddd", lw=0.5)
+    figure.legend(*force.get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return figure
 
 

@@ -234,7 +234,7 @@ COVERS = {
     "bodies.",
     "measurement": "Lift sensor, differentiation and impacts found in records of exact flights.",
     "measured": "Measurements of others: strain pulses of struck bars, oblique impacts of spheres, "
-    "bounces in liquids, waves in rock.",
+    "bounces in liquids, waves in rock, a magnet.",
     "mechanics": "Mass, spring, friction, gravity and forces in the time loop, against closed "
     "motions.",
     "mechanical-parts": "Nonlinear springs, surge, rubber, LuGre friction and levers "

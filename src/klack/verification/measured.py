@@ -1,4 +1,4 @@
-"""Checks against measurements of others: struck bars, oblique impacts, bounces, a ball on rock.
+"""Checks against measurements of others: struck bars, oblique impacts, bounces, rock, a magnet.
 
 Recordings: case ``struck-bar``, see its README. End face of the strikers and low pass of the
 amplifier are not known: one dome and one low pass for all shots, chosen once, and the same
@@ -19,6 +19,7 @@ from klack.machine.stages import collected_warnings
 from klack.verification.ball_on_rock import ball_on_rock
 from klack.verification.check import Check, ComparedCurve, check
 from klack.verification.half_space import oblique_spheres
+from klack.verification.pole_in_yoke import pole_in_yoke
 from klack.verification.sphere_in_liquid import (
     GLASS,
     NYLON,
@@ -111,6 +112,7 @@ def checks() -> list[Check]:
         *bounces_in_liquid(),
         *rebounds_in_oil(),
         ball_on_rock(),
+        *pole_in_yoke(),
     ]
 
 
