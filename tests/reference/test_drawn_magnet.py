@@ -1,0 +1,94 @@
+"""Maps from the drawing of a magnet, against finite elements of others and virtual work."""
+
+import sys
+
+import numpy as np
+import pytest
+
+from klack.errors import InputError, MissingExtraError
+from klack.magnetics.drawn_magnet import DrawnMagnet, Ring
+from klack.magnetics.flux_map import FluxMap
+from klack.magnetics.iron_library import iron_curve
+from klack.magnetics.map_choice import MapFile
+from klack.verification import published_magnets as published
+
+MM = 1e-3
+
+
+def ring(*ends):
+    return Ring(*(MM * end for end in ends))
+
+
+@pytest.fixture(scope="module")
+def lifting():
+    """The published lifting magnet, gap closed."""
+    return DrawnMagnet(
+        fixed=(ring(0, 15, 0, 3.5), ring(13.5, 15, 0, 35), ring(5.65, 15, 31.5, 35),
+               ring(0, 5, 0, 10)),
+        moving=(ring(0, 5, 10, 36),),
+        coil=ring(5.65, 13.5, 3.5, 31.5),
+        turns=957,
+        iron=iron_curve("9SMnPb28"),
+    )  # fmt: skip
+
+
+@pytest.mark.slow
+def test_lifting_magnet_and_its_virtual_work(lifting, tmp_path):
+    pytest.importorskip("ngsolve")
+    gaps = published.GAP[3:8:2]  # 1 to 2 mm
+
+    found = lifting.field_map([0.6, published.CURRENT], gaps)
+
+    # others' finite elements, whose mesh and iron table are not known
+    assert found.force[1] == pytest.approx(published.FORCE[3:8:2], rel=0.035)
+    assert found.linkage[1] / published.CURRENT == pytest.approx(
+        published.INDUCTANCE[3:8:2], rel=0.02
+    )
+    assert 0.0 < found.error < 5e-3
+    file = tmp_path / "map.csv"
+    found.write(file)
+    read = MapFile.model_validate({"file": file.name}, context={"folder": tmp_path}).table()
+    assert read.force == pytest.approx(found.force, rel=1e-8)
+    assert read.linkage == pytest.approx(found.linkage, rel=1e-8)
+    # dF/di = dpsi/dx over the middle gap: Simpson's rule over the current, parabola over the gap
+    slope = np.gradient(found.linkage, found.gap, axis=1, edge_order=2)[:, 1]
+    work = published.CURRENT / 6 * (4 * slope[0] + slope[1])
+    assert found.force[1, 1] == pytest.approx(work, rel=0.06)
+    FluxMap.of(current=read.current, gap=read.gap, linkage=read.linkage, force=None)
+
+
+@pytest.mark.slow
+def test_opening_the_other_way_is_a_mirror(lifting):
+    pytest.importorskip("ngsolve")
+    turned = DrawnMagnet(
+        fixed=tuple(Ring(r.inner, r.outer, -r.high, -r.low) for r in lifting.fixed),
+        moving=tuple(Ring(r.inner, r.outer, -r.high, -r.low) for r in lifting.moving),
+        coil=Ring(lifting.coil.inner, lifting.coil.outer, -lifting.coil.high, -lifting.coil.low),
+        turns=lifting.turns,
+        iron=lifting.iron,
+        opens=-1,
+    )
+
+    one, other = (m.field_map([0.6], [2 * MM]) for m in (lifting, turned))
+
+    # meshes differ; both errors are below 0.5 %
+    assert other.force == pytest.approx(one.force, rel=0.01)
+    assert other.linkage == pytest.approx(one.linkage, rel=0.01)
+
+
+def test_a_mesh_that_does_not_resolve_the_gap(lifting):
+    with pytest.raises(InputError, match="a mesh of 500 um for 250 um of air"):
+        lifting.field_map([1.0], [0.25 * MM], mesh_size=0.5 * MM)
+    with pytest.raises(InputError, match="touches a fixed one"):
+        lifting.field_map([1.0], [0.0])
+
+
+def test_sections_that_are_none():
+    with pytest.raises(InputError, match="inner radius below outer radius"):
+        ring(5, 5, 0, 1)
+
+
+def test_without_ngsolve(lifting, monkeypatch):
+    monkeypatch.setitem(sys.modules, "ngsolve", None)
+    with pytest.raises(MissingExtraError, match="klack\\[ngsolve\\]"):
+        lifting.field_map([1.0], [1.0 * MM])
