@@ -90,5 +90,5 @@ def test_sections_that_are_none():
 
 def test_without_ngsolve(lifting, monkeypatch):
     monkeypatch.setitem(sys.modules, "ngsolve", None)
-    with pytest.raises(MissingExtraError, match="klack\\[ngsolve\\]"):
+    with pytest.raises(MissingExtraError, match="--extra ngsolve"):
         lifting.field_map([1.0], [1.0 * MM])
