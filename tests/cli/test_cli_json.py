@@ -276,7 +276,7 @@ def test_a_missing_reader_says_how_to_install_it(tmp_path, capsys, monkeypatch):
     )
     message = capsys.readouterr().err
     assert code != 0
-    assert "pip install 'WHEEL[measurement]'" in message
+    assert "pip install 'FILE.whl[measurement]'" in message
     assert "Traceback" not in message
 
 

@@ -217,7 +217,7 @@ def test_a_missing_package_is_named_with_the_way_to_install_it(
 ):
     monkeypatch.setitem(sys.modules, package, None)
     (tmp_path / name).write_bytes(head)
-    with pytest.raises(MissingExtraError, match=r"pip install 'klack\[measurement\]'"):
+    with pytest.raises(MissingExtraError, match=r"pip install 'FILE.whl\[measurement\]'"):
         open_recording(tmp_path / name)
 
 

@@ -63,5 +63,5 @@ def test_temperatures_and_gases_are_told():
 
 def test_without_the_package_one_error_says_how_to_install_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "CoolProp", None)
-    with pytest.raises(MissingExtraError, match=r"pip install 'klack\[coolprop\]'"):
+    with pytest.raises(MissingExtraError, match=r"pip install 'FILE.whl\[coolprop\]'"):
         FluidChoice(name="CoolProp:n-Dodecane")

@@ -312,7 +312,7 @@ def test_without_the_library_there_is_one_clear_error(monkeypatch, kind):
     monkeypatch.setitem(sys.modules, "sklearn", None)
     for name in [name for name in sys.modules if name.startswith("sklearn.")]:
         monkeypatch.setitem(sys.modules, name, None)
-    with pytest.raises(MissingExtraError, match=r"klack\[surrogate\]"):
+    with pytest.raises(MissingExtraError, match=r"whl\[surrogate\]"):
         fitted(kind, smooth, 3, 32)
 
 
