@@ -78,7 +78,7 @@ class MissingExtraError(KlackError, ImportError):
     def __init__(self, package: str, purpose: str, extra: str | None) -> None:
         way = f"pip install {package}"
         if extra is not None:
-            way = f"uv sync --extra {extra} in a clone, or pip install 'FILE.whl[{extra}]' with klack's wheel"
+            way = f"uv sync --extra {extra} in a clone, or pip install 'FILE.whl[{extra}]'"
         super().__init__(
             f"{purpose} needs the package '{package}', which is not installed.\nTry: {way}."
         )
