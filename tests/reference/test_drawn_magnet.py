@@ -1,11 +1,13 @@
 """Maps from the drawing of a magnet, against finite elements of others and virtual work."""
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from klack.errors import InputError, MissingExtraError
+from klack.magnetics import drawn_magnet
 from klack.magnetics.drawn_magnet import DrawnMagnet, FieldMap, Ring
 from klack.magnetics.iron_library import iron_curve
 from klack.magnetics.map_choice import MapFile
@@ -96,6 +98,49 @@ def test_a_mesh_that_does_not_resolve_the_gap(lifting):
         lifting.field_map([1.0], [0.25 * MM], mesh_size=0.5 * MM)
     with pytest.raises(InputError, match="touches a fixed one"):
         lifting.field_map([1.0], [0.0])
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"coil": ring(5.65, 14.5, 3.5, 31.5)}, "a coil that overlaps a fixed ring"),
+        ({"opens": 2}, "opens: got 2, expected 1 or -1"),
+        ({"moving": ()}, "4 fixed and 0 moving rings"),
+        ({"turns": 0}, "turns: got 0"),
+    ],
+)
+def test_magnets_that_are_none(lifting, changed, words):
+    with pytest.raises(InputError, match=words):
+        replace(lifting, **changed)
+
+
+@pytest.mark.parametrize(
+    ("current", "gap", "words"),
+    [
+        ([], [MM], "current: got none"),
+        ([2.0, 1.0], [MM], "current: got 2, 1, expected increasing"),
+        ([np.nan], [MM], "current: got nan"),
+        ([1.0], [-40 * MM], "gap: got -0.04 m"),  # the armature below the magnet
+    ],
+)
+def test_points_that_are_none(lifting, current, gap, words):
+    with pytest.raises(InputError, match=words):
+        lifting.field_map(current, gap)
+
+
+@pytest.mark.slow
+def test_the_error_is_no_smaller_than_the_distance_to_a_higher_order(lifting, monkeypatch):
+    """Truth = the same integral in polynomials of order 5, at half the size at the corners."""
+    pytest.importorskip("ngsolve")
+    gap, current = 5 * MM, 1.2
+    found = lifting.field_map([current], [gap])
+    size = lifting.clearance(gap)
+
+    monkeypatch.setattr(drawn_magnet, "_ORDER", 5)
+    linkage, force = drawn_magnet._Solution(lifting, gap, 0.25 * size, 1.0).point(current)
+
+    assert abs(force - found.force[0, 0]) < abs(found.force_error[0, 0]) < 0.01 * abs(force)
+    assert abs(linkage - found.linkage[0, 0]) < found.linkage_error[0, 0] < 0.01 * linkage
 
 
 def test_sections_that_are_none():

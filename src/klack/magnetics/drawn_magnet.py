@@ -24,7 +24,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import ConvergenceError, InputError, optional_package, require_positive
+from klack.errors import (
+    ConvergenceError,
+    InputError,
+    optional_package,
+    refuse_if,
+    require_nonnegative,
+    require_positive,
+)
 from klack.magnetics.iron import VACUUM_PERMEABILITY, IronCurve
 from klack.units import format_si
 
@@ -36,6 +43,7 @@ _ORDER = 3
 _FAR = 5.0  # air around, over the size of the magnet
 _COARSE = 2.0  # ratio of the two meshes
 _SETTLED = 1e-6
+_TOUCH = 1e-9  # of a radius: what touches as drawn may overlap by round-off
 _MOST_STEPS = 60
 
 
@@ -68,12 +76,18 @@ class Ring:
         along = max(other.low - self.high, self.low - other.high, 0.0)
         return hypot(across, along)
 
+    def overlaps(self, other: "Ring") -> bool:
+        """Whether both share more than an edge, round-off apart."""
+        across = min(self.outer, other.outer) - max(self.inner, other.inner)
+        along = min(self.high, other.high) - max(self.low, other.low)
+        return min(across, along) > _TOUCH * max(self.outer, other.outer)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class FieldMap:
     """Linkage [Wb] and force [N], negative where it closes the gap, over current [A] and gap [m].
 
-    ``linkage_error`` and ``force_error`` are differences to a mesh of twice the size.
+    ``linkage_error`` and ``force_error`` are differences to a mesh of twice the size everywhere.
     """
 
     current: Vector
@@ -87,7 +101,7 @@ class FieldMap:
     def error(self) -> float:
         """Largest error, of the largest linkage or force [-]."""
         pairs = ((self.linkage_error, self.linkage), (self.force_error, self.force))
-        return max(float(np.max(np.abs(e)) / np.max(np.abs(v))) for e, v in pairs)
+        return max(float(np.max(np.abs(e)) / (np.max(np.abs(v)) or 1.0)) for e, v in pairs)
 
     def write(self, file: Path) -> None:
         """Write the table that a ``force-map-solenoid`` reads: one row for each point."""
@@ -119,6 +133,30 @@ class DrawnMagnet:
     iron: IronCurve
     opens: int = 1
 
+    def __post_init__(self) -> None:
+        require_positive("DrawnMagnet: turns", self.turns, "1")
+        refuse_if(
+            self.opens not in (1, -1),
+            "DrawnMagnet: opens",
+            got=f"{self.opens}",
+            expected="1 or -1",
+            hint="1 where the moving rings rise as the gap opens, -1 where they sink.",
+        )
+        refuse_if(
+            not (self.fixed and self.moving),
+            "DrawnMagnet",
+            got=f"{len(self.fixed)} fixed and {len(self.moving)} moving rings",
+            expected="at least one of each",
+            hint="give the iron as rings.",
+        )
+        refuse_if(
+            any(self.coil.overlaps(ring) for ring in self.fixed),
+            "DrawnMagnet: coil",
+            got="a coil that overlaps a fixed ring",
+            expected="a section without iron; both may touch",
+            hint="draw the winding alone, without its bobbin.",
+        )
+
     def clearance(self, gap: float) -> float:
         """Shortest distance [m] between what moves and what does not, at a working gap [m]."""
         moved = [ring.raised(self.opens * gap) for ring in self.moving]
@@ -132,20 +170,29 @@ class DrawnMagnet:
         Parameters
         ----------
         current, gap [A], [m]
-            Increasing.
+            Increasing; gaps from 0.
         mesh_size [m]
             At corners of the iron, at most the shortest distance between what moves and what does
             not, which is the default.
         """
         i, x = np.array(current, dtype=float), np.array(gap, dtype=float)
+        for name, values in (("current", i), ("gap", x)):
+            refuse_if(
+                not (values.size and np.all(np.isfinite(values)) and np.all(np.diff(values) > 0.0)),
+                f"DrawnMagnet: {name}",
+                got=f"{', '.join(f'{value:g}' for value in values)}" or "none",
+                expected="increasing numbers",
+                hint=f"give each {name} once, the smallest first, in SI.",
+            )
+        require_nonnegative("DrawnMagnet: gap", float(x[0]), "m")
         for j in x:
             self._require_resolved(float(j), mesh_size)
         tables = []
         for coarse in (1.0, _COARSE):
             columns = []
             for j in x:
-                size = coarse * (mesh_size or self.clearance(float(j)))
-                solution = _Solution(self, float(j), 0.5 * size)
+                size = mesh_size or self.clearance(float(j))
+                solution = _Solution(self, float(j), 0.5 * size, coarse)
                 columns.append([solution.point(float(one)) for one in i])
             tables.append(np.array(columns).transpose(2, 1, 0))
         fine, rough = tables
@@ -181,9 +228,9 @@ class DrawnMagnet:
 class _Solution:
     """Field at one gap; ``point`` starts from the last current."""
 
-    def __init__(self, magnet: DrawnMagnet, gap: float, size: float) -> None:
+    def __init__(self, magnet: DrawnMagnet, gap: float, size: float, coarse: float) -> None:
         self.ng = ng = optional_package("ngsolve", "fields of a drawn magnet", "ngsolve")
-        self.mesh = _mesh(magnet, gap, size)
+        self.mesh = _mesh(magnet, gap, size, coarse)
         self.space = ng.H1(self.mesh, order=_ORDER, dirichlet="far|axis")
         self.potential = ng.GridFunction(self.space)
         u, r = self.space.TrialFunction(), ng.x
@@ -260,7 +307,8 @@ class _Solution:
         )
 
 
-def _mesh(magnet: DrawnMagnet, gap: float, size: float) -> Any:
+def _mesh(magnet: DrawnMagnet, gap: float, size: float, coarse: float) -> Any:
+    """Triangles of a size [m] at the corners of the iron; all sizes times ``coarse``."""
     ng = optional_package("ngsolve", "fields of a drawn magnet", "ngsolve")
     from netgen import occ
 
@@ -286,9 +334,9 @@ def _mesh(magnet: DrawnMagnet, gap: float, size: float) -> Any:
         for edge in part.edges:
             if abs(edge.center.x) < 1e-9 * extent:
                 edge.name = "axis"
-    fixed.maxh = moving.maxh = extent / 20
+    fixed.maxh = moving.maxh = coarse * extent / 20
     for part in (fixed, moving):
         for vertex in part.vertices:
-            vertex.maxh = size
+            vertex.maxh = coarse * size
     shape = occ.OCCGeometry(occ.Glue([*parts.values()]), dim=2)
-    return ng.Mesh(shape.GenerateMesh(maxh=reach / 5, grading=0.3))
+    return ng.Mesh(shape.GenerateMesh(maxh=coarse * reach / 5, grading=0.3))
