@@ -76,7 +76,16 @@ def test_about_lists_what_is_installed(capsys):
         assert about[name] == version(name)
     assert about["klack"] == klack.__version__
     assert f"zarr {version('zarr')}" in about["packages"]
-    assert Path(about["installed_in"]) == Path(klack.__file__).parent
+    assert Path(about["installed_in"]).expanduser() == Path(klack.__file__).parent
+
+
+def test_about_does_not_tell_the_name_of_the_user(capsys, monkeypatch):
+    home = Path(klack.__file__).parents[2]
+    monkeypatch.setenv("HOME", str(home))
+    main(["about", "--json", "-"])
+    out = capsys.readouterr().out
+    assert str(home) not in out
+    assert json.loads(out)["about"]["installed_in"] == "~/src/klack"
 
 
 @pytest.mark.parametrize(("words", "offered"), [("imp", "impact"), ("impact --lev", "--level")])

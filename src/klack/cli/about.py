@@ -2,6 +2,7 @@
 
 import subprocess
 from importlib.metadata import PackageNotFoundError, version
+from os.path import expanduser
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -33,9 +34,9 @@ def about(*, wanted: Shown = SHOWN) -> int:
         **run_conditions(),
         "commit": _commit() or "-",
         "packages": ", ".join(filter(None, map(_with_version, _PACKAGES))),
-        "installed in": str(Path(__file__).parents[1]),
-        "results kept in": "nowhere" if results is None else str(results.folder),
-        "compiled code in": "nowhere" if compiled is None else str(compiled),
+        "installed in": _place(Path(__file__).parents[1]),
+        "results kept in": _place(None if results is None else results.folder),
+        "compiled code in": _place(compiled),
     }
     wanted.show(
         [TextTable(title="klack", columns=("what", "is"), rows=tuple(found.items()), left=2)]
@@ -53,6 +54,16 @@ def _with_version(package: str) -> str:
         return f"{package} {version(package)}"
     except PackageNotFoundError:
         return ""
+
+
+def _place(folder: Path | None) -> str:
+    """A folder without the name of the user: ``~`` for the home directory."""
+    if folder is None:
+        return "nowhere"
+    home = Path(expanduser("~"))
+    # of a service the home is "/", of which all folders are below
+    below = home != Path(home.anchor) and folder.is_relative_to(home)
+    return str(Path("~") / folder.relative_to(home)) if below else str(folder)
 
 
 def _commit() -> str:
