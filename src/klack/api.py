@@ -189,9 +189,14 @@ class Number(float):
     unit: str
     measure: Measure[Any]
 
-    def __new__(cls, value: Value, unit: str, measure: Measure[Any]) -> "Number":
-        """Take None as nan."""
-        number = super().__new__(cls, float("nan") if value is None else value)
+    def __new__(
+        cls, value: Value, unit: str = "1", measure: Measure[Any] | None = None
+    ) -> "Number":
+        """Take None as nan; a float where no measure is given, as :mod:`statistics` has its means."""
+        plain = float("nan") if value is None else float(value)
+        if measure is None:
+            return plain  # type: ignore[return-value]
+        number = super().__new__(cls, plain)
         number.value, number.unit, number.measure = value, unit, measure
         return number
 
@@ -350,6 +355,14 @@ class Result:
         from klack.exchange.results.dataset import short_names
 
         return curve_of(data, curve, short_names(self.record))
+
+    def __contains__(self, name: object) -> bool:
+        """Whether ``result[name]`` is one curve."""
+        try:
+            self[name]  # type: ignore[index]
+        except InputError:
+            return False
+        return True
 
     def __iter__(self) -> Iterator[str]:
         """Names of the curves and numbers of the answer."""

@@ -3,6 +3,7 @@
 import copy
 import json
 import pickle
+import statistics
 import subprocess
 import sys
 from pathlib import Path
@@ -109,6 +110,11 @@ class TestNumbers:
         assert np.sqrt(peak) == np.sqrt(plain)
         assert json.loads(json.dumps({"peak": peak})) == {"peak": plain}
 
+    def test_its_mean_and_median_are_plain_floats(self, peak: klack.Number):
+        plain = float(peak)
+        for found in (statistics.mean([peak, peak]), statistics.median([peak, peak])):
+            assert (type(found), found) == (float, plain)
+
     def test_only_its_text_has_the_unit(self, peak: klack.Number):
         assert repr(peak) == str(peak) == f"{peak}" == f"{float(peak)!r} N"
 
@@ -151,6 +157,9 @@ class TestCurves:
         with pytest.raises(InputError, match="does not have, expected one of: contact_force"):
             _ = rods["conact_force"]
         assert {"contact_force", "short_velocity", "peak_force"} <= set(rods)
+        assert "force" in rods
+        assert "velocity" not in rods
+        assert ("full", "force") not in rods
 
     def test_every_axis_has_a_table(self, rods: klack.Result):
         pytest.importorskip("xarray")
