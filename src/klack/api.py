@@ -192,7 +192,7 @@ class Number(float):
     def __new__(
         cls, value: Value, unit: str = "1", measure: Measure[Any] | None = None
     ) -> "Number":
-        """Take None as nan; a float where no measure is given, as :mod:`statistics` has its means."""
+        """Take None as nan; a plain float without a measure: so :mod:`statistics` makes a mean."""
         plain = float("nan") if value is None else float(value)
         if measure is None:
             return plain  # type: ignore[return-value]
