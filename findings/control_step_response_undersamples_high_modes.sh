@@ -2,9 +2,9 @@
 # python-control 0.10.2: step_response chooses times that are too coarse for high modes.
 #
 # Guess: without a time vector the response is sampled finely enough for the fastest mode, or it warns.
-# Reality, 2026-11-29: of modes at 40 kHz and 1 MHz it takes 5000 points 2.7 us apart, nearly three periods
+# Reality, 2026-11-29: for modes at 40 kHz and 1 MHz it takes 5000 points 2.7 us apart, nearly three periods
 # of the upper one.  The peak of the velocity is 7 % lower than in steps of 20 ns.  No warning.
-# Why it matters here: the state spaces that klack exports are like that: seldom damped, with modes from
+# Why it matters here: the state spaces that klack exports are like that: lightly damped, with modes from
 # some kHz to MHz.  klack's page on exported models gives a time vector.
 set -euo pipefail
 place=$(mktemp -d)

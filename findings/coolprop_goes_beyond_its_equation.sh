@@ -3,8 +3,8 @@
 # temperature of an equation of state.
 #
 # Guess: n-heptane at 3000 bar is an error, since pmax() of its equation is 1000 bar.
-# Reality, 2026-11-29: 808 kg/m3 and 2198 m/s at 25 degC; PropsSI and AbstractState alike.  So does 2000 K,
-# with a largest temperature of 600 K.
+# Reality, 2026-11-29: 808 kg/m3 and 2198 m/s at 25 degC; PropsSI and AbstractState alike.  2000 K
+# gives numbers as well, with a largest temperature of 600 K.
 # Why it matters here: injectors reach 2500 bar, and the stiffness of the fluid is rho c^2.  klack ends
 # its table of a fluid at pmax(), and takes no temperature above Tmax().
 set -euo pipefail

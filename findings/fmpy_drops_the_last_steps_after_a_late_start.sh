@@ -2,8 +2,8 @@
 # FMPy 0.3.32: a co-simulation that starts late loses its last steps.
 #
 # Guess: a run of 50 us in steps of 0.1 us has 501 points, wherever its time axis begins.
-# Reality, 2026-11-29: 501 points from 0 s, 500 from 100 s, 491 from 1000 s: times that agree to 1e-9
-# of themselves count as equal, and the run stops where the stop time is "reached".  No warning.
+# Reality, 2026-11-29: 501 points from 0 s, 500 from 100 s, 491 from 1000 s: times that differ by less
+# than 1e-9 of their value count as equal, and the run stops where the stop time is "reached".  No warning.
 # Why it matters here: an impact that is cut out of a long drive cycle ends 1 us early, and the
 # impulse or the rebound speed that is read off at the end belongs to another time.
 set -euo pipefail

@@ -5,7 +5,7 @@
 # Reality, 2026-11-29: S1 and S1_conf are 0.0 for every parameter, without a warning.  ST is zero, too.
 # Why it matters here: a study of strokes loses points (a run that stops, a measure that does not
 # exist there), and a designer would read that no parameter matters.  klack discards the base rows
-# of such points and says how many; below a fewest number of rows the indices are blank, with why.
+# of such points and says how many; with too few rows left the indices are blank, and it says why.
 set -euo pipefail
 place=$(mktemp -d)
 trap 'rm -rf "$place"' EXIT

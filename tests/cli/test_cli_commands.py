@@ -79,13 +79,14 @@ def test_about_lists_what_is_installed(capsys):
     assert Path(about["installed_in"]).expanduser() == Path(klack.__file__).parent
 
 
-def test_about_does_not_tell_the_name_of_the_user(capsys, monkeypatch):
-    home = Path(klack.__file__).parents[2]
+def test_about_does_not_tell_the_name_of_the_user(capsys, monkeypatch, tmp_path):
+    home = Path(klack.__file__).parents[1]
     monkeypatch.setenv("HOME", str(home))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     main(["about", "--json", "-"])
     out = capsys.readouterr().out
     assert str(home) not in out
-    assert json.loads(out)["about"]["installed_in"] == "~/src/klack"
+    assert json.loads(out)["about"]["installed_in"] == str(Path("~", "klack"))
 
 
 @pytest.mark.parametrize(("words", "offered"), [("imp", "impact"), ("impact --lev", "--level")])
