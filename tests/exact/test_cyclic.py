@@ -3,11 +3,15 @@
 Truth: the same linear system.  Tolerances: round-off at a condition of some 1e4.
 """
 
+import tracemalloc
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cache
+from time import sleep
 
 import numpy as np
 import pytest
+import scipy
 from scipy.sparse import csr_array, diags_array
 
 from klack.bodies.elasticity.body import ElasticBody, elastic_body
@@ -92,6 +96,45 @@ def test_solves_are_those_of_the_whole_matrix(bore, layers, support):
         # G S^-1 b is the product of two halves
         shared = halves.T @ halves
         assert abs(shared - B.T @ expected).max() < tolerance * abs(shared).max()
+
+
+def test_a_part_that_is_held_takes_little_memory_at_set_up():
+    """A few times what is kept of it, beside what the sectors take without."""
+    made = body(0.0, 60, "none")
+    S, points = dynamic(made), made.mesh.points
+    held = np.sort(np.random.default_rng(7).choice(len(points) * 3, 900, replace=False))
+
+    def peak(fixed):
+        tracemalloc.start()
+        try:
+            with cyclic_factorization(S, points, fixed) as factor:
+                return tracemalloc.get_traced_memory()[1], factor._held.nbytes
+        finally:
+            tracemalloc.stop()
+
+    (without, _), (highest, kept) = peak(held[:0]), peak(held)
+    assert highest - without < 4 * kept
+
+
+def test_parts_held_of_two_bodies_leave_the_threads_of_blas(monkeypatch):
+    """Limits that overlap in time would restore each other's."""
+    made, inside, most, plain = body(0.0, 8, "part"), [0], [0], scipy.linalg.qr
+
+    def qr(*given, **options):
+        inside[0] += 1
+        most[0] = max(most[0], inside[0])
+        sleep(0.05)
+        inside[0] -= 1
+        return plain(*given, **options)
+
+    monkeypatch.setattr(scipy.linalg, "qr", qr)
+    S = dynamic(made)
+    with ThreadPoolExecutor(2) as pool:
+        for factor in pool.map(
+            lambda _: cyclic_factorization(S, made.mesh.points, made.fixed), "ab"
+        ):
+            factor.close()
+    assert most[0] == 1
 
 
 def test_bodies_that_do_not_repeat_are_left_alone():

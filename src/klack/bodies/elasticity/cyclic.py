@@ -16,6 +16,7 @@ D. L. Thomas, Int. J. Numer. Meth. Engng 14 (1979) 81.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -43,6 +44,11 @@ _SAME = 1e-10
 
 _MOST_HELD = 1500
 """Constraints, each a column that every substitution reads."""
+
+_BLOCK = 64
+"""Constraints per substitution."""
+
+_limiting = Lock()
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,13 +135,24 @@ class CyclicFactorization(Closing):
             self._constrain(supports.rest)
 
     def _constrain(self, held: NDArray[np.int64]) -> None:
-        rows = np.zeros((3 * self._nodes, len(held)))
-        rows[held, np.arange(len(held))] = 1.0
-        Y = self._half(rows)
-        self._reached = np.flatnonzero(np.any(Y, axis=1))
-        with threadpool_limits(limits=1, user_api="blas"):
-            Q, _ = scipy.linalg.qr(Y[self._reached].astype(float), mode="economic")
+        # random weights leave no entry zero by chance
+        weights = np.random.default_rng(1).uniform(1.0, 2.0, (len(held), 1))
+        self._reached = np.flatnonzero(self._half(self._at(held, weights)))
+        half = np.empty((len(self._reached), len(held)), order="F")
+        for start in range(0, len(held), _BLOCK):
+            block = slice(start, start + _BLOCK)
+            loads = self._at(held[block], np.eye(len(held[block])))
+            half[:, block] = self._half(loads)[self._reached]
+        # two bodies that limit threads side by side would leave the process with one
+        with _limiting, threadpool_limits(limits=1, user_api="blas"):
+            Q, _ = scipy.linalg.qr(half, mode="economic", overwrite_a=True)
         self._held = np.asfortranarray(Q, dtype=self.dtype)
+
+    def _at(self, places: NDArray[np.int64], loads: Floats) -> Floats:
+        """Loads (m, k) at some of all degrees of freedom."""
+        whole = np.zeros((3 * self._nodes, loads.shape[1]))
+        whole[places] = loads
+        return whole
 
     def _half(self, whole: Floats) -> NDArray[Any]:
         """L^-1 of loads (n, k) on all degrees of freedom, real and imaginary parts in turn."""
