@@ -4,6 +4,8 @@ Truth: closed formulas, ``sqrt(k/(m + rho l A_b^2/A))`` and two masses on spring
 parallel.
 """
 
+import re
+from dataclasses import replace
 from math import pi, sqrt
 
 import numpy as np
@@ -82,10 +84,14 @@ def added_mass(result):
 
 def notes(passages, pace=5e3, speed=0.05, **more):
     """Notes on a motion of that pace [rad/s] and greatest speed."""
+    return notes_on(network(passages, **more), pace, speed)
+
+
+def notes_on(rows, pace=5e3, speed=0.05):
     record = 1e-3 / pace
     time = record * np.arange(int(2.0 * pi / pace / record))
     moved = {"mass velocity": ChannelData(unit="m/s", values=speed * np.cos(pace * time))}
-    return list(liquid_doubts(network(passages, **more), moved, record))
+    return list(liquid_doubts(rows, moved, record))
 
 
 def stated(note):
@@ -147,3 +153,42 @@ def test_no_note_where_the_liquid_does_not_matter() -> None:
     (note,) = notes({"gap": GAP, "guide": tight})
     assert "'guide'" not in note
     assert notes({"gap": GAP}, speed=0.0) == []
+
+
+def test_many_passages_in_a_row_name_one() -> None:
+    """Each holds less than a tenth of what is missing."""
+    count = 20
+    parts = {
+        "mass": RigidMass(mass=MASS),
+        "spring": Spring(stiffness=STIFFNESS, preload=PUSH),
+        "face": PressureFace(direction="opening", outer_diameter=FACE),
+        "tank": PressureSource(pressure=AMBIENT),
+        **{f"room{i}": Chamber(volume=0.1 * VOLUME, pressure=AMBIENT) for i in range(count)},
+        **{f"hole{i}": HOLE for i in range(count)},
+    }
+    joints = [["mass.body", "spring.end", "face.body"]]
+    joints += [
+        [f"hole{i - 1}.b" if i else "face.fluid", f"room{i}.fluid", f"hole{i}.a"]
+        for i in range(count)
+    ]
+    rows = Network(parts, [*joints, [f"hole{count - 1}.b", "tank.fluid"]], fluid=HEPTANE).rows()
+    (note,) = notes_on(rows, speed=1e-4)
+    assert re.search(r"through 'hole\d+'.*, whose inertia", note)
+    assert "Try: join hole" in note
+
+
+def test_a_body_on_its_machine_displaces_as_a_free_one() -> None:
+    """It has a momentum instead of rigid modes (a mount of 1 Hz)."""
+    rows = network({"gap": GAP})
+    (row,) = rows.bodies
+    held = replace(
+        row.body,
+        rigid_count=0,
+        rigid_axial=np.zeros(0),
+        omega=np.array([2.0 * pi]),
+        momentum=row.body.rigid_axial,
+    )
+    free = notes_on(rows)
+    assert free != []
+    rows.bodies[0] = replace(row, body=held)
+    assert notes_on(rows) == free

@@ -35,7 +35,7 @@ from klack.units import format_si
 __all__ = ["liquid_doubts"]
 
 _SHARE = 0.05  # of the mass of a body, from which on liquid without inertia is doubted
-_NAMED = 0.1  # of the liquid that is missing, for a passage to be named
+_NAMED = 0.1  # of the liquid that is missing, for a passage to be named, as the largest is
 _KEPT = 0.5  # of the inertance of passages, in an inertance before them, that stands for them
 _OPEN, _RIGID = 1e-5, 1e-4  # of the least inertance; of the compliance of chambers
 _SETTLED = 6  # repetitions of the resistance at the amplitude
@@ -61,7 +61,7 @@ def liquid_doubts(rows: Rows, channels: Mapping[str, ChannelData], record: float
         return
     passages = tuple(_passages(rows))
     for row in rows.bodies:
-        if row.body.rigid_count == 0 or row.course is not None:
+        if not row.body.moves or row.course is not None:
             continue
         areas = _areas(rows, row)
         limit = _SHARE * row.body.mass
@@ -80,7 +80,10 @@ def liquid_doubts(rows: Rows, channels: Mapping[str, ChannelData], record: float
 
 def _areas(rows: Rows, row: BodyRow) -> dict[int, float]:
     """By node: volume that opens there per displacement of the whole body [m^2]."""
-    rigid = row.body.port_shapes[: row.body.rigid_count].T @ row.body.rigid_axial
+    body = row.body
+    rigid = body.port_shapes[: body.rigid_count].T @ body.rigid_axial
+    if body.momentum is not None:
+        rigid = body.port_shapes.T @ body.momentum
     moves = dict(zip(row.ports, map(float, rigid), strict=True))
     areas: dict[int, float] = {}
     for wall in rows.walls:
@@ -173,9 +176,10 @@ def _masses(
 
 def _sentence(rows: Rows, row: BodyRow, passages: Sequence[_Passage], masses: Vector) -> str:
     total = float(masses.sum())
+    named_from = min(_NAMED * total, float(masses.max()))
     ways: dict[frozenset[int], list[_Passage]] = {}
     for passage, mass in zip(passages, masses, strict=True):
-        if mass >= _NAMED * total:
+        if mass >= named_from:
             ways.setdefault(frozenset((passage.a, passage.b)), []).append(passage)
     named = [passage for way in ways.values() for passage in way]
     names = " and ".join(f"'{passage.row.component}'" for passage in named if passage.row)
