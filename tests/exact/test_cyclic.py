@@ -100,9 +100,9 @@ def test_solves_are_those_of_the_whole_matrix(bore, layers, support):
 
 def test_a_part_that_is_held_takes_little_memory_at_set_up():
     """A few times what is kept of it, beside what the sectors take without."""
-    made = body(0.0, 60, "none")
+    made = body(0.0, 30, "none")
     S, points = dynamic(made), made.mesh.points
-    held = np.sort(np.random.default_rng(7).choice(len(points) * 3, 900, replace=False))
+    held = np.sort(np.random.default_rng(7).choice(len(points) * 3, 500, replace=False))
 
     def peak(fixed):
         tracemalloc.start()

@@ -12,10 +12,11 @@ with the flows ``Q_e`` that share the displaced one: the amplitudes at the pace 
 .. math:: i\omega \frac{V_n}{K} p_n + A_n v + \sum_e Q_e = 0, \qquad
           p_n - p_m = (i\omega L_e + R_e + C_e |Q_e|)\,Q_e .
 
-So parallel passages share the flow, a guide that is too tight leaves it to others, and a chamber
-that is large enough takes it.  Where chambers swing at that pace they would multiply it; the mass
-is at most that in rigid ones.  The sum is over passages whose inertia the rows leave out, except
-those behind an inertance or a line that has it: at a volume without a moving wall.
+``K`` is that at the mean pressure while the body moves.  So parallel passages share the flow, a
+guide that is too tight leaves it to others, and a chamber that is large enough takes it.  Where
+chambers swing at that pace they would multiply it; the mass is at most that in rigid ones.  The sum
+is over passages whose inertia the rows leave out, except those behind an inertance or a line that
+has it: at a volume without a moving wall.
 
 Limits: seats, edges and other restrictions that move, and accumulators, take any flow without
 inertia, which makes the mass a lower limit; liquid within chambers is left out.  Source: Lamb,
@@ -73,9 +74,27 @@ def liquid_doubts(rows: Rows, channels: Mapping[str, ChannelData], record: float
         fastest = float(np.max(np.abs(speed)))
         if not travel > 0.0:
             continue
-        masses = _masses(rows, passages, areas, 2.0 * fastest / travel, fastest)
+        pressures = _pressures(rows, channels, np.square(speed / fastest))
+        masses = _masses(rows, passages, areas, pressures, 2.0 * fastest / travel, fastest)
         if masses.sum() >= limit:
             yield _sentence(rows, row, passages, masses)
+
+
+def _pressures(
+    rows: Rows, channels: Mapping[str, ChannelData], weights: Vector
+) -> dict[int, float]:
+    """By node without a prescribed one: mean while the body moves [Pa]."""
+    found = {}
+    for node, row in rows.nodes.items():
+        if node == AMBIENT or row.prescribed:
+            continue
+        recorded = channels.get(f"{row.component} pressure")
+        found[node] = (
+            row.at_start
+            if recorded is None
+            else float(np.average(recorded.values, weights=weights))
+        )
+    return found
 
 
 def _areas(rows: Rows, row: BodyRow) -> dict[int, float]:
@@ -142,22 +161,21 @@ def _masses(
     rows: Rows,
     passages: Sequence[_Passage],
     areas: Mapping[int, float],
+    pressures: Mapping[int, float],
     omega: float,
     speed: float,
 ) -> Vector:
     """Mass that each passage leaves out [kg]: the lesser of those with real and rigid chambers."""
     assert rows.fluid is not None
-    free = [node for node, row in rows.nodes.items() if node != AMBIENT and not row.prescribed]
-    place = {node: i for i, node in enumerate(free)}
-    ends = np.zeros((len(passages), len(free)))
+    place = {node: i for i, node in enumerate(pressures)}
+    ends = np.zeros((len(passages), len(place)))
     for e, passage in enumerate(passages):
         for node, sign in ((passage.a, 1.0), (passage.b, -1.0)):
             if node in place:
                 ends[e, place[node]] += sign
-    moved = np.array([areas.get(node, 0.0) for node in free])
-    held = [rows.nodes[node] for node in free]
-    stiff = rows.fluid.bulk_modulus(np.array([row.at_start for row in held]))
-    compliance = np.array([row.volume for row in held]) / stiff
+    moved = np.array([areas.get(node, 0.0) for node in place])
+    stiff = rows.fluid.bulk_modulus(np.array(list(pressures.values())))
+    compliance = np.array([rows.nodes[node].volume for node in place]) / stiff
     inertance = np.array([passage.liquid.inertance for passage in passages])
     resistance = np.array([passage.liquid.resistance for passage in passages])
     loss = np.array([passage.liquid.loss for passage in passages])
