@@ -20,6 +20,7 @@ from klack.analyses.impact.analysis import IMPACT
 from klack.analyses.noise.analysis import NOISE
 from klack.analyses.noise.content import noise_content
 from klack.analyses.noise.figures import own_sound_charts
+from klack.analyses.noise.own_sound import own_sound
 from klack.analyses.noise.record import NoiseDesign
 from klack.analyses.noise.run import noise_design
 from klack.analyses.noise.source import load_sources
@@ -324,6 +325,27 @@ def test_boundary_elements_take_off_what_a_small_valve_cannot_radiate(impact):
         assert np.abs(series.values[-100:]).max() < 1e-4 * np.abs(series.values).max()
     names = [chart.name for chart in own_sound_charts(SimpleNamespace(designs=[found]))]
     assert names == ["directivity", "own-click"]
+
+
+def test_directivity_ends_where_elements_hold(impact, monkeypatch):
+    """Above, the far pressure is not known: no bands, no curves, no sound over time."""
+    coarse = 5e3
+
+    def coarser(source, acting, around, distance):
+        ways = {k: replace(way, holds_up_to=coarse) for k, way in around.elements.items()}
+        return own_sound(source, acting, replace(around, elements=ways), distance)
+
+    monkeypatch.setattr("klack.analyses.noise.run.own_sound", coarser)
+    found = sounding(impact, radiation="elements")
+    own = found.own_sound
+    assert own.middle[-1] < 1.01 * coarse
+    power = np.abs(np.fft.rfft(own.side.values)) ** 2
+    f = np.fft.rfftfreq(own.side.values.size, own.side.step)
+    assert power[f > 1.2 * coarse].sum() < 1e-3 * power.sum()
+    directivity, click = own_sound_charts(SimpleNamespace(designs=[found]))
+    labels = [curve.label for curve in directivity.panels[0].curves]
+    assert len(labels) == 3
+    assert "to 5 kHz" in click.note.replace("\xa0", " ")
 
 
 def test_surfaces_that_enclose_nothing_radiate_as_pistons_and_say_so(impact):

@@ -12,7 +12,12 @@ from klack.acoustics.coupling import Placement, axes_of, couple
 from klack.acoustics.interface import Freedom, InterfacePoint, Receiver, laplace
 from klack.acoustics.isolator import Spring
 from klack.acoustics.plate import Plate
-from klack.acoustics.receivers.modal import ModalReceiver, grounded, rigid_receiver
+from klack.acoustics.receivers.modal import (
+    ModalReceiver,
+    grounded,
+    matrix_receiver,
+    rigid_receiver,
+)
 from klack.acoustics.receivers.plates import InfinitePlate
 from klack.acoustics.standing import StandingValve, standing_valve
 from klack.analyses.noise.in_machine import in_machine, installed
@@ -196,9 +201,45 @@ def test_the_matrices_of_a_body_are_that_body_as_a_receiver(tmp_path: Path) -> N
     found = machine.receiver.at(laplace(F)).mobility
     assert machine.causal
     assert np.abs(found - exact).max() <= 1e-9 * np.abs(exact).max()
+    given["rows"] = {"flange.z": "z", "flange.ry": 5}
+    with pytest.raises(InputError, match="the row 5, which another freedom has"):
+        machine_of(CaseNoise.model_validate(data, context={}), {}, (FLANGE,))
     given["rows"] = {"flange.z": "x"}
     with pytest.raises(InputError, match="a number from 1 to 6, or one of: q0"):
         machine_of(CaseNoise.model_validate(data, context={}), {}, (FLANGE,))
+
+
+def test_next_to_massless_rows_do_not_stiffen_or_free_a_machine() -> None:
+    """Four masses on springs; a light one at the end changes nothing, as it only follows."""
+
+    def mobility(light: float) -> np.ndarray:
+        n = 5 if light else 4
+        K = 1e6 * (2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1))
+        K[0, 0] = K[-1, -1] = 1e6
+        M = np.diag([1.0, 1.0, 1.0, 1.0, light][:n])
+        receiver = matrix_receiver(K, M, {Z: 0}, (FLANGE,), damping=0.01)
+        return receiver.at(laplace(np.array([50.0, 200.0]))).mobility
+
+    assert np.abs(mobility(1e-12) / mobility(0.0) - 1.0).max() < 1e-4
+    with pytest.raises(InputError, match="lost in round-off"):
+        mobility(1e-18)
+    A = np.array([[1.0, 1.0], [1.0, 1.0 + 4e-16]])
+    with pytest.raises(InputError, match="a mass that is not above 0"):
+        matrix_receiver(np.eye(2), A, {Z: 0}, (FLANGE,), damping=0.01)
+
+
+def test_what_hangs_is_stable() -> None:
+    found = standing_valve(
+        [body(1, BOTH[1:2])],
+        (FLANGE,),
+        rigid_receiver(0.3, None, np.zeros(3), (FLANGE,)),
+        placements={},
+        isolators={},
+        missing={},
+    )
+    hangs = found.omega <= 2.0 * np.pi * 0.1
+    assert hangs.any()
+    assert np.all(found.damping[hangs] > 0.0)
 
 
 # --------------------------------------------------------------------------- in time
@@ -322,6 +363,29 @@ def test_on_a_sheet_the_impact_is_softer(sheet: StrokeStudy) -> None:
         assert variant.result.books.relative_residual < 1e-9
 
 
+def test_lift_counts_from_the_valve_that_drifts(sheet: StrokeStudy) -> None:
+    """The plate gives way by 26 um of the gap of 50 um, for good; compression of both is less."""
+    variant = sheet.variants["dry-mounted"]
+    lift = variant.result.channels[sheet.channels.lift].values
+    drift = variant.result.channels["mounted.base-seat displacement"].values
+    closing = variant.needle_times.closing
+    assert drift[-1] > 20e-6
+    assert abs(lift[-1]) < 1e-6
+    assert 50e-6 < lift.max() < 60e-6
+    assert closing.at_50 < closing.at_10 < closing.touch
+    (note,) = [word for word in sheet.warnings if "the valve itself moves by up to" in word]
+    assert note.startswith("'dry-mounted'")
+
+
+def test_a_component_with_the_name_of_the_whole_is_none_elsewhere() -> None:
+    text = CASE.read_text().replace("guide", "mounted").replace("type: mounted-", "type: guide-")
+    case = read_valve_case(text.replace("duration: 8 ms", "duration: 0.1 ms"), CASE)
+    study = run_stroke(case, variants=("dry",), threads=1)
+    assert "machine" not in study.variants["dry"].label
+    with pytest.raises(InputError, match="the name 'mounted'"):
+        run_stroke(case, variants=("dry-mounted",), threads=1)
+
+
 def test_force_on_the_plate_in_the_run_and_by_coupling(sheet: StrokeStudy) -> None:
     """The forces of the coupled run, through blocked force and coupling, give its own joint force.
 
@@ -351,6 +415,7 @@ def test_a_variant_without_what_it_needs_is_refused() -> None:
     text = CASE.read_text()
     broken = {
         "no place for the reaction of spring": ("spring: pole.top, ", ""),
+        "'magnet', which has no second end": ("magnet: outside", "magnet: pole.top"),
         "'dry-mounted' without a machine": (text[text.index("  receiver:") :], ""),
     }
     for says, (old, new) in broken.items():

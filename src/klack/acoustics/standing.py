@@ -12,7 +12,7 @@ left out: right to first order of the ratios.  Dampers of elements and an infini
 (:math:`F = 8 \sqrt{D m''}\, v` at a point, without memory) are left to the network, with the motion
 that each of them sees, so that they may be as strong as they like.
 
-A whole that is free would have no place to rest: it hangs at 0.1 Hz.
+A whole that is free would have no place to rest: it hangs at 0.1 Hz, all but undamped.
 """
 
 from collections.abc import Mapping, Sequence
@@ -36,6 +36,7 @@ __all__ = ["StandingValve", "standing_valve"]
 
 _RIGID = 1e-9  # of the largest compliance
 _SEEN = 1e-12  # of the largest shape of a port
+_HUNG = 1e-4  # damping ratio of what hangs, which would grow by round-off
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -145,6 +146,7 @@ def standing_valve(
     squares, X = scipy.linalg.eigh(Z.T @ K @ Z, Z.T @ M @ Z)
     X = Z @ X
     found = np.sqrt(np.maximum(squares, HANGS**2))
+    lost = np.maximum(np.einsum("im,ij,jm->m", X, C, X, optimize=True), 0.0) / (2.0 * found)
     seen = {}
     for name, i, c in dampers:
         seen[name] = X.T @ (d.T @ (stiff @ (springs * (np.arange(springs.size) == i)))), c
@@ -152,7 +154,7 @@ def standing_valve(
         seen[f"{receiver.freedoms[j]}".replace(".", "-")] = X[modes + own + j], float(c)
     return StandingValve(
         omega=found,
-        damping=np.maximum(np.einsum("im,ij,jm->m", X, C, X, optimize=True), 0.0) / (2.0 * found),
+        damping=np.where(squares > HANGS**2, lost, np.maximum(lost, _HUNG)),
         shapes=X[: modes + own].T @ ports,
         freedoms=freedoms,
         mounts=X[modes : modes + own].T,

@@ -28,7 +28,9 @@ from klack.errors import refuse_if
 
 __all__ = ["ModalReceiver", "body_receiver", "grounded", "matrix_receiver", "rigid_receiver"]
 
-_RIGID = 1e-12  # of the largest eigenvalue
+_RIGID = 1e-12  # of the largest eigenvalue, below 0
+_MASSLESS = 1e-12  # of a row's own mass
+_LOST = 20.0  # [Hz] round-off of frequencies, at most
 _SYMMETRIC = 1e-6
 _BLOCK = 1 << 16  # denominators at once: what a processor's cache holds
 
@@ -177,18 +179,30 @@ def matrix_receiver(
     damping [-]
         Ratio of all elastic modes.
     """
+    own = np.sqrt(np.maximum(np.diag(mass), 0.0))
     refuse_if(
         not all(np.abs(A - A.T).max() <= _SYMMETRIC * np.abs(A).max() for A in (stiffness, mass))
-        or not np.linalg.eigvalsh(mass)[0] > 0.0,
+        or not np.all(own > 0.0)
+        or not np.linalg.eigvalsh(mass / np.outer(own, own))[0] > _MASSLESS,
         "noise.receiver.matrices",
         got="matrices that are not symmetric, or a mass that is not above 0",
         expected="K and M of an elastic body",
-        hint="write them without constraints, contact and damping.",
+        hint="write them without constraints, contact and damping; condense rows without mass.",
     )
     squares, X = scipy.linalg.eigh(stiffness, mass)
-    rigid = np.abs(squares) <= _RIGID * squares[-1]
+    noise = squares.size * np.finfo(float).eps * float(np.abs(squares).max())
+    lost = np.sqrt(noise) / (2.0 * np.pi)
     refuse_if(
-        bool(np.any(squares[~rigid] < 0.0)),
+        lost > _LOST,
+        "noise.receiver.matrices",
+        got=f"a mode at {lost / np.sqrt(noise / squares[-1]):.2g} Hz, beside which those below "
+        f"{lost:.2g} Hz are lost in round-off",
+        expected=f"round-off below {_LOST:g} Hz",
+        hint="condense rows of next to no mass, and what a penalty holds.",
+    )
+    rigid = squares <= noise
+    refuse_if(
+        bool(np.any(squares < -max(_RIGID * squares[-1], noise))),
         "noise.receiver.matrices",
         got="a stiffness below 0",
         expected="one of an elastic body at rest",

@@ -591,7 +591,7 @@ def own_sound_charts(study: NoiseStudy) -> tuple[Chart, ...]:
     for i, design, own in known:
         whose = f"{design.name}, " if len(known) > 1 else ""
         level = _level(own.exposure, EXPOSURE_REFERENCE)
-        for band in _OCTAVES:
+        for band in (band for band in _OCTAVES if band < 1.1 * own.middle[-1]):
             n = int(np.argmin(np.abs(np.log(own.middle / band))))
             label = f"{whose}{quantity(band, 'Hz', 2)}"
             curves.append(look_of(len(curves)).curve(np.degrees(own.angle), level[n], label))
@@ -600,7 +600,9 @@ def own_sound_charts(study: NoiseStudy) -> tuple[Chart, ...]:
         for found, series in ((axis, own.axis), (side, own.side)):
             x, y = thinned(1e3 * series.time, 1e3 * series.values)
             found.append(look_of(i).curve(x, y, design.label, listed=found is axis))
-    first = known[0][1]
+    if not curves:
+        return ()
+    first, top = known[0][1], min(float(own.middle[-1]) for *_, own in known)
     where = quantity(first.settings.distance, "m", 3)
     window = (1e3 * min(float(own.axis.time[0]) for *_, own in known), 1e3 * max(ends))
     return (
@@ -622,8 +624,8 @@ def own_sound_charts(study: NoiseStudy) -> tuple[Chart, ...]:
                 Panel(y=AxisSpec(label="on the axis", unit="mPa"), curves=tuple(axis), share=0.7),
                 Panel(y=AxisSpec(label="beside", unit="mPa"), curves=tuple(side), share=0.7),
             ),
-            note="By boundary elements with phase, to 20 kHz, without the travel time; on the axis "
-            "at 0 degrees from +z, beside at 90.",
+            note=f"By boundary elements with phase, to {quantity(top, 'Hz', 2)}, without the "
+            "travel time; on the axis at 0 degrees from +z, beside at 90.",
         ),
     )
 

@@ -326,8 +326,17 @@ def _of_matrices(given: NoiseMatrices, points: tuple[InterfacePoint, ...]) -> tu
                 + (f", or one of: {one_of(held.names)}" if held.names else ""),
                 hint="name a row of the file.",
             )
+        row = place - 1 if isinstance(wanted, int) else place
+        if row in rows.values():
+            raise InputError(
+                f"noise.receiver.matrices.rows.{name}",
+                got=f"the row {wanted!r}, which another freedom has",
+                expected="a row for each freedom",
+                hint="name the row of this motion, or leave it out and say what it does in "
+                "receiver.missing.",
+            )
         freedom = Freedom(mount, DIRECTIONS.index(direction) + 1)
-        rows[freedom] = place - 1 if isinstance(wanted, int) else place
+        rows[freedom] = row
         scale.append(1.0 if freedom.is_rotation else given.units.length)
     energy = given.units.length**2
     found = matrix_receiver(

@@ -5,8 +5,8 @@ All bodies add with their phases,
 .. math:: \hat p(f, \theta) = \frac{\rho c}{r} \sum_s D_s(f, \theta)\, y_s(f),
 
 with the velocity spectra :math:`y_s` of the fields of each body under all forces.  It is the far
-field, in the free, without the travel time; on one mount all bodies move alike, and its motion
-counts once.
+field, in the free, without the travel time, up to where the elements hold; on one mount all bodies
+move alike, and its motion counts once.
 """
 
 from collections.abc import Mapping
@@ -29,6 +29,7 @@ __all__ = ["own_sound"]
 
 _RATE = 48e3  # [Hz] of sound
 _HEARING = 20e3  # [Hz]
+_EDGE = 1.01 * 10**0.05  # over the middle of a band, with a margin
 _LEAD, _RINGS = 5e-3, 0.03  # [s] before the forces and after them
 _MOST = 40000  # lines
 
@@ -75,7 +76,11 @@ def own_sound(
         pressure += around.elements[own.name].far_pressure(f[1:], fields)
     share = np.interp(f[1:], around.octaves.middle, np.sqrt(around.share))
     pressure *= around.air.impedance / distance * share[:, None]
-    heard = around.octaves.high <= 1.01 * 10**0.05 * _HEARING
+    top = min(_HEARING, *(around.elements[own.name].holds_up_to for own in used))
+    heard = around.octaves.high <= _EDGE * top
+    if not np.any(heard):
+        return None
+    pressure[f[1:] > _EDGE * top] = 0.0
     low, high = around.octaves.low[heard, None], around.octaves.high[heard, None]
     df = float(f[1])
     inside = np.minimum(f[1:] + df / 2, high) - np.maximum(f[1:] - df / 2, low)

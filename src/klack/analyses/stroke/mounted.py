@@ -2,11 +2,16 @@
 
 What pushes moving parts against the ground in the network pushes them against the surface that
 ``noise.reactions`` names; so within the valve all forces cancel.
+
+The whole may drift without bounds, on an infinite plate or as a free body. Points of moving bodies
+are therefore recorded as seen from the stop of the valve that is named; centres of mass and the
+valve itself as seen from the ground.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
 import scipy
 
 from klack.acoustics.at_mounts import points_of
@@ -24,8 +29,11 @@ from klack.mechanics.friction import GuideFriction
 from klack.network.component import Component
 from klack.network.network import Network
 from klack.network.port import Role
+from klack.network.rows import Rows
+from klack.simulation.network_result import NetworkResult
+from klack.units import format_si
 
-__all__ = ["STANDING", "standing_network"]
+__all__ = ["STANDING", "moving_note", "seen_from_valve", "standing_network"]
 
 STANDING = "mounted"
 """Component of all held bodies; its ports are named BODY-PORT."""
@@ -87,11 +95,45 @@ def standing_network(valve: Valve, network: Network) -> Network:
     return replace(network, components={**kept, **components}, connections=connections)
 
 
+def seen_from_valve(result: NetworkResult, rows: Rows, stops: Sequence[str]) -> NetworkResult:
+    """Points of moving bodies as seen from the first of some stops that the valve has."""
+    whole = next((row for row in rows.bodies if row.body.momentum is not None), None)
+    if whole is None:
+        return result
+    held = dict(zip(whole.ports, whole.names, strict=True))
+    ends = {row.component: (row.upper, row.lower) for row in rows.interfaces}
+    places = [held[end] for stop in stops for end in ends.get(stop, ()) if end in held]
+    channels = dict(result.channels)
+    for row in rows.bodies if places else ():
+        for point in row.names if row.body.rigid_count > 0 and row.course is None else ():
+            for what in ("displacement", "velocity"):
+                key, place = f"{row.component}.{point} {what}", f"{STANDING}.{places[0]} {what}"
+                moved = channels[key].values - channels[place].values
+                channels[key] = replace(channels[key], values=moved)
+    return replace(result, channels=channels)
+
+
+def moving_note(variant: str, result: NetworkResult) -> str:
+    """How far the valve of a mounted variant moves, and from where lift counts."""
+    ways = [
+        float(np.abs(data.values).max())
+        for name, data in result.channels.items()
+        if name.startswith(f"{STANDING}.") and name.endswith(" displacement")
+    ]
+    if not variant.endswith("mounted") or not ways:
+        return ""
+    return (
+        f"'{variant}': the valve itself moves by up to {format_si(max(ways), 'm', 3)}. Lift and "
+        "motion of other points of moving bodies count from its seat, which moves with it; "
+        "speeds of centres of mass from the ground."
+    )
+
+
 def _connections(
     network: Network, held: Mapping[str, FlexibleBody], noise: CaseNoise
 ) -> list[list[str]]:
     """Connections of a network with one body for those held, and reactions in their places."""
-    given, homeless = noise.reactions or {}, []
+    given, homeless, ends = noise.reactions or {}, [], []
     found: list[list[str]] = []
     loose: list[tuple[str, str]] = [(port, port.partition(".")[0]) for port in _standing(network)]
     for connection in network.connections:
@@ -102,8 +144,10 @@ def _connections(
             found.append(ports)
     for port, component in loose:
         place = given.get(component)
-        if place is None or (isinstance(place, SurfaceName) and port == component):
+        if place is None:
             homeless.append(component)
+        elif isinstance(place, SurfaceName) and port == component:
+            ends.append(component)
         elif isinstance(place, SurfaceName):
             _meet(found, f"{STANDING}.{place.body}-{place.surface}", port)
     if homeless:
@@ -113,6 +157,14 @@ def _connections(
             expected="a surface of a held body for each component with an end on the ground, "
             "'outside' for each that acts from outside",
             hint=f"add, for example, noise.reactions: {{{homeless[0]}: BODY.SURFACE}}.",
+        )
+    if ends:
+        raise InputError(
+            f"noise.reactions.{ends[0]}",
+            got=f"a surface for '{ends[0]}', which has no second end that could push it",
+            expected="'outside' in a run on the machine, which leaves this reaction out",
+            hint="take a component with two ends, such as a solenoid or a spring; or run the "
+            "variant dry, whose noise has the reaction.",
         )
     return found
 

@@ -16,7 +16,7 @@ from klack.analyses.record import case_fields, run_fields
 from klack.analyses.stroke.acting import acting_forces, fluid_passages, moving_bodies
 from klack.analyses.stroke.controllers import controller_notes
 from klack.analyses.stroke.missing import cut_records, missing_notes, rest_note
-from klack.analyses.stroke.mounted import STANDING, standing_network
+from klack.analyses.stroke.mounted import moving_note, seen_from_valve, standing_network
 from klack.analyses.stroke.record import (
     FluidSummary,
     IncompleteStrokeError,
@@ -127,11 +127,12 @@ def stroke_notes(
         if not any(note in other for other in warned)  # a warning already
     ]
     at_rest = [rest_note(name, variant.result, seat) for name, variant in variants.items()]
+    moving = [moving_note(name, variant.result) for name, variant in variants.items()]
     return (
         *controller_notes(case),
         *warned,
         *begun,
-        *filter(None, at_rest),
+        *filter(None, [*at_rest, *moving]),
         *_record_notes(case, variants),
     )
 
@@ -472,6 +473,7 @@ def variant_of(
     setup_time: float = 0.0,
 ) -> StrokeVariant:
     """Record of one variant, with the times of its needle."""
+    result = seen_from_valve(result, rows, (roles.seat, roles.opening_stop))
     times = all_lift_times(result, rows, roles.needle, roles.point)
     wet, flexible = not name.startswith("dry"), not name.endswith("lumped")
     return StrokeVariant(
@@ -506,7 +508,7 @@ def _label(valve: Valve, rows: Rows, *, wet: bool, flexible: bool) -> str:
         return f"{fluid}, rigid bodies on {lumped.stiffness / 1e6:.4g} N/um"
     if not any(elastic):
         return f"{fluid}, rigid bodies"
-    where = ", on its machine" if any(row.component == STANDING for row in rows.bodies) else ""
+    where = ", on its machine" if any(row.body.momentum is not None for row in rows.bodies) else ""
     return f"{fluid}, {' + '.join(str(count) for count in elastic)} modes{where}"
 
 
