@@ -345,7 +345,7 @@ def test_directivity_ends_where_elements_hold(impact, monkeypatch):
     directivity, click = own_sound_charts(SimpleNamespace(designs=[found]))
     labels = [curve.label for curve in directivity.panels[0].curves]
     assert len(labels) == 3
-    assert "to 5 kHz" in click.note.replace("\xa0", " ")
+    assert "to 5.0 kHz" in click.note.replace("\xa0", " ")
 
 
 def test_surfaces_that_enclose_nothing_radiate_as_pistons_and_say_so(impact):
