@@ -384,6 +384,10 @@ def test_a_component_with_the_name_of_the_whole_is_none_elsewhere() -> None:
     assert "machine" not in study.variants["dry"].label
     with pytest.raises(InputError, match="the name 'mounted'"):
         run_stroke(case, variants=("dry-mounted",), threads=1)
+    text = CASE.read_text().replace("base", "flange").replace("name: seat", "name: z")
+    text = text.replace("points: [seat]", "points: [z]").replace("flange.seat", "flange.z")
+    with pytest.raises(InputError, match="'flange-z' of a mount, which is also flange and z"):
+        run_stroke(read_valve_case(text, CASE), variants=("dry-mounted",), threads=1)
 
 
 def test_force_on_the_plate_in_the_run_and_by_coupling(sheet: StrokeStudy) -> None:

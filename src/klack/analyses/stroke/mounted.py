@@ -84,6 +84,14 @@ def standing_network(valve: Valve, network: Network) -> Network:
     }
     connections = _connections(network, held, noise)
     reduced, places = _reduced(structures, standing)
+    if both := [key for key in standing.dampers if key in places]:
+        raise InputError(
+            "noise.mounts",
+            got=f"the motion '{both[0]}' of a mount, which is also "
+            f"{' and '.join(places[both[0]])}, body and surface",
+            expected="different names of mounts and bodies",
+            hint="rename the mount.",
+        )
     used = {p.partition(".")[2] for c in connections for p in c if p.startswith(f"{STANDING}.")}
     connections += [[f"{STANDING}.{key}", f"{STANDING}-{key}.body"] for key in standing.dampers]
     points_used = [name for name in reduced.port_names if name in used or name not in places]
