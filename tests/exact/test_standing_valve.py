@@ -20,8 +20,9 @@ from klack.acoustics.receivers.modal import (
 )
 from klack.acoustics.receivers.plates import InfinitePlate
 from klack.acoustics.standing import StandingValve, standing_valve
+from klack.analyses.noise.body import Transfers
 from klack.analyses.noise.in_machine import in_machine, installed
-from klack.analyses.noise.machine import machine_of
+from klack.analyses.noise.machine import Machine, machine_of
 from klack.analyses.noise.source import stroke_sources
 from klack.analyses.stroke.record import StrokeStudy
 from klack.analyses.stroke.run import run_stroke
@@ -240,6 +241,41 @@ def test_what_hangs_is_stable() -> None:
     hangs = found.omega <= 2.0 * np.pi * 0.1
     assert hangs.any()
     assert np.all(found.damping[hangs] > 0.0)
+
+
+def test_points_of_a_study_do_not_take_each_others_machine() -> None:
+    """Another thread stores its own between what this one stores and returns."""
+
+    class Interrupted(Transfers):
+        def __setattr__(self, name: str, value: object) -> None:
+            super().__setattr__(name, value)
+            if name == "_machine" and value is not None:
+                self.__dict__[name] = ("other",), machines[1]
+
+    def machine(stiffness: float) -> Machine:
+        return Machine(
+            receiver=grounded({3: stiffness}, (FLANGE,)),
+            placements={},
+            isolators={},
+            missing={},
+            words=("", ""),
+            known=None,
+            causal=True,
+        )
+
+    machines = [machine(1e6), machine(2e6)]
+    transfers = Interrupted()
+    found = transfers.machine(("this",), lambda: machines[0])
+    s, others = laplace(F), laplace(2.0 * F)
+
+    class Hasty(type(found.receiver)):  # type: ignore[misc]
+        def __setattr__(self, name: str, value: object) -> None:
+            super().__setattr__(name, value)
+            if name == "_last" and value is not None:
+                self.__dict__[name] = others, machines[0].receiver.at(others)
+
+    answered = Hasty(found.receiver).at(s).mobility
+    assert np.array_equal(answered, machines[0].receiver.at(s).mobility)
 
 
 # --------------------------------------------------------------------------- in time

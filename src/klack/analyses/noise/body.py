@@ -220,9 +220,11 @@ class _Remembered:
 
     def at(self, s: Complexes) -> ReceiverResponse:
         """As the receiver does."""
-        if self._last is None or not np.array_equal(self._last[0], s):
-            self._last = s, self._receiver.at(s)
-        return self._last[1]
+        last = self._last  # threads of a study share it
+        if last is None or not np.array_equal(last[0], s):
+            last = s, self._receiver.at(s)
+            self._last = last
+        return last[1]
 
 
 class Transfers:
@@ -235,10 +237,12 @@ class Transfers:
 
     def machine(self, described: tuple[object, ...], make: Callable[[], Machine]) -> Machine:
         """The machine of a case, made and answered once while what describes it stays."""
-        if self._machine is None or self._machine[0] != described:
+        kept = self._machine  # threads of a study share it
+        if kept is None or kept[0] != described:
             made = make()
-            self._machine = described, replace(made, receiver=_Remembered(made.receiver))
-        return self._machine[1]
+            kept = described, replace(made, receiver=_Remembered(made.receiver))
+            self._machine = kept
+        return kept[1]
 
     def elements(
         self, structures: tuple[Structure, ...], sound_speed: float, compute: Callable[[], Elements]
