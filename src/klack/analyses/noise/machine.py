@@ -314,7 +314,8 @@ def _model(
 def _of_matrices(given: NoiseMatrices, points: tuple[InterfacePoint, ...]) -> tuple[Receiver, str]:
     """By all modes; translations of the file have its length, rotations are radians."""
     held = read_reduced_matrices(given.file)
-    size, rows, scale = len(held.K), {}, []
+    size, scale = len(held.K), []
+    rows: dict[Freedom, int] = {}
     for name, wanted in given.rows.items():
         mount, _, direction = name.partition(".")
         place = held.names.index(wanted) if wanted in held.names else wanted
