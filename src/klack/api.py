@@ -373,12 +373,10 @@ class Result:
 
     def __repr__(self) -> str:
         every = self.measures
-        keys = next(iter(every.values()), {}).keys()
-        alike = [name for name, numbers in every.items() if numbers.keys() == keys][:_LINES]
         lines = [f"{self.analysis.form.command}: {self.record.title or self.record.case}"]
-        lines += [f"  {name}: {_short(every[name])}" for name in alike]
-        if len(every) > len(alike):
-            lines.append(f"  and {len(every) - len(alike)} more in measures")
+        lines += [f"  {name}: {_short(every[name])}" for name in list(every)[:_LINES]]
+        if len(every) > _LINES:
+            lines.append(f"  and {len(every) - _LINES} more in measures")
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:

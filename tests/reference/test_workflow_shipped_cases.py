@@ -320,9 +320,11 @@ def test_it_opens_closes_and_comes_to_rest_open(study: StrokeStudy):
 
 
 def test_nothing_speaks_against_the_set_up(study: StrokeStudy):
-    # but impacts on a stop after several bounces, which depend on the steps for good
+    # but impacts on a stop after several bounces, which depend on the steps for good, and the
+    # liquid of the armature, which the case leaves out and says so
     assert all(
-        note.partition("': ")[2].startswith("with all time steps") for note in study.warnings
+        note.partition("': ")[2].startswith("with all time steps") or "displaces liquid" in note
+        for note in study.warnings
     )
     assert [body.name for body in study.bodies] == ["needle", "housing", "pole"]
     assert study.variants["wet"].modes == 81
