@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from klack.report.chart import COLOURS
 from klack.report.printed import STYLE, svg
-from klack.verification.ball_on_rock import STEEP, computed_pulse, measured_pulses
+from klack.verification.ball_on_rock import computed_pulse, steep_pulses
 from klack.verification.half_space import oblique_spheres
 from klack.verification.measured import SHOTS, struck_bar
 from klack.verification.pole_in_yoke import FIELD, MEASURED, network_points
@@ -143,8 +143,8 @@ def ball_on_rock() -> Figure:
     """Surface velocity over time, over its first extreme."""
     figure = Figure(figsize=(6.4, 3.4), layout="constrained")
     axes = figure.add_subplot()
-    steep = [one for one in measured_pulses() if one.angle < STEEP]
-    shapes = np.array([one.velocity / one.velocity[one.extremes[0]] for one in steep])
+    steep = steep_pulses()
+    shapes = np.array([one.shape for one in steep])
     time = 1e6 * steep[0].time
     axes.plot(time, shapes.mean(axis=0), color=COLOURS["blue"], lw=2.0,
               label=f"measured, mean of {len(steep)} places")  # fmt: skip
@@ -152,7 +152,7 @@ def ball_on_rock() -> Figure:
                       alpha=0.25, lw=0, label="80 % of them")  # fmt: skip
     pulse = computed_pulse()
     seen = slice(None, None, 5)
-    axes.plot(1e6 * pulse.time[seen], pulse.velocity[seen] / pulse.velocity[pulse.extremes[0]],
+    axes.plot(1e6 * pulse.time[seen], pulse.shape[seen],
               color=COLOURS["black"], lw=1.3, ls="--", label="computed")  # fmt: skip
     axes.set(xlabel="time since the P wave [us]", xlim=(-1.0, 8.0), ylim=(-0.9, 1.1),
              ylabel="velocity over its first extreme")  # fmt: skip

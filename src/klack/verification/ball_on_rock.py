@@ -14,11 +14,9 @@ from klack.analyses.impact.run import run_impact
 from klack.case.reader import find_case, read_case
 from klack.verification.check import Check, ComparedCurve, check
 
-__all__ = ["STEEP", "Pulse", "ball_on_rock", "computed_pulse", "measured_pulses"]
+__all__ = ["Pulse", "ball_on_rock", "computed_pulse", "measured_pulses", "steep_pulses"]
 
-STEEP = 45.0
-"""Angle [deg] of the ray to the normal of the struck face, up to which the check goes."""
-
+_STEEP = 45.0  # [deg] from the normal of the struck face, up to which the check goes
 _PLACE, _P_WAVE = (50e-3, 70e-3), 6200.0  # beside and below the impact [m], [m/s]
 _SOURCE = (
     "drops of a steel ball of 2 mm from 0.5 m, kura-okubo/4mNonSelfSim_Paper (MIT), shipped with "
@@ -55,10 +53,14 @@ class Pulse:
         return float(self.time[second] - self.time[first])
 
     @property
+    def shape(self) -> NDArray[np.float64]:
+        """Velocity over its first extreme [-]."""
+        return self.velocity / self.velocity[self.extremes[0]]
+
+    @property
     def ratio(self) -> float:
         """Second extreme over the first [-]."""
-        first, second = self.extremes
-        return float(self.velocity[second] / self.velocity[first])
+        return float(self.shape[self.extremes[1]])
 
 
 def measured_pulses() -> list[Pulse]:
@@ -68,6 +70,11 @@ def measured_pulses() -> list[Pulse]:
     angles = [float(name.split(":")[1]) for name in lines[0].split(",")[1:]]
     time, *traces = np.array([line.split(",") for line in lines[1:]], dtype=float).T
     return [Pulse(*one) for one in zip(angles, [time] * len(angles), traces, strict=True)]
+
+
+def steep_pulses() -> list[Pulse]:
+    """Those that the check compares: rays within 45 degrees of the normal."""
+    return [one for one in measured_pulses() if one.angle < _STEEP]
 
 
 def computed_pulse() -> Pulse:
@@ -85,8 +92,8 @@ def computed_pulse() -> Pulse:
 def ball_on_rock() -> Check:
     """Time between the extremes, against the middle of the measured ones."""
     pulse = computed_pulse()
-    steep = [one for one in measured_pulses() if one.angle < STEEP]
-    mean = np.mean([one.velocity / one.velocity[one.extremes[0]] for one in steep], axis=0)
+    steep = steep_pulses()
+    mean = np.mean([one.shape for one in steep], axis=0)
     seen = slice(None, None, 5)
     return check(
         "steel ball on rock, velocity 86 mm away: first to second extreme [us]",
@@ -99,9 +106,6 @@ def ball_on_rock() -> Check:
             x_label="time since the P wave [us]",
             y_label="velocity over its first extreme [-]",
             expected=(1e6 * steep[0].time, mean),
-            computed=(
-                1e6 * pulse.time[seen],
-                (pulse.velocity / pulse.velocity[pulse.extremes[0]])[seen],
-            ),
+            computed=(1e6 * pulse.time[seen], pulse.shape[seen]),
         ),
     )

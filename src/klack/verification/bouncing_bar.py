@@ -9,7 +9,6 @@ periods; so the second contact is the first one backwards in time, and all begin
 """
 
 from collections.abc import Iterator
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,7 +57,6 @@ def bounce(level: str, size: int, *, duration: float) -> ImpactHistory:
     duration [T]
     """
     back = RETURN_TIME[level]
-    weighing = partial(_weight, back=back)
     if level == "full":
         area = 1e-4
         return drop_rod(
@@ -66,19 +64,24 @@ def bounce(level: str, size: int, *, duration: float) -> ImpactHistory:
             elements=size,
             area=area,
             speed=_SPEED,
-            weight=weighing(STEEL.density * area * _LENGTH),
+            weight=_weight(STEEL.density * area * _LENGTH, back),
             returns=duration,
         ).history
     step, end = back / 4000, duration * back
     if level == "interface":
         model = free_rod(size, stiffness=1e30)
         return simulate_interface(
-            model, speed=_SPEED, duration=end, step=step, force=weighing(model.mass), points=False
+            model,
+            speed=_SPEED,
+            duration=end,
+            step=step,
+            force=_weight(model.mass, back),
+            points=False,
         ).history
     bar = steel_rod("bar", _LENGTH, size)
     rest = LinearLaw(1.0 / float(bar.residual_compliance[0, 0]))
     wall = fixed_body("wall", port="top")
-    system = one_contact(bar, wall, rest, gap=1e-9, press=weighing(bar.mass))
+    system = one_contact(bar, wall, rest, gap=1e-9, press=_weight(bar.mass, back))
     return simulate_impact(system, speed=_SPEED, step=step, duration=end)
 
 
@@ -133,7 +136,7 @@ def bouncing_bar_checks(level: str, size: int, tolerance: float, late: float) ->
     yield check(f"{name}: second touch [2 L/c]", 4.0, touch, late, source, curve)
 
 
-def _weight(mass: float, *, back: float) -> float:
+def _weight(mass: float, back: float) -> float:
     return 2.0 / 3.0 * mass * _SPEED / back
 
 

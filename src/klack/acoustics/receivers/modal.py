@@ -195,7 +195,7 @@ def matrix_receiver(
     refuse_if(
         lost > _LOST,
         "noise.receiver.matrices",
-        got=f"a mode at {lost / np.sqrt(noise / squares[-1]):.2g} Hz, beside which those below "
+        got=f"a mode at {np.sqrt(squares[-1]) / (2.0 * np.pi):.2g} Hz, beside which those below "
         f"{lost:.2g} Hz are lost in round-off",
         expected=f"round-off below {_LOST:g} Hz",
         hint="condense rows of next to no mass, and what a penalty holds.",
