@@ -37,6 +37,7 @@ from klack.case import load_case
 from klack.case.guide import Placement
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.machine.progress import silent
+from klack.transient.interface_kernel import march
 
 pytestmark = pytest.mark.slow
 
@@ -86,9 +87,15 @@ def columns_of(outcomes: list[ShotOutcome]) -> ShotColumns:
     return ShotColumns.of([outcome.numbers for outcome in outcomes])
 
 
-def same(one: ShotColumns, other: ShotColumns) -> None:
+ROUND_OFF = 1e-12
+"""Of a time, a speed, an energy: a process may round differently where it chooses its BLAS."""
+
+
+def same(one: ShotColumns, other: ShotColumns, error: float = 0.0) -> None:
     for field in fields(ShotColumns):
-        np.testing.assert_array_equal(getattr(one, field.name), getattr(other, field.name))
+        np.testing.assert_allclose(
+            getattr(one, field.name), getattr(other, field.name), rtol=error, atol=error
+        )
 
 
 def test_a_centred_rebound_is_a_throw(model, centred):
@@ -145,9 +152,18 @@ def test_two_processes_give_the_same_numbers(model, draws, alone):
     log = shot_log(None, "")
     run_shots_on(2, model.setup, draws, log, silent)
 
-    same(columns_of([log.done[draw.index] for draw in draws]), columns_of(alone))
+    same(columns_of([log.done[draw.index] for draw in draws]), columns_of(alone), ROUND_OFF)
     for draw, outcome in zip(draws, alone, strict=True):
-        np.testing.assert_array_equal(log.done[draw.index].height, outcome.height)
+        scale = np.abs(outcome.height).max()
+        np.testing.assert_allclose(
+            log.done[draw.index].height / scale, outcome.height / scale, atol=1e-6
+        )
+
+
+def test_arrays_are_whole_as_other_processes_get_them(alone):
+    # a strided one would have machine code of its own, which rounds differently on some processors
+    assert "C)" in str(march.nopython_signatures)
+    assert ", A)" not in str(march.nopython_signatures)
 
 
 def test_an_interrupted_study_goes_on_with_the_same_numbers(study, alone):

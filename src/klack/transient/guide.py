@@ -169,7 +169,7 @@ def guide_at_sections(
             )
     centre = np.array([section.centre for section in sections])
     return Guide(
-        heights=centre[:, 2],
+        heights=np.ascontiguousarray(centre[:, 2]),
         clearance=np.full(count, clearance),
         offset=np.ascontiguousarray(centre[:, :2]),
         traces=np.ascontiguousarray(motion[:, :2]),
