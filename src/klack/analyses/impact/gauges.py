@@ -11,6 +11,11 @@ forces *f* (mode acceleration; Craig & Kurdila 2006, ch. 17).  The level ``reduc
 pressure pattern of its contact port for all forces: near the contact its gauges are no better than
 that.  A velocity is that of the modes alone.  Constant forces and springs act on the whole body
 like its weight, so they move it and do not strain it.
+
+Waves shorter than those of the kept modes are missing: in a bar these are the parts of the force
+above the highest kept mode, which at *f* are :math:`1 / (2 \pi f T)` of the peak of a half sine of
+the duration *T*; in a block they are those of its rate.  What the upper modes add to the static
+answer of the lower ones tells how far a gauge has settled (``upper_share``).
 """
 
 import warnings
@@ -37,6 +42,9 @@ from klack.transient.result import MotionOfBody, Snapshots
 __all__ = ["FullGauges", "interface_gauges", "modal_motion", "with_reduced_gauges"]
 
 Floats = NDArray[np.float64]
+
+_UPPER = 0.5**0.5
+"""Of the highest frequency: above it is half of the modes of a plane body."""
 
 
 # ------------------------------------------------------------------------ full order
@@ -87,10 +95,15 @@ class FullGauges:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ModalMotion:
-    """Modes over time, displacement and velocity, (n + 1, m) each."""
+    """Modes over time, displacement and velocity, (n + 1, m) each; ``omega`` (m,) [rad/s].
 
+    ``waves``: displacement beyond the static one under the same loads; 0 of rigid modes.
+    """
+
+    omega: Floats
     q: Floats
     v: Floats
+    waves: Floats
 
 
 def modal_motion(
@@ -132,7 +145,10 @@ def modal_motion(
         (p1, z1), (p2, z2) = states
         q[:, i] = ((z1 - z2) / (p1 - p2)).real
         v[:, i] = ((p1 * z1 - p2 * z2) / (p1 - p2)).real
-    return ModalMotion(q=q, v=v)
+    elastic = omega > 0.0
+    waves = np.zeros_like(q)
+    waves[:, elastic] = q[:, elastic] - _at_edges(loads[:, elastic]) / omega[elastic] ** 2
+    return ModalMotion(omega=omega, q=q, v=v, waves=waves)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -153,7 +169,22 @@ class _Response:
                 values = self.motion.v @ self.shapes[k]
             else:
                 values = self.motion.q @ self.shapes[k] + self.extra[:, k]
-            yield gauge.record(history.start, history.step, values)
+            record = gauge.record(history.start, history.step, values)
+            yield self._judged(record, self.shapes[k])
+
+    def _judged(self, record: GaugeRecord, shape: Floats) -> GaugeRecord:
+        """With its highest mode, and what the upper half of the modes in a plane adds."""
+        motion = self.motion
+        omega = np.where(shape == 0.0, 0.0, motion.omega)
+        upper = omega > _UPPER * omega.max(initial=0.0)
+        moved = motion.v if record.kind == "velocity" else motion.waves
+        added = replace(record, exact=moved[:, upper] @ shape[upper])
+        peak = float(np.abs(record.values).max())
+        return replace(
+            record,
+            kept_up_to=float(omega.max(initial=0.0)) / (2.0 * np.pi),
+            upper_share=float(np.abs(added.values).max()) / peak if peak > 0.0 else 0.0,
+        )
 
 
 def _at_edges(values: Floats) -> Floats:

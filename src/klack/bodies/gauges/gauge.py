@@ -1,6 +1,7 @@
 """A gauge on a body, and its record over time."""
 
 from dataclasses import dataclass
+from math import inf
 from typing import Literal
 
 import numpy as np
@@ -66,6 +67,10 @@ class GaugeRecord:
         The clock is that of the contact force.
     exact (n,)
         Before the low pass, in :attr:`unit`; tension and motion along the direction are positive.
+    kept_up_to [Hz]
+        Highest mode that it sees; infinite where every degree of freedom moves.
+    upper_share [-]
+        What the modes above 0.7 of that add, over its highest value.
     """
 
     name: str
@@ -76,6 +81,8 @@ class GaugeRecord:
     step: float
     exact: Floats
     low_pass: LowPass | None = None
+    kept_up_to: float = inf
+    upper_share: float = 0.0
 
     @property
     def unit(self) -> str:
