@@ -16,6 +16,7 @@ import pytest
 from scipy.integrate import simpson
 
 from klack.acoustics.boundary import outline
+from klack.acoustics.mount import Mount
 from klack.analyses.impact.analysis import IMPACT
 from klack.analyses.noise.analysis import NOISE
 from klack.analyses.noise.content import noise_content
@@ -23,8 +24,10 @@ from klack.analyses.noise.figures import own_sound_charts
 from klack.analyses.noise.own_sound import own_sound
 from klack.analyses.noise.record import NoiseDesign
 from klack.analyses.noise.run import noise_design
+from klack.analyses.noise.sounds import study_sounds
 from klack.analyses.noise.source import load_sources
 from klack.cli.main import main
+from klack.errors import AccuracyWarning
 
 ROOT = Path(__file__).parents[2]
 HOW_TO = ROOT / "docs" / "how-to"
@@ -323,8 +326,45 @@ def test_boundary_elements_take_off_what_a_small_valve_cannot_radiate(impact):
         energy = float((series.values**2).sum() * series.step)
         assert own.exposure[:-1, angle].sum() < energy < 1.02 * own.exposure[:, angle].sum()
         assert np.abs(series.values[-100:]).max() < 1e-4 * np.abs(series.values).max()
-    names = [chart.name for chart in own_sound_charts(SimpleNamespace(designs=[found]))]
-    assert names == ["directivity", "own-click"]
+    study = SimpleNamespace(designs=[found])
+    assert [chart.name for chart in own_sound_charts(study)] == ["directivity", "own-click"]
+    files = {name: pressure for name, _, pressure in study_sounds(study)}
+    assert list(files)[:2] == ["click.wav", "pattern.wav"]
+    assert files["own-surface-on-the-axis.wav"] is own.axis
+    assert files["own-surface-beside.wav"] is own.side
+
+
+def test_a_record_without_room_for_its_sound_is_named(impact, monkeypatch):
+    """Truth: 1 s of force does not fit into half of a period of 1.67 s."""
+
+    def longer(source, acting, around, distance):
+        slow = {
+            body: {key: replace(x, step=1.0 / x.values.size) for key, x in forces.items()}
+            for body, forces in acting.items()
+        }
+        return own_sound(source, slow, around, distance)
+
+    monkeypatch.setattr("klack.analyses.noise.run.own_sound", longer)
+    with pytest.warns(AccuracyWarning, match="last 1 s, more than 800 ms"):
+        assert sounding(impact, radiation="elements").own_sound is None
+
+
+def test_a_valve_that_rings_on_is_heard_longer(impact, monkeypatch):
+    """On a mount of 8 kHz the energy falls as exp(-2 pi f eta t); 1e-4 of it is cut off."""
+
+    def kept(loss_factor):
+        def on(source, acting, around, distance):
+            mass = sum(own.mass for own in source.structures)
+            mount = Mount(stiffness=(16e3 * np.pi) ** 2 * mass, loss_factor=loss_factor, mass=mass)
+            return own_sound(source, acting, replace(around, plate=None, mount=mount), distance)
+
+        monkeypatch.setattr("klack.analyses.noise.run.own_sound", on)
+        side = sounding(impact, radiation="elements").own_sound.side
+        return side.start + side.values.size * side.step
+
+    assert kept(3e-3) == pytest.approx(np.log(1e4) / (2.0 * np.pi * 8e3 * 3e-3), rel=0.01)
+    with pytest.warns(AccuracyWarning, match="rings for longer than 110 ms"):
+        kept(1e-4)
 
 
 def test_directivity_ends_where_elements_hold(impact, monkeypatch):

@@ -25,7 +25,8 @@ from klack.analyses.noise.in_machine import in_machine, installed
 from klack.analyses.noise.machine import Machine, machine_of
 from klack.analyses.noise.source import stroke_sources
 from klack.analyses.stroke.record import StrokeStudy
-from klack.analyses.stroke.run import run_stroke
+from klack.analyses.stroke.run import run_stroke, variant_network
+from klack.assembling.valve import build_valve
 from klack.bodies.reduction.craig_bampton import CraigBampton
 from klack.case.any_case import read_valve_case
 from klack.case.noise import CaseNoise
@@ -37,7 +38,10 @@ from klack.mechanics.friction import GuideFriction
 from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring as ReturnSpring
 from klack.network.network import Network
+from klack.simulation.network_compile import compile_network
 from klack.simulation.network_run import simulate_network
+from klack.simulation.step_sizes import step_sizes
+from klack.simulation.tangent_numbers import numbers_at_rest
 
 F = np.geomspace(200.0, 15e3, 9)
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
@@ -449,6 +453,16 @@ def test_force_on_the_plate_in_the_run_and_by_coupling(sheet: StrokeStudy) -> No
         turn = np.exp(-1j * w * (result.time[1:] - 0.5 * step))
         direct = np.sum(means * turn) * step * np.sinc(record.frequency[k] * step)
         assert abs(joint.force[k] - direct) < tolerance * abs(direct)
+
+
+def test_numbers_of_the_whole_change_smoothly_with_its_steps() -> None:
+    """Truth: they are sines and cosines of modes in a step; an extremum of one is no jump."""
+    valve = build_valve(read_valve_case(CASE.read_text(), CASE))
+    rows = variant_network(valve, "dry-mounted").rows()
+    for step in (40e-9, 50e-9, 60e-9):
+        sizes = step_sizes(rows, "normal", step=step)
+        found = numbers_at_rest(compile_network(rows, sizes), None, [], sizes)
+        assert any(np.any(slope) for *_, slope in found.by_step)
 
 
 def test_a_variant_without_what_it_needs_is_refused() -> None:

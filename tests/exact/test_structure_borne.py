@@ -360,6 +360,17 @@ def test_missing_freedoms_are_listed_and_blocked_or_freed_on_demand() -> None:
     assert freed.force == pytest.approx(g[..., 0], rel=1e-9, abs=0)
 
 
+def test_what_a_known_receiver_does_is_not_assumed() -> None:
+    """Of a direction that it knows an error, of a mount in general a note; nothing changes."""
+    pair = Pair()
+    with pytest.raises(InputError, match=r"missing: a\.z: got 'free'"):
+        couple(pair.source, pair.receiver, missing={"a.z": "free"})
+    found = couple(pair.source, pair.receiver, missing={"a": "free"})
+    (note,) = found.notes
+    assert "missing: a: free has no effect" in note
+    assert np.array_equal(found.force, couple(pair.source, pair.receiver).force)
+
+
 def test_blocked_force_in_situ_through_isolators() -> None:
     """The interface is that of the source: what is below it, isolator and receiver, has no say."""
     pair = Pair()

@@ -331,6 +331,7 @@ def transformation(
     points = {point.name: point for point in receiver.points}
     rows, kept, open_ones = [], [], []
     taken: dict[str, list[str]] = {}
+    idle = {name for name in missing if name in mounts}
     for i, freedom in enumerate(freedoms):
         place = placements.get(freedom.point, Placement())
         name = place.point or freedom.point
@@ -342,7 +343,15 @@ def transformation(
             hint="say where the mount stands (placement: point).",
         )
         row, rest = _row(freedom, mounts[freedom.point], points[name], receiver.freedoms, place)
+        refuse_if(
+            rest <= _ALONG and str(freedom) in missing,
+            f"missing: {freedom}",
+            got=f"'{missing.get(str(freedom))}' for a direction in which the receiver is known",
+            expected="directions in which it is not",
+            hint=f"remove {freedom}: what the receiver does there counts.",
+        )
         if rest > _ALONG:
+            idle.discard(freedom.point)
             wanted = missing.get(str(freedom)) or missing.get(freedom.point)
             if wanted is None:
                 open_ones.append(str(freedom))
@@ -363,6 +372,10 @@ def transformation(
     notes = tuple(
         f"{', '.join(names)}: the receiver is not known there; taken as {wanted}."
         for wanted, names in taken.items()
+    )
+    notes += tuple(
+        f"missing: {name}: {missing[name]} has no effect: the receiver is known in all directions."
+        for name in sorted(idle)
     )
     return np.array(rows), kept, notes
 

@@ -129,6 +129,7 @@ STRETCH = 1
 _LONGER = 1e-4  # of the step, to either side: what a longer one changes
 _BENT = 0.1  # of a small change: more than this to one side only is a jump
 _ROUND_OFF = 1e-10  # of the largest number of a bundle: a change that tells nothing
+_WAVED = 1e-5  # the same with the step: modes that swing ten times in it turn over by chance
 _LEAST = {"at": 1.0, "g": 1.0, "force": 1.0, "force_before": 1.0}
 """Scale of bundles that may hold nothing but round-off, forces [N] and energies [J/kg]."""
 
@@ -244,7 +245,7 @@ def _slopes_by_step(network: CompiledNetwork, sizes: StepSizes) -> NetworkArrays
         for factor in (1.0, 1.0 + _LONGER, 1.0 - _LONGER)
     )
     longer, shorter = (_in_place(end, base) for end in ends)
-    found = _difference(base, longer, shorter, 2.0 * _LONGER, "length of the steps")
+    found = _difference(base, longer, shorter, 2.0 * _LONGER, "length of the steps", told=_WAVED)
     found = found._replace(lines=found.lines._replace(fraction=delay_slopes(base.lines)))
     for array in state_arrays(found):
         array[...] = 0.0
@@ -252,12 +253,21 @@ def _slopes_by_step(network: CompiledNetwork, sizes: StepSizes) -> NetworkArrays
 
 
 def _difference(
-    base: Any, plus: Any, minus: Any, distance: float, name: str, least: float = 0.0
+    base: Any,
+    plus: Any,
+    minus: Any,
+    distance: float,
+    name: str,
+    *,
+    least: float = 0.0,
+    told: float = _ROUND_OFF,
 ) -> Any:
     if isinstance(base, tuple):
         sizes = [_LEAST.get(field, 0.0) for field in getattr(base, "_fields", [""] * len(base))]
         parts = zip(base, plus, minus, sizes, strict=True)
-        return type(base)(*(_difference(*part[:3], distance, name, part[3]) for part in parts))
+        return type(base)(
+            *(_difference(*part[:3], distance, name, least=part[3], told=told) for part in parts)
+        )
     if isinstance(base, np.ndarray):
         if base.dtype != np.float64:
             return base
@@ -268,7 +278,7 @@ def _difference(
         known = np.isfinite(found)
         found, bend = np.where(known, found, 0.0), np.where(known, bend, 0.0)
         size = np.max(np.abs(base), initial=least, where=np.isfinite(base))
-        if np.any(np.abs(bend) > _BENT * np.abs(found) + _ROUND_OFF * size):
+        if np.any(np.abs(bend) > _BENT * np.abs(found) + told * size):
             raise _jumps(name)
         return found / distance
     return (plus - minus) / distance if isinstance(base, float) else base

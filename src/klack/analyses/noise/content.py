@@ -274,6 +274,8 @@ def _listen(study: NoiseStudy) -> Section:
             what = f"{design.settings.rate:.4g} clicks per second"
         elif name.startswith("click-at-"):
             what = f"one click {name.removesuffix('.wav').removeprefix('click-').replace('-', ' ')}"
+        elif name.startswith("own-surface"):
+            what = f"one click of the valve's own surface, {pressure.name}"
         whose = f"{design.name}, " if len(study.designs) > 1 else ""
         fits = length <= _LONGEST
         players.append(

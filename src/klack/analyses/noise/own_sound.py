@@ -9,6 +9,7 @@ field, in the free, without the travel time, up to where the elements hold; on o
 move alike, and its motion counts once.
 """
 
+import warnings
 from collections.abc import Mapping
 
 import numpy as np
@@ -23,7 +24,9 @@ from klack.analyses.noise.body import Surroundings, damped
 from klack.analyses.noise.record import SurfaceSound
 from klack.analyses.noise.source import NoiseSource
 from klack.arrays import Vector
+from klack.errors import AccuracyWarning
 from klack.signals.sampled import TimeSeries
+from klack.units import format_si
 
 __all__ = ["own_sound"]
 
@@ -31,7 +34,8 @@ _RATE = 48e3  # [Hz] of sound
 _HEARING = 20e3  # [Hz]
 _EDGE = 1.01 * 10**0.05  # over the middle of a band, with a margin
 _LEAD, _RINGS = 5e-3, 0.03  # [s] before the forces and after them
-_MOST = 40000  # lines
+_MOST = 40000  # lines; a record is at most half of the period that they make
+_RUNG = 1e-4  # share of the energy that is cut off
 
 
 def own_sound(
@@ -54,7 +58,14 @@ def own_sound(
         return None
     begin = min(force.start - 0.5 * force.step for force in forces) - _LEAD
     span = max(force.values.size * force.step for force in forces)
-    count = min(int(np.ceil(2.0 * (span + _LEAD + _RINGS) * _RATE)), _MOST)
+    length = span + _LEAD + _RINGS
+    if length * _RATE > _MOST:
+        _warn(
+            f"is left out: its forces last {format_si(span, 's', 3)}, more than "
+            f"{format_si(_MOST / _RATE - _LEAD - _RINGS, 's', 2)}. Try: a shorter run.duration"
+        )
+        return None
+    count = min(int(np.ceil(2.0 * length * _RATE)), _MOST)
     f = np.linspace(0.0, 0.5 * _RATE, count + 1)
 
     def spectrum_of(force: TimeSeries) -> tuple[Vector, Complexes]:
@@ -88,7 +99,14 @@ def own_sound(
         [np.zeros(2), pressure[:, [0, ANGLES.size // 2]] * audio_band(f[1:])[:, None]]
     )
     values = scipy.fft.irfft(limited, 2 * count, axis=0) * _RATE
-    kept = int((span + _LEAD + _RINGS) * _RATE)
+    most = 3 * count // 2  # of the period: at its end is what sharp ends of the band ring before
+    energy = np.cumsum(np.sum(values[:most] ** 2, axis=1))
+    kept = max(int(length * _RATE), int(np.searchsorted(energy, (1.0 - _RUNG) * energy[-1])))
+    if kept > 0.9 * most:
+        _warn(
+            f"rings for longer than {format_si(most / _RATE, 's', 2)}: its end is added to "
+            "its beginning. Try: the damping of the mounted valve"
+        )
     axis, side = (
         TimeSeries(step=1.0 / _RATE, start=begin, values=column[:kept].copy(), unit="Pa", name=name)
         for column, name in zip(values.T, ("on the axis", "beside"), strict=True)
@@ -99,4 +117,12 @@ def own_sound(
         exposure=np.maximum(inside, 0.0) @ (2.0 * np.abs(pressure) ** 2),
         axis=axis,
         side=side,
+    )
+
+
+def _warn(what: str) -> None:
+    warnings.warn(
+        f"The sound of the valve's own surface over angle and time {what}.",
+        AccuracyWarning,
+        stacklevel=3,
     )

@@ -1,6 +1,7 @@
 """Sound files of a noise study, to one scale."""
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 from klack.acoustics.drive_pattern import drive_pattern
@@ -15,20 +16,26 @@ StudySound = tuple[str, NoiseDesign, TimeSeries]
 
 
 def study_sounds(study: NoiseStudy) -> tuple[StudySound, ...]:
-    """One click of each design, then its drive pattern [Pa]; at further ears clicks."""
-    found: list[StudySound] = []
-    for design in study.designs:
-        if design.sound is None:
-            continue
+    """Clicks of each design and its drive pattern [Pa]; see :func:`_of_design`."""
+    return tuple(
+        (_file_name(what, study, design), design, pressure)
+        for design in study.designs
+        for what, pressure in _of_design(design)
+    )
+
+
+def _of_design(design: NoiseDesign) -> Iterator[tuple[str, TimeSeries]]:
+    """One click, its pattern, clicks at further ears and of the own surface."""
+    if design.sound is not None:
         click, settings = design.sound.pressure, design.settings
-        pattern = drive_pattern(click, settings.rate, settings.duration)
-        found.append((_file_name("click", study, design), design, click))
-        found.append((_file_name("pattern", study, design), design, pattern))
+        yield "click", click
+        yield "pattern", drive_pattern(click, settings.rate, settings.duration)
         for ear in design.machine.ears[1:] if design.machine else ():
             if ear.sound is not None:
-                name = _file_name(f"click-at-{ear.name}", study, design)
-                found.append((name, design, ear.sound.pressure))
-    return tuple(found)
+                yield f"click-at-{ear.name}", ear.sound.pressure
+    if design.own_sound is not None:
+        yield "own-surface-on-the-axis", design.own_sound.axis
+        yield "own-surface-beside", design.own_sound.side
 
 
 def common_full_scale(sounds: tuple[StudySound, ...]) -> float:
