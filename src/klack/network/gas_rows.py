@@ -5,7 +5,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["GasBranchRow", "GasChamberRow", "GasRows", "GasSourceRow", "GasWallRow"]
+__all__ = ["PASSED", "GasBranchRow", "GasChamberRow", "GasRows", "GasSourceRow", "GasWallRow"]
+
+PASSED = "passed mass"
+"""Channel of what a restriction has passed from a to b since the start [kg]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -52,8 +52,8 @@ def quantity(value: float, unit: str, digits: int = 4) -> str:
         return _NONE if value != value else "∞"
     if value == 0.0:
         return f"0{_space(unit)}"
-    if unit == "kg":
-        return quantity(1e3 * value, "g", digits)
+    if unit in ("kg", "kg/s"):
+        return quantity(1e3 * value, unit[1:], digits)
     pure = _PURE_POWER.fullmatch(unit)
     if pure is not None and abs(value) < _SMALL ** int(pure["power"]):
         value, unit = value * 1e3 ** int(pure["power"]), f"m{unit}"

@@ -19,6 +19,7 @@ import numpy as np
 from klack.arrays import Matrix, Vector
 from klack.contact.step_constants import LAW_RUBBING, LAW_YIELDING, NO_LAW
 from klack.errors import InputError
+from klack.network.gas_rows import PASSED
 from klack.network.rows import BranchRow, ElementRow, LineRow, Rows
 from klack.simulation.linear_rows import LinearRow, RowPoint, linear_row
 from klack.simulation.linear_system import LinearSystem, Signal
@@ -458,7 +459,7 @@ class _Assembly:
                     self._show(place.replace(" ", "_"), "force", "N", acts[p])
                     self._adds_force(f"{place}.force".replace(" ", "_"), port, 1.0)
                 for channel, form in zip(row.channels, law.channels @ forms, strict=True):
-                    if not any(channel.label.endswith(x) for x in ("driver state",)):
+                    if not any(channel.label.endswith(x) for x in ("driver state", PASSED)):
                         self._show(channel.owner or owner, channel.label, channel.unit, form)
                 k += 1
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from klack.case.valve_roles import ValveRoles
 from klack.magnetics.constant_drive import coils_of, current_left
+from klack.network.gas_rows import PASSED
 from klack.network.network import Network
 from klack.network.rows import Rows
 from klack.simulation.operating_point import OperatingPoint
@@ -16,7 +17,10 @@ __all__ = ["Measured", "measured"]
 Key = tuple[str, str, str]
 """Component, quantity and unit."""
 
-_NONE_AT_REST = ("velocity", "peak force", "film force", "driver state", "flow", "mass flow")
+_NONE_AT_REST = (
+    *("velocity", "peak force", "film force", "driver state", "flow", "mass flow"),
+    PASSED,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

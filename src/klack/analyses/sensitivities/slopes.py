@@ -193,8 +193,8 @@ _STAGE = "derivatives"
 
 
 def has_slope(item: ChosenMeasure) -> bool:
-    """Whether a measure has derivatives: times, impacts, energies and levels."""
-    if item.of == "impact":
+    """Whether a measure has derivatives: times, impacts, flows, energies and levels."""
+    if item.of in ("impact", "delivery") or item.name == "delivered_mass":
         return True
     if item.is_noise:
         return item.measure.unit in _OF_NOISE
@@ -333,11 +333,13 @@ class SlopeRunner:
     def _ahead(self, run: TangentRun, direction: int) -> Callable[[float], StrokeOfPoint]:
         """Stroke with the parameter of a direction changed by an amount."""
         name = run.directions[direction].name if run.directions else ""
+        end = float(run.moved(direction, 0.0).time[-1])
 
         def moved(amount: float) -> VariantRun:
             result = run.moved(direction, amount)
-            rows = self.rows({name: amount})  # stops may end another lift
-            variant = variant_of(self.valve, self.roles, self.name, rows, result)
+            valve = self.at({name: amount})  # stops may end another lift, drivers start later
+            rows = variant_network(valve, self.name).rows()
+            variant = variant_of(valve, self.roles, self.name, rows, result, until=end)
             return VariantRun(variant=variant, rows=rows, failure=None)
 
         @cache

@@ -28,7 +28,9 @@ from klack.analyses.json_parts import (
 from klack.analyses.measures import text_table
 from klack.analyses.store import RecordFormat
 from klack.analyses.stroke.axis import AxisPlace, axis_place, moves_in_space
+from klack.analyses.stroke.delivery import Delivery
 from klack.analyses.stroke.measures import (
+    DELIVERY_MEASURES,
     EVENT_MEASURES,
     NOT_REACHED,
     VARIANT_MEASURES,
@@ -37,6 +39,7 @@ from klack.analyses.stroke.measures import (
 )
 from klack.analyses.stroke.missing import cut_records
 from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
+from klack.analyses.stroke.stairs import STAIR_MEASURES
 from klack.analyses.stroke.step_check import CHANGE_MEASURES, NOTICED, ImpactChange
 from klack.analyses.stroke.times import LiftTimes, Passage
 from klack.bodies.reduction.structure import STRUCTURE_UNITS
@@ -57,6 +60,7 @@ __all__ = [
     "start_text",
     "stroke_answer",
     "time_rows",
+    "told_deliveries",
 ]
 
 
@@ -163,6 +167,26 @@ _FACES = JsonForm(
     Key("set_m", float, "By which they part later than when new.", "set"),
     Key("largest_force_N", float, "So far: up to it they are elastic from now on.", "force"),
 )
+_DELIVERY = JsonForm(
+    "DeliveryJson",
+    "What a restriction passes in the whole run (command 0) or from one command of its driver to "
+    "the next; positive from its port a to its port b.",
+    Key("component", str),
+    Key("command", int, of="pulse"),
+    Key("leads_out", bool, "To the surroundings, or to a given pressure.", "leads_out"),
+    *measured_keys(DELIVERY_MEASURES),
+)
+_STAIR = JsonForm(
+    "StairJson",
+    "One edge of the stairs that waves in a line leave in the velocity after an impact.",
+    Key("line", str),
+    Key("body", str),
+    Key("stop", str),
+    Key("impact", int, "On that stop, from 1."),
+    Key("echo", int, "Since the impact, from 1.", "number"),
+    Key("seen", bool, "Whether the step is above three times the scatter of the velocity."),
+    *measured_keys(STAIR_MEASURES),
+)
 _VARIANT = JsonForm(
     "VariantJson",
     "One variant of a stroke; opening and closing are those of the needle.",
@@ -191,6 +215,13 @@ _VARIANT = JsonForm(
         lambda of: cut_records(of.variant.result),
     ),
     Key("events", [_EVENT], "Impacts in the order of time.", _events),
+    Key("stairs", [_STAIR], "By line, body and impact.", "variant.stairs"),
+    Key(
+        "deliveries",
+        {str: _DELIVERY},
+        "By restriction, NAME, and its commands, NAME.1, NAME.2.",
+        "variant.deliveries",
+    ),
     *measured_keys(VARIANT_MEASURES, "variant"),
     *inherited(_TIMES, "variant.needle_times"),
     Key(
@@ -253,6 +284,8 @@ def stroke_told(study: StrokeStudy) -> Iterator[TextTable | str]:
         yield from _changes_told(variant)
         yield from _axis_told(study, variant)
         yield from yield_told(variant)
+    yield from deliveries_told(study)
+    yield from stairs_told(study)
     for stop in study.stops:
         if doubt := contact_doubt(stop):
             yield f"Impacts on '{stop.name}': {doubt}"
@@ -260,10 +293,48 @@ def stroke_told(study: StrokeStudy) -> Iterator[TextTable | str]:
             yield f"Impacts on '{stop.name}': {line}"
 
 
+def told_deliveries(variant: StrokeVariant) -> dict[str, Delivery]:
+    """What leaves and enters by each restriction, and by command where there are some."""
+    whole = {name: item for name, item in variant.deliveries.items() if not item.pulse}
+    out = {name: item for name, item in variant.deliveries.items() if item.leads_out}
+    several = {item.component for item in out.values() if item.pulse > 1}
+    return {
+        name: item
+        for name, item in (out or whole).items()
+        if not item.pulse or item.component in several
+    }
+
+
+def deliveries_told(study: StrokeStudy) -> Iterator[TextTable]:
+    """What leaves the valve, and enters it, in each variant with fluid."""
+    for variant in study.variants.values():
+        found = list(told_deliveries(variant).items())
+        if found:
+            title = f"{variant.name}: mass and volume that restrictions pass from a to b"
+            if len(found) > _TOLD:
+                title += f" (the first {_TOLD} of {len(found)}; all of them with --json)"
+            yield text_table(title, "restriction", DELIVERY_MEASURES, found[:_TOLD])
+
+
+def stairs_told(study: StrokeStudy) -> Iterator[TextTable]:
+    """Stairs after the impacts of each variant with lines."""
+    for variant in study.variants.values():
+        if found := variant.stairs:
+            title = f"{variant.name}: stairs in the velocity"
+            if len(found) > _TOLD:
+                title += f" (the first {_TOLD} of {len(found)}; all of them with --json)"
+            named = [(stair.name, stair) for stair in found[:_TOLD]]
+            yield text_table(title, "edge", STAIR_MEASURES, named)
+
+
 def stroke_measured(study: StrokeStudy) -> Iterator[Measured]:
     """Every variant and impact with its measures."""
     for name, variant in study.variants.items():
         yield name, variant, VARIANT_MEASURES
+        for restriction, found in variant.deliveries.items():
+            yield f"{name}, {restriction}", found, DELIVERY_MEASURES
+        for stair in variant.stairs:
+            yield f"{name}, {stair.name}", stair, STAIR_MEASURES
         counts, called = Counter[str](), list[str]()
         for event in variant.result.events:
             counts[event.stop] += 1
@@ -548,6 +619,8 @@ STROKE = StoredAnalysis(
     measures={
         "stroke variant": VARIANT_MEASURES,
         "impact of a stroke": EVENT_MEASURES,
+        "delivery of a restriction": DELIVERY_MEASURES,
+        "edge of the stairs of a stroke": STAIR_MEASURES,
         "impact of a stroke whose steps were doubled": CHANGE_MEASURES,
     },
     measured=stroke_measured,

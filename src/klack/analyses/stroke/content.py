@@ -1,7 +1,8 @@
 """Content of a stroke report."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import isfinite
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from klack.analyses.stroke.analysis import (
     start_text,
     stroke_answer,
     time_rows,
+    told_deliveries,
 )
 from klack.analyses.stroke.axis import (
     acts_across,
@@ -28,6 +30,7 @@ from klack.analyses.stroke.axis import (
 )
 from klack.analyses.stroke.figures import (
     actuation_chart,
+    delivery_chart,
     echo_chart,
     energy_bars,
     first_impact_chart,
@@ -38,9 +41,10 @@ from klack.analyses.stroke.figures import (
     variants_chart,
 )
 from klack.analyses.stroke.film_frames import film_charts
-from klack.analyses.stroke.measures import EVENT_MEASURES, VARIANT_MEASURES
+from klack.analyses.stroke.measures import DELIVERY_MEASURES, EVENT_MEASURES, VARIANT_MEASURES
 from klack.analyses.stroke.missing import cut_records
 from klack.analyses.stroke.record import FluidSummary, StopSummary, StrokeStudy, StrokeVariant
+from klack.analyses.stroke.stairs import STAIR_MEASURES
 from klack.analyses.stroke.step_check import CHANGE_MEASURES
 from klack.report.chart import AnyChart, Chart
 from klack.report.page import Content, NextStep, Section, Table
@@ -50,6 +54,7 @@ from klack.simulation.network_result import EnergyBooks
 __all__ = ["NEXT_STEPS", "stroke_charts", "stroke_content"]
 
 _MOST_IMPACTS = 12
+_MOST_STAIRS, _MOST_FLOWS = 24, 40
 _ROUND_OFF = 1e-12
 """Share of the throughput below which an energy is zero."""
 
@@ -70,7 +75,12 @@ def stroke_content(study: StrokeStudy) -> Content:
         ),
         *_ring_sections(study),
         Section(title="First impacts", charts=_named(*_first_impacts(study))),
-        Section(title="Echoes of the lines", charts=_named(*_echoes(study))),
+        Section(
+            title="Echoes of the lines", charts=_named(*_echoes(study)), tables=_stair_tables(study)
+        ),
+        Section(
+            title="What flows", charts=_named(delivery_chart(study)), tables=_flow_tables(study)
+        ),
         Section(title="Loops of the iron", charts=_named(loop_chart(study))),
         _comparison(study, wet=False),
         _impacts(study),
@@ -413,6 +423,34 @@ def _energy(value: float | None, books: EnergyBooks) -> str:
     return quantity(value, "J", 4)
 
 
+def _measure_table(
+    first: str, measures: Sequence[Measure[Any]], found: Sequence[tuple[str, Any]]
+) -> Table:
+    rows = tuple((name, *page_cells(measures, item)) for name, item in found)
+    return Table(columns=(first, *page_heads(measures)), rows=rows)
+
+
+def _stair_tables(study: StrokeStudy) -> tuple[Table, ...]:
+    return tuple(
+        _measure_table(
+            variant.name, STAIR_MEASURES, [(x.name, x) for x in variant.stairs[:_MOST_STAIRS]]
+        )
+        for variant in study.variants.values()
+        if variant.stairs
+    )
+
+
+def _flow_tables(study: StrokeStudy) -> tuple[Table, ...]:
+    """Every restriction, and the commands of those that lead out where there are several."""
+    tables = []
+    for variant in study.variants.values():
+        found = told_deliveries(variant)
+        inside = {n: x for n, x in variant.deliveries.items() if not x.pulse and n not in found}
+        if rows := [*found.items(), *inside.items()][:_MOST_FLOWS]:
+            tables.append(_measure_table(f"{variant.name}, from a to b", DELIVERY_MEASURES, rows))
+    return tuple(tables)
+
+
 # --------------------------------------------------------------------------- words
 
 
@@ -468,6 +506,8 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
         for measure in VARIANT_MEASURES
         if measure.key not in ("opening_time", "closing_time")  # above
     ),
+    *glossary(DELIVERY_MEASURES),
+    *glossary(measure for measure in STAIR_MEASURES if measure.key != "time"),
     (
         "echo time 2L/a",
         "Time of a pressure wave to the far end of a line and back.",

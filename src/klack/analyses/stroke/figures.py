@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.analyses.stroke.analysis import first_impact
+from klack.analyses.stroke.delivery import passed_mass
 from klack.analyses.stroke.record import LineSummary, StopSummary, StrokeStudy, StrokeVariant
 from klack.report.chart import AxisSpec, Band, BarChart, BarPart, Chart, Curve, Mark, Panel
 from klack.report.looks import OTHER, PART_LOOKS, Look, look_of, thinned
@@ -19,6 +20,7 @@ from klack.simulation.network_result import EnergyBooks, ImpactEvent
 
 __all__ = [
     "actuation_chart",
+    "delivery_chart",
     "echo_chart",
     "energy_bars",
     "first_impact_chart",
@@ -117,6 +119,38 @@ def variants_chart(
         x=_axis_over(*variants),
         panels=tuple(panel for panel in panels if panel.curves),
         note=f"{note} Forces on the stops: the largest one of every record.",
+    )
+
+
+def delivery_chart(study: StrokeStudy) -> Chart | None:
+    """Mass that has passed the restrictions that lead out, and their flow; None without fluid."""
+    wet = next((item for item in study.variants.values() if item.restrictions), None)
+    if wet is None or wet.result.time.size < 2:
+        return None
+    shown = [item for item in wet.restrictions if item.outward] or list(wet.restrictions)
+    masses, flows = list[Curve](), list[Curve]()
+    time = 1e3 * wet.result.time
+    for item, look in zip(shown, map(look_of, range(_MOST_PARTS)), strict=False):
+        mass = passed_mass(item, wet.result)
+        masses.append(look.curve(*thinned(time, 1e6 * mass), item.component))
+        flow = np.diff(mass) / np.diff(wet.result.time)
+        flows.append(look.curve(*thinned(time[1:], 1e3 * flow), item.component, listed=False))
+    lift = _channel_panel(wet, (study.channels.lift,), AxisSpec(label="lift", unit="µm"), 1e6, 0.5)
+    panels = (
+        Panel(y=AxisSpec(label="mass", unit="mg"), curves=tuple(masses), marks=(_ZERO,), share=0.7),
+        Panel(y=AxisSpec(label="flow", unit="g/s"), curves=tuple(flows), marks=(_ZERO,), share=0.6),
+        lift,
+    )
+    return Chart(
+        name="delivery",
+        title=f"Mass that flows: {wet.label}",
+        x=_axis_over(wet),
+        panels=tuple(panel for panel in panels if panel.curves),
+        note=(
+            f"Variant '{wet.name}'; restrictions that lead to the surroundings or to a given "
+            f"pressure, at most {_MOST_PARTS}, positive from port a to port b. Flows are means "
+            "over a record."
+        ),
     )
 
 

@@ -4,12 +4,20 @@ from operator import attrgetter
 from typing import Literal
 
 from klack.analyses.measures import Column, Measure, described_in
+from klack.analyses.stroke.delivery import Delivery
 from klack.analyses.stroke.record import StrokeVariant
 from klack.report.wording import count
 from klack.simulation.network_result import ImpactEvent
 from klack.units import format_si
 
-__all__ = ["EVENT_MEASURES", "NOT_REACHED", "VARIANT_MEASURES", "real_time_factor", "steps_told"]
+__all__ = [
+    "DELIVERY_MEASURES",
+    "EVENT_MEASURES",
+    "NOT_REACHED",
+    "VARIANT_MEASURES",
+    "real_time_factor",
+    "steps_told",
+]
 
 NOT_REACHED = "not reached"
 
@@ -183,6 +191,15 @@ VARIANT_MEASURES: tuple[Measure[StrokeVariant], ...] = described_in(
         kind="whole",
     ),
     Measure(
+        key="delivered_mass",
+        symbol="m",
+        unit="kg",
+        definition="Mass that leaves the valve through all restrictions that lead to the "
+        "surroundings or to a given pressure, each that passes more out than in; missing without "
+        "such a restriction.",
+        page=True,
+    ),
+    Measure(
         key="end_time",
         symbol="t_e",
         unit="s",
@@ -276,3 +293,113 @@ VARIANT_MEASURES: tuple[Measure[StrokeVariant], ...] = described_in(
     ),
 )
 """Of one variant; opening and closing are those of the needle."""
+
+DELIVERY_MEASURES: tuple[Measure[Delivery], ...] = described_in(
+    "theory/stroke",
+    Measure(
+        key="mass",
+        symbol="m",
+        unit="kg",
+        definition="Mass that flows from port a to port b, less what flows back: in the whole run, "
+        "or from the start of one command of the driver to the start of the next.",
+        column=Column("mg", 1e6, ".5g"),
+        remark=lambda found: " (flows on)" if found.flows_on else "",
+        page=True,
+    ),
+    Measure(
+        key="volume",
+        symbol="V",
+        unit="m^3",
+        definition="That mass over the density at the pressure of the surroundings, of a liquid at "
+        "its temperature, of a gas at that of the surroundings.",
+        column=Column("mm^3", 1e9, ".5g"),
+        page=True,
+    ),
+    Measure(
+        key="back_mass",
+        symbol="m_b",
+        unit="kg",
+        definition="Mass that flows against the direction of the whole, within what records "
+        "resolve.",
+        column=Column("mg", 1e6, ".3g", "back"),
+        page=True,
+        title="flows back",
+    ),
+    Measure(
+        key="peak_flow",
+        symbol="q_max",
+        unit="kg/s",
+        definition="Largest mass flow, mean over a record.",
+    ),
+    Measure(
+        key="steady_flow",
+        symbol="q",
+        unit="kg/s",
+        definition="Median of the mass flow while it is above half of its largest value; missing "
+        "where it is off by more than 5 % for half of that time, as in a ballistic pulse.",
+        column=Column("g/s", 1e3, ".4g"),
+        page=True,
+    ),
+    Measure(
+        key="initial_flow",
+        symbol="q_0",
+        unit="kg/s",
+        definition="Mass flow in the first record: of a closed seat, its leakage.",
+    ),
+    Measure(
+        key="final_flow",
+        symbol="q_e",
+        unit="kg/s",
+        definition="Mass flow in the last record.",
+    ),
+    Measure(
+        key="first_flow",
+        symbol="t_f",
+        unit="s",
+        definition="When the mass flow has risen by 1 % of its largest rise above the first one; "
+        "missing where it does not rise.",
+        digits=5,
+        column=Column("ms", 1e3, ".4f"),
+        page=True,
+    ),
+    Measure(
+        key="flow_delay",
+        symbol="t_d",
+        unit="s",
+        definition="From the start of the command of the nearest driver, in the whole run of the "
+        "first one, to the first flow.",
+        column=Column("us", 1e6, ".5g", "delay"),
+        page=True,
+    ),
+    Measure(
+        key="last_flow",
+        symbol="t_l",
+        unit="s",
+        definition="When it has fallen to that level for good; missing where it flows on at the "
+        "end.",
+        digits=5,
+        column=Column("ms", 1e3, ".4f"),
+        page=True,
+    ),
+    Measure(
+        key="opening_pressure",
+        symbol="dp_o",
+        unit="Pa",
+        definition="Pressure before less behind the restriction at the first flow.",
+        page=True,
+    ),
+    Measure(
+        key="closing_pressure",
+        symbol="dp_c",
+        unit="Pa",
+        definition="The same at the last flow.",
+        page=True,
+    ),
+    Measure(
+        key="hysteresis",
+        symbol="dp_h",
+        unit="Pa",
+        definition="Opening pressure less closing pressure.",
+    ),
+)
+"""Of what one restriction passes; flows from its port a to its port b are positive."""

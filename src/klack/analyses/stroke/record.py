@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from math import isfinite
 
 import numpy as np
@@ -9,6 +10,8 @@ from numpy.typing import NDArray
 
 from klack.analyses.record import CaseRecord
 from klack.analyses.stroke.acting import ActingForce, FluidPassage, MovingBody
+from klack.analyses.stroke.delivery import Delivery, Restriction, deliveries
+from klack.analyses.stroke.stairs import LineEnd, Stair, stairs
 from klack.analyses.stroke.step_check import ImpactChange
 from klack.analyses.stroke.times import LiftTimes, Passage
 from klack.assembling.body_summary import BodySummary
@@ -183,9 +186,9 @@ class StrokeVariant:
         Of each impact when all steps are doubled, if asked for.
     halvings
         Of all steps, by their check.
-    acting, moving, passages
-        Recorded forces and where they act, what moves, and the fluid's columns and ways in and out;
-        empty in results of former versions.
+    acting, moving, passages, restrictions, line_ends
+        Recorded forces and where they act, what moves, the fluid's columns and ways in and out,
+        where it flows, and lines that end at a body; empty in results of former versions.
     """
 
     name: str
@@ -203,6 +206,24 @@ class StrokeVariant:
     acting: tuple[ActingForce, ...] = ()
     moving: tuple[MovingBody, ...] = ()
     passages: tuple[FluidPassage, ...] = ()
+    restrictions: tuple[Restriction, ...] = ()
+    line_ends: tuple[LineEnd, ...] = ()
+
+    @cached_property
+    def deliveries(self) -> Mapping[str, Delivery]:
+        """What restrictions pass, by :attr:`~klack.analyses.stroke.delivery.Delivery.name`."""
+        return {item.name: item for item in deliveries(self.restrictions, self.result)}
+
+    @cached_property
+    def stairs(self) -> tuple[Stair, ...]:
+        """Steps that waves in lines leave in the velocity after impacts."""
+        return tuple(stairs(self.line_ends, self.result))
+
+    @property
+    def delivered_mass(self) -> float | None:
+        """Mass that leaves the valve through all restrictions that lead out [kg]."""
+        ends = [item for item in self.deliveries.values() if item.leads_out and not item.pulse]
+        return sum(max(item.outward * item.mass, 0.0) for item in ends) if ends else None
 
     @property
     def needle_times(self) -> LiftTimes:

@@ -15,6 +15,7 @@ from klack.analyses.impact.contact_check import check_contact
 from klack.analyses.record import case_fields, run_fields
 from klack.analyses.stroke.acting import acting_forces, fluid_passages, moving_bodies
 from klack.analyses.stroke.controllers import controller_notes
+from klack.analyses.stroke.delivery import restrictions_of
 from klack.analyses.stroke.missing import cut_records, missing_notes, rest_note
 from klack.analyses.stroke.mounted import moving_note, seen_from_valve, standing_network
 from klack.analyses.stroke.record import (
@@ -26,6 +27,7 @@ from klack.analyses.stroke.record import (
     StrokeStudy,
     StrokeVariant,
 )
+from klack.analyses.stroke.stairs import line_ends
 from klack.analyses.stroke.step_check import CheckedSteps, checked_steps, not_checked, watched
 from klack.analyses.stroke.times import all_lift_times
 from klack.assembling.body_summary import BodySummary, summarise_body
@@ -471,8 +473,12 @@ def variant_of(
     rows: Rows,
     result: NetworkResult,
     setup_time: float = 0.0,
+    until: float | None = None,
 ) -> StrokeVariant:
-    """Record of one variant, with the times of its needle."""
+    """Record of one variant, with the times of its needle.
+
+    ``until`` [s] is the end of the run, by default that of its records.
+    """
     result = seen_from_valve(result, rows, (roles.seat, roles.opening_stop))
     times = all_lift_times(result, rows, roles.needle, roles.point)
     wet, flexible = not name.startswith("dry"), not name.endswith("lumped")
@@ -490,6 +496,8 @@ def variant_of(
         acting=acting_forces(rows),
         moving=moving_bodies(rows),
         passages=fluid_passages(rows, valve.network),
+        line_ends=line_ends(rows),
+        restrictions=restrictions_of(rows, valve.network, until or float(result.time[-1])),
     )
 
 

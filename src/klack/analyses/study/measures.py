@@ -27,7 +27,8 @@ from klack.analyses.sample import STATISTICS
 from klack.analyses.shots.record import RESULTS, RULE_MEASURES, RuleVerdict
 from klack.analyses.shots.run import DroppedShots, highest_of, judge_rule
 from klack.analyses.stroke.analysis import first_impact
-from klack.analyses.stroke.measures import EVENT_MEASURES, VARIANT_MEASURES
+from klack.analyses.stroke.delivery import Delivery, restriction_names
+from klack.analyses.stroke.measures import DELIVERY_MEASURES, EVENT_MEASURES, VARIANT_MEASURES
 from klack.analyses.stroke.record import StrokeVariant
 from klack.case.schema import Case
 from klack.case.valve import ValveCase
@@ -109,7 +110,8 @@ class ChosenMeasure:
     Parameters
     ----------
     of
-        The ``"variant"`` of a stroke or one ``"impact"`` in it, the ``"level"`` of an impact, all
+        The ``"variant"`` of a stroke, one ``"impact"`` in it or the ``"delivery"`` of a
+        restriction, the ``"level"`` of an impact, all
         of its ``"shots"``, a ``"click"`` or the noise ``"design"``.
     part
         Of a run, what the measure is read from.
@@ -117,7 +119,7 @@ class ChosenMeasure:
 
     name: str
     measure: Measure[Any]
-    of: Literal["variant", "impact", "level", "shots", "click", "design"]
+    of: Literal["variant", "impact", "delivery", "level", "shots", "click", "design"]
     part: Callable[[Any], Any]
 
     @property
@@ -361,6 +363,7 @@ TIMES = ("opening_time", "closing_time")
 
 _OF_VARIANTS = {measure.key: measure for measure in VARIANT_MEASURES}
 _OF_IMPACTS = {measure.key: measure for measure in EVENT_MEASURES}
+_OF_DELIVERIES = {measure.key: measure for measure in DELIVERY_MEASURES}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -376,34 +379,46 @@ def stroke_measures(case: ValveCase, names: Iterable[str]) -> tuple[ChosenMeasur
 
     ``"opening_time"``; ``"seat.peak_force"`` of the first impact on the stop ``seat`` that is no
     mere tremble, see :func:`~klack.analyses.stroke.analysis.first_impact`; ``"seat.2.peak_force"``
-    of the second one in the list of all impacts; ``"noise.sound_exposure_level_weighted"``.
+    of the second one in the list of all impacts; ``"nozzle.mass"`` of a restriction in the whole
+    run, ``"nozzle.2.mass"`` of the second command; ``"noise.sound_exposure_level_weighted"``.
     """
-    stops, known = _stops(case), stroke_measure_names(case)
+    stops, ways, known = _stops(case), _restrictions(case), stroke_measure_names(case)
     return choose_measures(
-        names, lambda name: _stroke_measure(name, stops), known, _known_words(stops), "opening_time"
+        names,
+        lambda name: _stroke_measure(name, stops, ways),
+        known,
+        _known_words(stops, ways),
+        "opening_time",
     )
 
 
 def stroke_measure_names(case: ValveCase) -> tuple[str, ...]:
-    """Measures of a stroke, first impacts on each stop, and noise."""
+    """Measures of a stroke, first impacts on each stop, restrictions, and noise."""
     of_impacts = (f"{stop}.{key}" for stop in _stops(case) for key in _OF_IMPACTS)
-    return (*_OF_VARIANTS, *of_impacts, *NOISE_NAMES)
+    of_ways = (f"{name}.{key}" for name in _restrictions(case) for key in _OF_DELIVERIES)
+    return (*_OF_VARIANTS, *of_impacts, *of_ways, *NOISE_NAMES)
 
 
 def _stops(case: ValveCase) -> list[str]:
     return [name for name, part in case.network.components.items() if part.type == END_STOP]
 
 
-def _stroke_measure(name: str, stops: list[str]) -> ChosenMeasure | None:
+def _restrictions(case: ValveCase) -> tuple[str, ...]:
+    return restriction_names(case.network.components)
+
+
+def _stroke_measure(name: str, stops: list[str], ways: Sequence[str]) -> ChosenMeasure | None:
     if name in _OF_VARIANTS:
         return ChosenMeasure(name, _OF_VARIANTS[name], "variant", attrgetter("variant"))
     stop, _, rest = name.partition(".")
-    *number, key = rest.split(".")
-    if stop in stops and key in _OF_IMPACTS and len(number) < 2:
-        if not number:
-            return ChosenMeasure(name, _OF_IMPACTS[key], "impact", _impact_on(stop, 0))
-        if number[0].isascii() and number[0].isdecimal() and int(number[0]) > 0:
-            return ChosenMeasure(name, _OF_IMPACTS[key], "impact", _impact_on(stop, int(number[0])))
+    *numbers, key = rest.split(".")
+    is_number = len(numbers) == 1 and numbers[0].isascii() and numbers[0].isdecimal()
+    number = int(numbers[0]) if is_number else 0
+    if bool(numbers) == (number > 0):
+        if stop in stops and key in _OF_IMPACTS:
+            return ChosenMeasure(name, _OF_IMPACTS[key], "impact", _impact_on(stop, number))
+        if stop in ways and key in _OF_DELIVERIES:
+            return ChosenMeasure(name, _OF_DELIVERIES[key], "delivery", _by(stop, number))
     if stop == SHOTS and stop not in stops:
         raise InputError(
             "measures",
@@ -425,8 +440,19 @@ def _impact_on(stop: str, number: int) -> Callable[[StrokeOfPoint], ImpactEvent 
     return impact
 
 
-def _known_words(stops: list[str]) -> str:
+def _by(restriction: str, command: int) -> Callable[[StrokeOfPoint], Delivery | None]:
+    """What a restriction passes after the command of this number; 0: in the whole run."""
+    name = f"{restriction}.{command}" if command else restriction
+    return lambda run: run.variant.deliveries.get(name)
+
+
+def _known_words(stops: list[str], ways: Sequence[str]) -> str:
     words = f"one of: {one_of(_OF_VARIANTS)}; {NOISE_WORDS}"
+    if ways:
+        words += (
+            f"; of a restriction, {ways[0]}.KEY (from its second command on {ways[0]}.2.KEY), with "
+            f"a restriction of: {one_of(ways)}, and a key of: {one_of(_OF_DELIVERIES)}"
+        )
     if not stops:
         return words
     return (

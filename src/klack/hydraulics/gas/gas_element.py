@@ -21,7 +21,7 @@ from klack.hydraulics.gas.gas_step import (
     gas_step,
 )
 from klack.hydraulics.mass_balance import find_links
-from klack.network.gas_rows import GasChamberRow, GasRows, GasSourceRow
+from klack.network.gas_rows import PASSED, GasChamberRow, GasRows, GasSourceRow
 from klack.network.rows import Ambient, Book, Channel, ElementRow, LimitRow, Rows, StateInput
 from klack.network.step_function import evaluate
 from klack.units import percent_text
@@ -97,7 +97,7 @@ class GasNetwork:
         par = self.parameters() if parameters is None else parameters
         n, s, b = (int(count) for count in par[:3])
         links = int(par[int(par[15]) + n])
-        return OF_CHAMBER * n + s + b + (WORK_OF_CHAMBER + 6) * n + 8 * links
+        return OF_CHAMBER * n + s + 2 * b + (WORK_OF_CHAMBER + 6) * n + 8 * links
 
     def volumes(self, y: Vector) -> dict[int, float]:
         """Volume of each chamber [m^3] with the ports at ``y``."""
@@ -245,6 +245,7 @@ def _channels(rows: GasRows) -> list[Channel]:
     at += len(rows.sources)
     for k, branch in enumerate(rows.branches):
         found.append(Channel("mass flow", "kg/s", at + k, derived=True, owner=branch.component))
+        found.append(Channel(PASSED, "kg", at + len(rows.branches) + k, owner=branch.component))
     return found
 
 

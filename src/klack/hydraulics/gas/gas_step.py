@@ -377,6 +377,9 @@ def _finish(
         now[s], now[s + 1] = mass, energy
         now[s + 2], now[s + 3] = energy * R / (cv * work[c + 6]), energy / (mass * cv)
         now[s + 4] = work[c + 11]
+    flows = OF_CHAMBER * chambers + int(par[1])
+    for k in range(int(par[2])):
+        now[flows + int(par[2]) + k] += h * now[flows + k]
     for k in range(int(par[3])):
         at = int(par[13]) + WALL * k
         node, port = int(par[at]), int(par[at + 1])
@@ -424,7 +427,7 @@ def _advance(
 def gas_step(par: Any, state: Any, inp: Any, out: Any) -> int:
     """All gas of a network; status 1: no convergence, 2: a chamber has no volume left."""
     chambers, sources, ports = int(par[0]), int(par[1]), int(par[4])
-    numbers = OF_CHAMBER * chambers + sources + int(par[2])
+    numbers = OF_CHAMBER * chambers + sources + 2 * int(par[2])
     now = shift(out, ports)
     work = shift(now, numbers)
     A, r = _equations(par, work)

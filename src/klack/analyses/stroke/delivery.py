@@ -1,0 +1,334 @@
+"""What restrictions pass in a run, as a whole and from each command of a driver to the next.
+
+Mass is the sum over the solver's own steps, as it left one volume and entered the other: records
+hold means over all steps of a record, and gas counts what has passed.  Only what happens within a
+record, as a flow that turns round, is lost.
+"""
+
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.hydraulics.gas.gas import Gas
+from klack.magnetics.driver import DiodeDriver, Driver
+from klack.network.component import Component
+from klack.network.gas_rows import PASSED
+from klack.network.network import Network
+from klack.network.nodes import RESERVED
+from klack.network.port import FLUID_DOMAINS, Role
+from klack.network.rows import AMBIENT, Rows
+from klack.simulation.flow_channels import flow_label
+from klack.simulation.network_result import NetworkResult
+
+__all__ = [
+    "Delivery",
+    "Restriction",
+    "deliveries",
+    "passed_mass",
+    "restriction_names",
+    "restrictions_of",
+]
+
+Vector = NDArray[np.float64]
+
+_BEGUN = 0.01  # of the largest rise of a flow: from there on it flows
+_OPEN = 0.5  # of the largest flow: where a steady flow is sought
+_STEADY, _MOSTLY = 0.05, 0.5  # off the median by so much at most, for so much of that time
+_NOTHING = 1e-6  # of the largest flow of all restrictions: no flow, but round-off and trembling
+_SLIVER = 1e-6  # of a record: a shorter piece of one has no mean
+
+
+@dataclass(frozen=True, kw_only=True)
+class Restriction:
+    """A component with a flow from its port a to its port b.
+
+    Parameters
+    ----------
+    flows [kg/s]
+        Channels with means over records, whose sum is the flow of a liquid.
+    passed [kg]
+        Channel with what a gas has passed; empty for a liquid.
+    pressures
+        Channels at ports a and b; empty for the surroundings.
+    ambient [Pa]
+    outward [-]
+        1 where port b leads to the surroundings or a given pressure, -1 for port a, 0 within.
+    density [kg/m^3]
+        At the pressure of the surroundings.
+    starts [s]
+        When the driver that is nearest in the network switches on, within the run.
+    until [s]
+        End of the run.
+    """
+
+    component: str
+    flows: tuple[str, ...]
+    passed: str
+    pressures: tuple[str, str]
+    ambient: float
+    outward: int
+    density: float
+    starts: tuple[float, ...]
+    until: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Delivery:
+    """What one restriction passes; flows from its port a to its port b are positive.
+
+    Parameters
+    ----------
+    pulse
+        Command from whose start to that of the next one it counts; 0 for the whole run.
+    begin, end [s]
+    mass [kg]
+        Of both directions together.
+    back_mass [kg]
+        Against the direction of ``mass``, zero or more.
+    peak_flow, steady_flow, initial_flow, final_flow [kg/s]
+        Means over records.
+    first_flow, last_flow, flow_delay [s]
+        Without a driver there is no delay.
+    opening_pressure, closing_pressure [Pa]
+        Before less behind, at the first and at the last flow.
+    """
+
+    component: str
+    pulse: int
+    outward: int
+    begin: float
+    end: float
+    mass: float
+    volume: float
+    back_mass: float
+    peak_flow: float
+    steady_flow: float | None
+    initial_flow: float
+    final_flow: float
+    first_flow: float | None
+    last_flow: float | None
+    flow_delay: float | None
+    opening_pressure: float | None
+    closing_pressure: float | None
+
+    @property
+    def name(self) -> str:
+        """As in the name of a measure: ``"nozzle"``, ``"nozzle.2"``."""
+        return f"{self.component}.{self.pulse}" if self.pulse else self.component
+
+    @property
+    def leads_out(self) -> bool:
+        """Whether it leads to the surroundings, or to a given pressure."""
+        return self.outward != 0
+
+    @property
+    def flows_on(self) -> bool:
+        """Whether what began to flow still does at the end."""
+        return self.first_flow is not None and self.last_flow is None
+
+    @property
+    def hysteresis(self) -> float | None:
+        """Opening less closing pressure [Pa]."""
+        if self.opening_pressure is None or self.closing_pressure is None:
+            return None
+        return self.opening_pressure - self.closing_pressure
+
+
+def restriction_names(components: Mapping[str, Component]) -> tuple[str, ...]:
+    """Components whose flow from port a to port b is recorded: all but lines."""
+    return tuple(
+        name
+        for name, part in components.items()
+        if part.type != "line"
+        and all(
+            kind is not None and kind.domain in FLUID_DOMAINS and kind.role is Role.FLOW
+            for kind in map(part.port_kinds().get, ("a", "b"))
+        )
+    )
+
+
+def restrictions_of(rows: Rows, network: Network, until: float) -> tuple[Restriction, ...]:
+    """Restrictions of a network with its fluids, in a run that ends then [s]."""
+    known, found = restriction_names(network.components), list[Restriction]()
+    ambient, gas = rows.ambient, rows.gas_rows
+    names = {handle: node.component for handle, node in rows.nodes.items()}
+    names |= {handle: row.component for handle, row in (gas.chambers | gas.sources).items()}
+    given = {AMBIENT, *gas.sources}
+    given |= {handle for handle, node in rows.nodes.items() if node.prescribed}
+    ends: dict[str, tuple[int, int]] = {}
+    flows: dict[str, tuple[str, ...]] = {}
+    for row in rows.branches:
+        if row.component in known:
+            ends[row.component] = (row.a, row.b)
+            channel = " ".join(filter(None, (row.component, row.label, flow_label(row))))
+            flows[row.component] = (*flows.get(row.component, ()), channel)
+    ends |= {row.component: (row.a, row.b) for row in gas.branches}
+    for name in filter(ends.__contains__, known):
+        a, b = ends[name]
+        density = 0.0
+        if name in flows and rows.fluid is not None:
+            density = float(rows.fluid.density(ambient.pressure))
+        elif isinstance(rows.gas, Gas):
+            density = ambient.pressure / (rows.gas.gas_constant * ambient.temperature)
+        found.append(
+            Restriction(
+                component=name,
+                flows=flows.get(name, ()),
+                passed="" if name in flows else f"{name} {PASSED}",
+                pressures=(_pressure(names, a), _pressure(names, b)),
+                ambient=ambient.pressure,
+                outward=(b in given) - (a in given),
+                density=density,
+                starts=_starts(network, name, until),
+                until=until,
+            )
+        )
+    return tuple(found)
+
+
+def _pressure(names: Mapping[int, str], node: int) -> str:
+    return "" if node == AMBIENT else f"{names[node]} pressure"
+
+
+def _starts(network: Network, name: str, until: float) -> tuple[float, ...]:
+    """Starts of the driver that is nearest, along connections, within the run."""
+    beside: dict[str, set[str]] = {}
+    for connection in network.connections:
+        parts = {port.partition(".")[0] for port in connection} - set(RESERVED)
+        for part in parts:
+            beside.setdefault(part, set()).update(parts)
+    away, ahead = {name: 0}, deque([name])
+    while ahead:
+        part = ahead.popleft()
+        for other in beside.get(part, set()) - away.keys():
+            away[other] = away[part] + 1
+            ahead.append(other)
+    found = [
+        (away[part], start, driver.repeat_every if isinstance(driver, DiodeDriver) else None)
+        for part, driver in network.components.items()
+        if isinstance(driver, Driver) and part in away
+        for start, _ in driver.commands()
+    ]
+    if not found:
+        return ()
+    _, first, period = min(found, key=lambda item: item[:2])
+    if period is None:
+        return (first,) if first < until else ()
+    return tuple(np.arange(first, until, period).tolist())
+
+
+def deliveries(restrictions: Sequence[Restriction], result: NetworkResult) -> Iterator[Delivery]:
+    """What every restriction passes in the whole run, then from each of its commands on."""
+    time = result.time
+    if time.size < 2:
+        return
+    passed = [passed_mass(item, result) for item in restrictions]
+    largest = [float(np.max(np.abs(np.diff(mass) / np.diff(time)))) for mass in passed]
+    least = _NOTHING * max(largest, default=0.0)
+    for item, mass in zip(restrictions, passed, strict=True):
+        known = [(k, start) for k, start in enumerate(item.starts, start=1) if start >= time[0]]
+        yield _delivery(
+            item,
+            result,
+            mass,
+            least,
+            (0, float(time[0]), item.until),
+            known[0][1] if known else None,
+        )
+        for (k, start), (_, end) in pairwise([*known, (0, item.until)]):
+            yield _delivery(item, result, mass, least, (k, start, end), start)
+
+
+def passed_mass(item: Restriction, result: NetworkResult) -> Vector:
+    """Mass that has passed at each record [kg]."""
+    channels = result.channels
+    if item.passed:
+        values = channels[item.passed].values
+        return np.asarray(values - values[0])
+    flow = sum((channels[name].values for name in item.flows), np.zeros(result.time.size))
+    return np.concatenate([[0.0], np.cumsum(flow[1:] * np.diff(result.time))])
+
+
+def _delivery(
+    item: Restriction,
+    result: NetworkResult,
+    passed: Vector,
+    least: float,
+    span: tuple[int, float, float],
+    command: float | None,
+) -> Delivery:
+    (pulse, begin, end), time = span, result.time
+    sliver = _SLIVER * float(time[1] - time[0])
+    if end > time[-1]:  # as derivatives move it: the last flow lasts
+        time, passed = (np.append(x, 2.0 * x[-1] - x[-2]) for x in (time, passed))
+    inside = (time > begin + sliver) & (time < end - sliver)
+    t = np.concatenate([[begin], time[inside], [end]])
+    pieces = np.diff(np.interp(t, time, passed))
+    flow, middle = pieces / np.diff(t), 0.5 * (t[:-1] + t[1:])
+    mass = float(np.sum(pieces))
+    way = -1.0 if mass < 0.0 else 1.0
+    first, last = _times(middle, way * (flow - flow[0]), least)
+
+    def drop(moment: float | None) -> float | None:
+        return None if moment is None else way * _drop(item, result, moment)
+
+    return Delivery(
+        component=item.component,
+        pulse=pulse,
+        outward=item.outward,
+        begin=begin,
+        end=end,
+        mass=mass,
+        volume=mass / item.density if item.density > 0.0 else float("nan"),
+        back_mass=max(0.5 * (float(np.sum(np.abs(pieces))) - abs(mass)), 0.0),
+        peak_flow=float(flow[np.argmax(np.abs(flow))]),
+        steady_flow=_steady(way * flow, least, way),
+        initial_flow=float(flow[0]),
+        final_flow=float(flow[-1]),
+        first_flow=first,
+        last_flow=last,
+        flow_delay=None if first is None or command is None else first - command,
+        opening_pressure=drop(first),
+        closing_pressure=drop(last),
+    )
+
+
+def _times(middle: Vector, rise: Vector, least: float) -> tuple[float | None, float | None]:
+    """When a flow has risen, and when it has fallen again, between the middles of records."""
+    level = _BEGUN * float(rise.max())
+    if not level > _BEGUN * least:
+        return None, None
+    above = np.flatnonzero(rise > level)
+
+    def crossing(k: int) -> float:
+        part = (level - rise[k]) / (rise[k + 1] - rise[k])
+        return float(middle[k] + part * (middle[k + 1] - middle[k]))
+
+    last = int(above[-1])
+    return crossing(int(above[0]) - 1), None if last + 1 == rise.size else crossing(last)
+
+
+def _steady(flow: Vector, least: float, way: float) -> float | None:
+    top = float(flow.max())
+    if not top > least:
+        return None
+    open_flow = flow[flow >= _OPEN * top]
+    median = float(np.median(open_flow))
+    if float(np.mean(np.abs(open_flow - median) <= _STEADY * median)) < _MOSTLY:
+        return None
+    return way * median
+
+
+def _drop(item: Restriction, result: NetworkResult, moment: float) -> float:
+    """Pressure at port a less that at port b [Pa]."""
+    a, b = (
+        float(np.interp(moment, result.time, result.channels[name].values))
+        if name
+        else item.ambient
+        for name in item.pressures
+    )
+    return a - b
