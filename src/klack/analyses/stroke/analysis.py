@@ -184,7 +184,12 @@ _STAIR = JsonForm(
     Key("stop", str),
     Key("impact", int, "On that stop, from 1."),
     Key("echo", int, "Since the impact, from 1.", "number"),
-    Key("seen", bool, "Whether the step is above three times the scatter of the velocity."),
+    Key(
+        "hidden_by",
+        str | None,
+        "vibration, sensor, or null where the step is seen.",
+        lambda stair: stair.hidden_by or None,
+    ),
     *measured_keys(STAIR_MEASURES),
 )
 _VARIANT = JsonForm(

@@ -482,6 +482,7 @@ def variant_of(
     result = seen_from_valve(result, rows, (roles.seat, roles.opening_stop))
     times = all_lift_times(result, rows, roles.needle, roles.point)
     wet, flexible = not name.startswith("dry"), not name.endswith("lumped")
+    measured = valve.case.measurement
     return StrokeVariant(
         name=name,
         label=_label(valve, rows, wet=wet, flexible=flexible),
@@ -496,7 +497,7 @@ def variant_of(
         acting=acting_forces(rows),
         moving=moving_bodies(rows),
         passages=fluid_passages(rows, valve.network),
-        line_ends=line_ends(rows),
+        line_ends=line_ends(rows, None if measured is None else measured.sensor),
         restrictions=restrictions_of(rows, valve.network, until or float(result.time[-1])),
     )
 

@@ -12,12 +12,14 @@ Pressure and velocity are read apart: where both forces agree, the line made the
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
 
 from klack.analyses.measures import Column, Measure, described_in
 from klack.analyses.stroke.step_check import NOTICED
+from klack.measurement.channels import LiftSensor
 from klack.network.rows import LineRow, Rows
 from klack.simulation.network_result import ImpactEvent, NetworkResult
 
@@ -28,6 +30,7 @@ Vector = NDArray[np.float64]
 _MOST = 6  # edges after one impact
 _EDGE = 0.7  # of the time of the impact: half of what an edge takes
 _FEWEST = 8  # records of a stair
+_RISE = 0.35  # over the bandwidth: the time in which a low pass of first order rises
 _SEEN = 3.0  # times what the velocity scatters about its stairs
 
 
@@ -46,6 +49,8 @@ class LineEnd:
     mass [kg]
     stops
         End stops of the body.
+    resolution, bandwidth [m], [Hz]
+        Of the lift sensor, where the case states them; else 0 and infinite.
     """
 
     line: str
@@ -56,6 +61,8 @@ class LineEnd:
     area: float
     mass: float
     stops: tuple[str, ...]
+    resolution: float = 0.0
+    bandwidth: float = inf
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,6 +86,9 @@ class Stair:
         By which a lift leaves its parabola within half a stair.
     scatter [m/s]
         Of the velocity about the straight lines of both stairs: vibration.
+    hidden_by
+        ``"vibration"`` where the step is less than three times that, ``"sensor"`` where the lift
+        sensor of the case does not show it; else empty.
     """
 
     line: str
@@ -94,11 +104,7 @@ class Stair:
     velocity_step: float
     lift: float
     scatter: float
-
-    @property
-    def seen(self) -> bool:
-        """Whether the step is more than three times what the velocity scatters anyway."""
-        return abs(self.velocity_step) > _SEEN * self.scatter
+    hidden_by: str
 
     @property
     def name(self) -> str:
@@ -106,8 +112,8 @@ class Stair:
         return f"{self.line}: {self.body} after {self.stop} {self.impact}, echo {self.number}"
 
 
-def line_ends(rows: Rows) -> tuple[LineEnd, ...]:
-    """Ends of lines whose pressures push free bodies."""
+def line_ends(rows: Rows, sensor: LiftSensor | None = None) -> tuple[LineEnd, ...]:
+    """Ends of lines whose pressures push free bodies, and the sensor that sees these."""
     ends, delays = dict[str, tuple[int, int]](), dict[str, float]()
     lines: Sequence[LineRow] = rows.lines
     for line in lines:  # pieces of a line follow each other
@@ -135,6 +141,8 @@ def line_ends(rows: Rows) -> tuple[LineEnd, ...]:
                         area=area,
                         mass=float(row.body.mass),
                         stops=stops,
+                        resolution=0.0 if sensor is None else sensor.resolution,
+                        bandwidth=inf if sensor is None else sensor.bandwidth or inf,
                     )
                 )
     return tuple(found)
@@ -170,10 +178,12 @@ def _after(
         if edge + echo - half > until or np.count_nonzero(on) < _FEWEST:
             return
         line = np.polyfit(time[on] - edge, speed[on], 1)
-        scatter = float(np.std(speed[on] - np.polyval(line, time[on] - edge)))
-        here = float(np.mean(pressure[on])), float(line[0]), scatter
+        about = float(np.std(speed[on] - np.polyval(line, time[on] - edge)))
+        here = float(np.mean(pressure[on])), float(line[0]), about
         if before is not None:
-            slope = here[1] - before[1]
+            slope, scatter = here[1] - before[1], max(before[2], here[2])
+            lift = 0.125 * abs(slope) * echo**2
+            hidden = "sensor" if lift < end.resolution or echo < _RISE / end.bandwidth else ""
             yield Stair(
                 line=end.line,
                 body=end.body,
@@ -186,8 +196,9 @@ def _after(
                 force=end.area * (here[0] - before[0]),
                 seen_force=end.mass * slope,
                 velocity_step=slope * echo,
-                lift=0.125 * abs(slope) * echo**2,
-                scatter=max(before[2], here[2]),
+                lift=lift,
+                scatter=scatter,
+                hidden_by="vibration" if abs(slope * echo) <= _SEEN * scatter else hidden,
             )
         before = here
 
@@ -271,9 +282,11 @@ STAIR_MEASURES: tuple[Measure[Stair], ...] = described_in(
         definition="Standard deviation of the velocity about the straight lines of both stairs.",
         digits=2,
         column=Column("m/s", 1.0, ".1e"),
-        remark=lambda stair: "" if stair.seen else " (not seen)",
+        remark=lambda stair: f" (lost in the {stair.hidden_by})" if stair.hidden_by else "",
         page=True,
-        note="A step of less than three times that is lost in the vibration of the body.",
+        note="A step of less than three times that is lost in the vibration of the body; lost in "
+        "the sensor is one of less than the resolution of the lift sensor of the case, or with "
+        "stairs shorter than its rise time, 0.35 over its bandwidth.",
     ),
 )
 """Of one edge of the stairs after an impact."""
