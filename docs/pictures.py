@@ -11,7 +11,8 @@ Of two results of ``klack impact CASE --level reduced,interface,full`` with the
 same two cases comes levels.svg.
 
 Of ``klack calibrate measured --measurement cases/measured/strokes_synthetic.csv`` comes
-calibration.svg, of ``klack noise demo-stroke --variant wet,dry`` click.svg, of ``klack heat
+calibration.svg, of ``klack study docs/how-to/injected_mass.yaml --study
+docs/how-to/pulse_width.yaml`` injected-mass.svg, of ``klack noise demo-stroke --variant wet,dry`` click.svg, of ``klack heat
 warm-valve`` warm-up.svg.
 
 Of ``klack stroke`` of a copy of ``docs/how-to/guided_stroke.yaml`` with ``placement: {seed: 4}``,
@@ -22,6 +23,8 @@ and off-axis-film.svg.
 import sys
 from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from klack.analyses.calibration.analysis import CALIBRATION
 from klack.analyses.calibration.content import stroke_chart as calibration_chart
@@ -41,7 +44,9 @@ from klack.analyses.stroke.figures import actuation_chart
 from klack.analyses.stroke.film_frames import film_charts
 from klack.analyses.stroke.record import StrokeStudy
 from klack.analyses.stroke.ring_figure import line_load_picture
-from klack.report.chart import AxisSpec, Chart
+from klack.analyses.study.analysis import STUDY
+from klack.analyses.study.record import StudyRecord
+from klack.report.chart import AxisSpec, Chart, Curve, Mark, Panel
 from klack.report.printed import svg_chart
 
 IMAGES = Path(__file__).parent / "images"
@@ -61,6 +66,9 @@ def main(results: list[Path]) -> None:
             chart = calibration_chart(study, study.channels[0])
             (IMAGES / "calibration.svg").write_bytes(svg_chart(chart))
             continue
+        if form == STUDY.form.name:
+            (IMAGES / "injected-mass.svg").write_bytes(svg_chart(mass_chart(STUDY.load(result))))
+            continue
         if form == NOISE.form.name:
             chart = click_charts(NOISE.load(result))[0]
             (IMAGES / "click.svg").write_bytes(svg_chart(chart))
@@ -79,6 +87,31 @@ def main(results: list[Path]) -> None:
         (IMAGES / "pressure.svg").write_bytes(draw_pressure(rings))
     if len(compared) > 1:
         (IMAGES / "levels.svg").write_bytes(svg_chart(levels_chart(compared)))
+
+
+def mass_chart(study: StudyRecord) -> Chart:
+    """Mass over the width of the pulse; the grey line is where the needle first reaches its stop."""
+    pulse, mass = study.parameters[0].values, study.measures[0].values
+    touch = next(item for item in study.measures if item.name == "opening_time").values
+    reached = 1e3 * float(pulse[np.flatnonzero(np.isfinite(touch))[0]])
+    x, y = 1e3 * pulse, 1e6 * mass
+    curves = (
+        Curve(x=x, y=y, colour="blue", width=1.0, listed=False),
+        Curve(x=x, y=y, colour="blue", width=2.0, drawn="points", listed=False),
+    )
+    label = "the needle reaches its stop"
+    return Chart(
+        name="injected-mass",
+        title="Injected mass over the width of the pulse",
+        x=AxisSpec(label="width of the pulse", unit="ms"),
+        panels=(
+            Panel(
+                y=AxisSpec(label="mass", unit="mg"),
+                curves=curves,
+                marks=(Mark(value=reached, label=label),),
+            ),
+        ),
+    )
 
 
 def levels_chart(studies: list[ImpactStudy]) -> Chart:

@@ -83,4 +83,6 @@ def told_value(value: float, unit: str, digits: int = 4) -> str:
     """Value for a terminal; a dash without one."""
     if not np.isfinite(value):
         return "–"
+    if unit == "kg":
+        value, unit = 1e3 * value, "g"
     return format_si(value, unit, digits) if unit != "1" else f"{value:.4f}"

@@ -329,6 +329,7 @@ def _stroke_numbers(
         "guide_loss": float(result.books.losses.get("guide friction", 0.0)),
         "faces_loss": float(sum(rubbed)) if rubbed else _NAN,
         **energies,
+        "delivered_mass": _NAN if variant.delivered_mass is None else variant.delivered_mass,
         "energy_residual": float(result.books.relative_residual),
     }
 

@@ -167,6 +167,13 @@ RESULTS: tuple[Measure[Row], ...] = described_in(
         definition="Work of the stops on the modes of the held bodies, along the axis.",
     ),
     Measure(
+        key="delivered_mass",
+        symbol="m",
+        unit="kg",
+        definition="Mass that leaves the valve in one stroke through all restrictions that lead to "
+        "the surroundings or to a given pressure; missing without one, as in a dry stroke.",
+    ),
+    Measure(
         key="radiated_energy",
         name="sound energy radiated (estimate)",
         symbol="W_rad",
@@ -344,7 +351,7 @@ HIGHEST_MEASURES: tuple[Measure[HighestRebound], ...] = described_in(
 _STORED = (*STARTED, *RESULTS[:2], *STROKE_MEASURES[-2:-1], *RESULTS[2:], *STROKE_MEASURES[-1:])
 
 
-@with_columns(_STORED, later=("contact_friction", "faces_loss"))
+@with_columns(_STORED, later=("contact_friction", "delivered_mass", "faces_loss"))
 class StrokeColumns(Columns):
     """Strokes in rows: start and results; early versions lack some columns."""
 

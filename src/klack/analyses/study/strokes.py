@@ -3,7 +3,7 @@
 The time loop runs outside of the interpreter, so that threads share meshes, modes and laws.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from klack.analyses.noise.body import Transfers
@@ -53,6 +53,7 @@ from klack.machine.stages import collected_warnings
 from klack.signals.sampled import TimeSeries
 from klack.simulation.network_recorder import recorded_columns
 from klack.simulation.network_run import has_python_steps
+from klack.units import format_si
 
 __all__ = ["STROKES"]
 
@@ -225,6 +226,7 @@ class _Strokes(PointKind[ValveCase, _Built]):
         notes = [*built.notes, *doubts_in(caught), *whole.noise.notes]
         notes += [note for note in begun if not any(note in other for other in notes)]
         notes += [rest] if rest else []
+        notes += _unfinished(asked.chosen, whole)
         told = tuple(dict.fromkeys(notes))
         return PointRow(values, notes=told, others=others_in(caught), steps=steps)
 
@@ -236,6 +238,20 @@ class _Strokes(PointKind[ValveCase, _Built]):
 
 STROKES = _Strokes()
 """Strokes of a case of a whole valve."""
+
+
+def _unfinished(chosen: Sequence[ChosenMeasure], run: StrokeOfPoint) -> Iterator[str]:
+    """Doubts about what measures of flows count: it still flows at the end."""
+    found = [item.part(run) for item in chosen if item.of == "delivery"]
+    if any(item.name == "delivered_mass" for item in chosen):
+        found += [item for item in run.variant.deliveries.values() if item.leads_out]
+    for item in found:
+        if item is not None and item.flows_on:
+            yield (
+                f"'{item.name}' still passes {format_si(1e3 * abs(item.final_flow), 'g/s', 3)} at "
+                f"{format_si(item.end, 's')}, where its mass ends. Try: a longer run.duration, or "
+                "commands further apart."
+            )
 
 
 def _valve_at(asked: AskedPoints[ValveCase], built: _Built, i: int) -> Valve:

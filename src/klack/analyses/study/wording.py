@@ -43,9 +43,9 @@ _TOLD = 8  # points in a sentence
 
 
 def shown_unit(unit: str) -> tuple[str, float]:
-    """Unit for prefixes, and the factor from SI: masses in grams, numbers bare."""
-    if unit == "kg":
-        return "g", 1e3
+    """Unit for prefixes, and the factor from SI: masses and their flows in g, numbers bare."""
+    if unit in ("kg", "kg/s"):
+        return unit[1:], 1e3
     return ("", 1.0) if unit in ("1", "-") else (unit, 1.0)
 
 
