@@ -12,8 +12,8 @@ same two cases comes levels.svg.
 
 Of ``klack calibrate measured --measurement cases/measured/strokes_synthetic.csv`` comes
 calibration.svg, of ``klack study docs/how-to/injected_mass.yaml --study
-docs/how-to/pulse_width.yaml`` injected-mass.svg, of ``klack noise demo-stroke --variant wet,dry`` click.svg, of ``klack heat
-warm-valve`` warm-up.svg.
+docs/how-to/pulse_width.yaml`` injected-mass.svg, of ``klack noise demo-stroke --variant wet,dry``
+click.svg, of ``klack heat warm-valve`` warm-up.svg.
 
 Of ``klack stroke`` of a copy of ``docs/how-to/guided_stroke.yaml`` with ``placement: {seed: 4}``,
 without ``shots`` and with ``run: {duration: 0.8 ms, variants: [wet]}`` come off-axis-line-load.svg
@@ -90,7 +90,7 @@ def main(results: list[Path]) -> None:
 
 
 def mass_chart(study: StudyRecord) -> Chart:
-    """Mass over the width of the pulse; the grey line is where the needle first reaches its stop."""
+    """Mass over the width of the pulse, and where the needle first reaches its stop."""
     pulse, mass = study.parameters[0].values, study.measures[0].values
     touch = next(item for item in study.measures if item.name == "opening_time").values
     reached = 1e3 * float(pulse[np.flatnonzero(np.isfinite(touch))[0]])

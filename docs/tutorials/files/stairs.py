@@ -6,12 +6,10 @@ with the opposite sign after 2 L / a, and the pressure at the needle is
 
     p(t) = -p(t - 2 L/a) + Z [q(t) - q(t - 2 L/a)],    Z = rho a / A_line,
 
-with q the flow into the line, above the pressure at rest.  Stair k lasts from k to k + 1 echo times
-after the middle of the impact.
+with q the flow into the line, above the pressure at rest.  The stairs themselves are those that
+klack has found.
 """
 
-from dataclasses import dataclass
-from itertools import pairwise
 from math import pi
 
 import numpy as np
@@ -22,15 +20,6 @@ from klack.hydraulics.fluid_library import library_fluid
 LENGTH, BORE, SEAT = 60e-3, 7e-3, 5e-3  # [m], of stairs/case.yaml
 SUPPLY = 6.013e5  # [Pa]
 EDGE = 12e-6  # [s], half of the time that an impact, so an edge, takes
-
-
-@dataclass(frozen=True)
-class Stair:
-    """Mean pressure force on the needle, and the slope of its velocity, over one stair."""
-
-    force: float
-    expected_force: float
-    slope: float
 
 
 def theory():
@@ -52,36 +41,21 @@ def expected_pressure(time, speed, seat_flow):
     return SUPPLY + above
 
 
-def edge_time(time, pressure, about):
-    """Centre [s] of a change of pressure."""
-    near = np.abs(time - about) < 1.5 * EDGE
-    rate = np.abs(np.gradient(pressure, time))[near]
-    return float(np.sum(rate * time[near]) / np.sum(rate))
-
-
-def stairs(variant, impact, count):
-    """Edges [s] and stairs after an impact on the seat."""
+def stairs(variant, number):
+    """Stairs after an impact on the seat, each with the step of force [N] that theory expects."""
     echo, _, _ = theory()
-    area = 0.25 * pi * SEAT**2
-    channel = {name: variant.result.channels[name].values for name in variant.result.channels}
-    time, speed = variant.result.time, channel["needle velocity"]
-    pressure, body = channel["mouth pressure"], channel["body pressure"]
-    expected = expected_pressure(
-        time, channel["needle.tip velocity"], channel["restriction mass flow"]
-    )
-    middle = impact.time + 0.5 * impact.contact_time
+    channels, time = variant.result.channels, variant.result.time
+    speed, flow = channels["needle.tip velocity"].values, channels["restriction mass flow"].values
+    pressure = expected_pressure(time, speed, flow)
     found = []
-    for k in range(count):
-        on = (time > middle + k * echo + EDGE) & (time < middle + (k + 1) * echo - EDGE)
-        found.append(
-            Stair(
-                force=area * np.mean((pressure - body)[on]),
-                expected_force=area * np.mean((expected - body)[on]),
-                slope=np.polyfit(time[on], speed[on], 1)[0],
+    for stair in variant.stairs:
+        if (stair.stop, stair.impact) == ("seat", number):
+            before, after = (
+                np.mean(pressure[(time > edge + EDGE) & (time < edge + echo - EDGE)])
+                for edge in (stair.expected_time - echo, stair.expected_time)
             )
-        )
-    edges = [edge_time(time, pressure, middle + k * echo) for k in range(count)]
-    return edges, found
+            found.append((stair, 0.25 * pi * SEAT**2 * (after - before)))
+    return found
 
 
 def slopes(variant, impact, count):
@@ -104,20 +78,15 @@ def main():
     mass = next(body.mass for body in study.bodies if body.name == "needle")
     echo, _, _ = theory()
     wet, dry = study.variants["wet"], study.variants["dry"]
-    edges, found = stairs(wet, wet.impacts("seat")[0], 3)
+    impact = wet.impacts("seat")[0]
+    middle = impact.time + 0.5 * impact.contact_time
     print(f"length of a stair: 2 L/a = {1e6 * echo:.1f} us")
-    for before, after in pairwise(edges):
-        print(f"  computed {1e6 * (after - before):.1f} us")
-    for k in range(1, len(found)):
-        step, theirs = (
-            found[k].force - found[k - 1].force,
-            found[k].expected_force - found[k - 1].expected_force,
-        )
-        seen = mass * (found[k].slope - found[k - 1].slope)
+    for stair, force in stairs(wet, 1):
         print(
-            f"edge {k}: force {theirs:+.2f} N expected, {step:+.2f} N computed, "
-            f"{seen:+.2f} N from the velocity; step of the velocity "
-            f"{theirs * echo / mass:+.3f} m/s expected, {seen * echo / mass:+.3f} m/s computed"
+            f"edge {stair.number}: after {1e6 * (stair.time - middle):.1f} us; force "
+            f"{force:+.2f} N expected, {stair.force:+.2f} N computed, {stair.seen_force:+.2f} N "
+            f"from the velocity; step of the velocity {force * echo / mass:+.3f} m/s expected, "
+            f"{stair.velocity_step:+.3f} m/s computed"
         )
     flat = slopes(dry, dry.impacts("seat")[0], 3)
     print("dry: slopes " + ", ".join(f"{slope:.0f} m/s^2" for slope in flat))
