@@ -574,8 +574,8 @@ def test_the_second_shot_is_late_as_the_page_says(result):
 @pytest.mark.slow
 def test_the_energies_are_those_of_the_page(result):
     found = re.search(
-        r"Of ([\d.]+) mJ from the battery ([\d.]+) mJ become heat in the coil, ([\d.]+) mJ in "
-        r"diodes, ([\d.]+) mJ in switches and ([\d.]+) mJ in the converter",
+        r"The battery supplies ([\d.]+) mJ. The coil turns ([\d.]+) mJ of them into heat, the "
+        r"diodes ([\d.]+) mJ, the switches ([\d.]+) mJ and the converter ([\d.]+) mJ",
         PAGE,
     )
     assert found is not None

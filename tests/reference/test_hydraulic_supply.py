@@ -189,8 +189,8 @@ def test_the_energy_balance_closes_and_its_entries_are_those_of_the_page_rail(re
     assert result_rail.books.relative_residual <= 1e-11
     pump, relief, leak = numbers(
         PAGE_RAIL,
-        r"Of the ([\d.]+) J of the pump the relief valve turns ([\d.]+) J into heat and the "
-        r"leakage of the pump ([\d.]+) J",
+        r"The pump supplies ([\d.]+) J, of which the relief valve turns ([\d.]+) J into heat and "
+        r"the leakage of the pump ([\d.]+) J",
     )
     assert result_rail.books.supplies["pump shaft work"] == pytest.approx(pump, abs=0.05)
     assert result_rail.books.losses["relief flow"] == pytest.approx(relief, abs=0.05)
