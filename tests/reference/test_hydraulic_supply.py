@@ -6,6 +6,8 @@ The page of a pneumatic valve says what its case gives; truth: a run, and mass t
 
 The page of metering notches says what its case gives; truth of the areas: `klack verify`.
 
+The page of injected mass says what its cases give; truth: forces over areas, test_delivery.py.
+
 The page of a common rail says what its case gives; truth: Joukowsky, and the time of a wave.
 """
 
@@ -16,9 +18,11 @@ from math import pi
 import numpy as np
 import pytest
 from pages import HOW_TO, blocks, numbers, require_parts, run_of
+from quoted_output import compare
 from ruamel.yaml import YAML
 
 from klack.analyses.operating_point.analysis import OPERATING_POINT
+from klack.analyses.stroke.run import run_stroke
 from klack.case.any_case import load_valve_case, read_valve_case
 from klack.cli.main import main
 from klack.simulation.network_run import simulate_network
@@ -288,3 +292,37 @@ def test_at_rest_the_relief_valve_passes_what_the_pump_delivers(tmp_path, monkey
     assert value["relief", "mass flow"] == pytest.approx(pump + leak, rel=1e-12)
     assert 145e5 < value["rail", "pressure"] < 155e5  # set and rated pressure of the relief valve
     assert value["rail", "pressure"] == pytest.approx(value["outlet", "pressure"], rel=1e-12)
+
+
+PAGE_MASS = (HOW_TO / "injected-mass.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("number", [0, 1, 2])
+def test_the_page_of_injected_mass_says_what_its_commands_print(number, capsys, tmp_path):
+    """A stroke, the studies of one width and of two pulses; truth: test_delivery.py."""
+    parts = re.findall(r"```\nklack ([^\n]*)\n```\n\n```\n(.*?)```", PAGE_MASS, re.DOTALL)
+    command, quoted = parts[number]
+    words = [
+        str(HOW_TO / word[12:]) if word.startswith("docs/") else word for word in command.split()
+    ]
+
+    assert main([*words, "--out", str(tmp_path), "--no-report"]) == 0
+
+    compare(quoted, capsys.readouterr().out, command)
+
+
+def test_a_pressure_valve_opens_and_closes_where_its_page_says():
+    """Preload and friction over the area within 2 % of both pressures; the page within a digit."""
+    variant = run_stroke(load_valve_case(HOW_TO / "pressure_valve.yaml")).reference
+    edge, area = variant.deliveries["edge"], pi / 4 * 25e-6
+    assert edge.opening_pressure == pytest.approx(38.3 / area, rel=0.02)
+    assert edge.closing_pressure == pytest.approx(36.3 / area, rel=0.02)
+    for name, value, factor in (
+        ("edge.opening_pressure", edge.opening_pressure, 1e-5),
+        ("edge.closing_pressure", edge.closing_pressure, 1e-5),
+        ("edge.hysteresis", edge.hysteresis, 1e-5),
+        ("edge.peak_flow", edge.peak_flow, 1e3),
+        ("leak.initial_flow", variant.deliveries["leak"].initial_flow, 1e6),
+    ):
+        said = numbers(PAGE_MASS, rf"`{name}` . ([\d.]+) ")[0]
+        assert value * factor == pytest.approx(said, rel=5e-3)
