@@ -208,6 +208,13 @@ def test_gas_passes_what_its_chamber_gains():
     assert found["inlet"].outward == -1
 
 
+def test_gas_between_given_pressures_alone_is_not_computed():
+    parts = {"supply": GasSource(pressure=HIGH), "hole": GasOrifice(diameter=4e-4)}
+    ways = [["supply.gas", "hole.a"], ["hole.b", "ambient"]]
+    found, _ = run(parts, ways, 1e-4, fluid=None, gas=library_gas("air"))
+    assert found == {}
+
+
 # ---- numbers of one flow, given as records ------------------------------------------------------
 
 
@@ -298,6 +305,8 @@ def test_commands_share_the_mass_wherever_records_lie():
     assert found["nozzle.1"].mass + found["nozzle.2"].mass == pytest.approx(found["nozzle"].mass)
     assert found["nozzle.2"].flow_delay == pytest.approx(1.01e-4, rel=1e-6)
     assert "nozzle.3" not in found
+    many = flow_of(values, 1e-6, starts=tuple(1e-5 * np.arange(101)))
+    assert (len(many), many["nozzle.100"].end) == (101, pytest.approx(1e-3))
 
 
 # ---- stairs ------------------------------------------------------------------------------------

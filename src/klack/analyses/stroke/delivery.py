@@ -39,6 +39,7 @@ _BEGUN = 0.01  # of the largest rise of a flow: from there on it flows
 _OPEN = 0.5  # of the largest flow: where a steady flow is sought
 _STEADY, _MOSTLY = 0.05, 0.5  # off the median by so much at most, for so much of that time
 _NOTHING = 1e-6  # of the largest flow of all restrictions: no flow, but round-off and trembling
+_MOST = 100  # commands with numbers of their own: more are no injections
 _SLIVER = 1e-6  # of a record: a shorter piece of one has no mean
 
 
@@ -60,7 +61,7 @@ class Restriction:
     density [kg/m^3]
         At the pressure of the surroundings.
     starts [s]
-        When the driver that is nearest in the network switches on, within the run.
+        When the driver that is nearest in the network switches on, within the run; the first 101.
     until [s]
         End of the run.
     """
@@ -166,7 +167,8 @@ def restrictions_of(rows: Rows, network: Network, until: float) -> tuple[Restric
             ends[row.component] = (row.a, row.b)
             channel = " ".join(filter(None, (row.component, row.label, flow_label(row))))
             flows[row.component] = (*flows.get(row.component, ()), channel)
-    ends |= {row.component: (row.a, row.b) for row in gas.branches}
+    if gas.chambers or gas.walls:  # else no gas is computed
+        ends |= {row.component: (row.a, row.b) for row in gas.branches}
     for name in filter(ends.__contains__, known):
         a, b = ends[name]
         density = 0.0
@@ -218,7 +220,7 @@ def _starts(network: Network, name: str, until: float) -> tuple[float, ...]:
     _, first, period = min(found, key=lambda item: item[:2])
     if period is None:
         return (first,) if first < until else ()
-    return tuple(np.arange(first, until, period).tolist())
+    return tuple(np.arange(first, until, period)[: _MOST + 1].tolist())
 
 
 def deliveries(restrictions: Sequence[Restriction], result: NetworkResult) -> Iterator[Delivery]:
@@ -239,7 +241,7 @@ def deliveries(restrictions: Sequence[Restriction], result: NetworkResult) -> It
             (0, float(time[0]), item.until),
             known[0][1] if known else None,
         )
-        for (k, start), (_, end) in pairwise([*known, (0, item.until)]):
+        for (k, start), (_, end) in pairwise([*known, (0, item.until)][: _MOST + 1]):
             yield _delivery(item, result, mass, least, (k, start, end), start)
 
 
