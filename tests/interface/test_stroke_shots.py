@@ -115,6 +115,7 @@ def test_strokes_keep_the_energy_balance(alone):
         assert np.isnan(outcome.stroke["faces_loss"])  # faces without friction
         assert outcome.stroke["injected_energy"] > 0.0
         assert np.isnan(outcome.stroke["radiated_energy"])  # no section noise
+        assert np.isnan(outcome.stroke["delivered_mass"])  # dry
         assert not outcome.failure
 
 

@@ -37,6 +37,7 @@ PRELOAD = "network.components.spring.preload"
 GAP = "network.components.opening.gap"
 STIFFNESS = "network.components.spring.stiffness"
 HEAD = "klack: 1\nstudy:\n"
+INJECTOR = SMALL.with_name("injected_mass.yaml")
 STUDY = f"""
   parameters:
     {PRELOAD}: {{from: 10 N, to: 14 N}}
@@ -85,6 +86,29 @@ class TestNumbers:
             found = klack.run_stroke(changed, ["dry"]).measures
             assert columns(record)["opening_time"][i] == found["dry"]["opening_time"].value
             assert columns(record)["impacts"][i] == found["dry"]["impacts"].value
+
+    def test_masses_are_those_of_the_restrictions_of_the_stroke(self, tmp_path):
+        """Also of one command of the driver, with a doubt where it does not end in time."""
+        names = ["nozzle.mass", "nozzle.2.mass", "nozzle.9.mass", "delivered_mass"]
+        text = f"""
+  parameters:
+    parameters.pulse: {{values: [0.5 ms, 0.6 ms]}}
+    parameters.period: {{fixed: 0.7 ms}}
+  measures: [{", ".join(names)}]
+  design: {{kind: grid, levels: 2}}
+"""
+        file = write(tmp_path, text)
+        record = klack.run_study(INJECTOR, file).record
+        case = klack.load_case(INJECTOR)
+        for key, value in (("pulse", "0.5 ms"), ("period", "0.7 ms")):
+            case = case.with_value(f"parameters.{key}", value)
+        measures = klack.run_stroke(case).measures
+        one, two = measures["wet, nozzle"]["mass"], measures["wet, nozzle.2"]["mass"]
+        found = [columns(record)[name][0] for name in names]
+        assert found[:2] == [one.value, two.value]
+        assert np.isnan(found[2])
+        assert found[3] == measures["wet"]["delivered_mass"].value == one.value
+        assert "'nozzle.2' still passes" in record.notes[0]
 
     def test_the_case_as_it_is_stands_beside(self, study):
         record = klack.run_study(SMALL, study).record
@@ -295,6 +319,7 @@ WRONG = [
     (f"{GAP}: lift", f"{PRELOAD}: preload", "a key that is a parameter as well"),
     (f"{GAP}: lift", f"{GAP}: stiffness * part / 1e6", "a length"),
     ("opening_time,", "opening_tim,", "did you mean 'opening_time'?"),
+    ("opening_time,", "bore.mass,", "did you mean 'bores.mass'?"),
     ("variant: dry", "variant: damp", "wet"),
     ("points: 8", "points: 0", "1 or more"),
     ("points: 8", "kind: file", "without a file"),
