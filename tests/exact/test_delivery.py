@@ -11,10 +11,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from pages import HOW_TO
 from scipy.integrate import solve_ivp
 
-from klack.analyses.stroke.delivery import Restriction, deliveries, restrictions_of
+from klack.analyses.stroke.delivery import Restriction, deliveries, restrictions_of, starts_of
 from klack.analyses.stroke.stairs import LineEnd, stairs
+from klack.case.any_case import load_valve_case
 from klack.hydraulics.chamber import Chamber
 from klack.hydraulics.fluid_library import library_fluid
 from klack.hydraulics.gas.gas_chamber import GasChamber
@@ -25,6 +27,7 @@ from klack.hydraulics.orifice import Orifice
 from klack.hydraulics.pressure_face import PressureFace
 from klack.hydraulics.pressure_source import PressureSource
 from klack.hydraulics.variable_orifice import VariableOrifice
+from klack.magnetics.boost_driver import BoostDriver, Shot
 from klack.mechanics.force import ForceOverTime
 from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
@@ -394,3 +397,27 @@ def test_stairs_that_the_sensor_does_not_show(sensor, hidden):
 def test_no_stairs_before_the_next_contact_or_without_records():
     """An echo that is as short as the impact leaves no stair to measure."""
     assert staircase([6e5, 9e5], echo=1.2e-5) == []
+
+
+# ---- whose command it is -----------------------------------------------------------------------
+
+
+def test_every_injector_has_the_commands_of_its_own_driver():
+    """Four of them on one rail, a quarter of a cycle apart; the pump has none of its own."""
+    case = load_valve_case(HOW_TO / "common_rail.yaml")
+    network = case.network.network()
+    found = {item.component: item for item in restrictions_of(network.rows(), network, 60e-3)}
+    for number, start in ((1, 1.0), (2, 19.75), (3, 7.25), (4, 13.5)):
+        starts = found[f"injector{number}_holes"].starts
+        assert starts == pytest.approx(1e-3 * np.arange(start, 60.0, 25.0))
+        assert found[f"injector{number}_holes"].outward == 1
+        assert found[f"injector{number}_nozzle"].outward == 0
+    assert "feed" not in found  # a line
+
+
+def test_every_shot_of_a_driver_is_a_command():
+    shots = [Shot(start=1e-3, end=2e-3), Shot(start=3e-3, end=4e-3)]
+    driver = BoostDriver.model_construct(shots=tuple(shots), repeat_every=10e-3)
+    parts = {"hole": Orifice(diameter=1e-3), "driver": driver}
+    network = SimpleNamespace(components=parts, connections=(("hole.a", "driver.terminals"),))
+    assert starts_of(network, "hole", 12e-3) == pytest.approx([1e-3, 3e-3, 11e-3])

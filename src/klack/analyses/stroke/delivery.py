@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.hydraulics.gas.gas import Gas
-from klack.magnetics.driver import DiodeDriver, Driver
+from klack.magnetics.driver import Driver
 from klack.network.component import Component
 from klack.network.gas_rows import PASSED
 from klack.network.network import Network
@@ -31,6 +31,7 @@ __all__ = [
     "passed_mass",
     "restriction_names",
     "restrictions_of",
+    "starts_of",
 ]
 
 Vector = NDArray[np.float64]
@@ -185,7 +186,7 @@ def restrictions_of(rows: Rows, network: Network, until: float) -> tuple[Restric
                 ambient=ambient.pressure,
                 outward=(b in given) - (a in given),
                 density=density,
-                starts=_starts(network, name, until),
+                starts=starts_of(network, name, until),
                 until=until,
             )
         )
@@ -196,7 +197,7 @@ def _pressure(names: Mapping[int, str], node: int) -> str:
     return "" if node == AMBIENT else f"{names[node]} pressure"
 
 
-def _starts(network: Network, name: str, until: float) -> tuple[float, ...]:
+def starts_of(network: Network, name: str, until: float) -> tuple[float, ...]:
     """Starts of the driver that is nearest, along connections, within the run."""
     beside: dict[str, set[str]] = {}
     for connection in network.connections:
@@ -209,18 +210,18 @@ def _starts(network: Network, name: str, until: float) -> tuple[float, ...]:
         for other in beside.get(part, set()) - away.keys():
             away[other] = away[part] + 1
             ahead.append(other)
-    found = [
-        (away[part], start, driver.repeat_every if isinstance(driver, DiodeDriver) else None)
+    drivers = [
+        (away[part], tuple(start for start, _ in driver.commands()), part, driver)
         for part, driver in network.components.items()
-        if isinstance(driver, Driver) and part in away
-        for start, _ in driver.commands()
+        if isinstance(driver, Driver) and part in away and driver.commands()
     ]
-    if not found:
+    if not drivers:
         return ()
-    _, first, period = min(found, key=lambda item: item[:2])
-    if period is None:
-        return (first,) if first < until else ()
-    return tuple(np.arange(first, until, period)[: _MOST + 1].tolist())
+    _, starts, _, driver = min(drivers, key=lambda item: item[:3])
+    period: float | None = getattr(driver, "repeat_every", None)
+    cycles = np.zeros(1) if period is None else np.arange(0.0, until, period)[: _MOST + 1]
+    found = np.unique(np.add.outer(cycles, starts))
+    return tuple(found[found < until][: _MOST + 1].tolist())
 
 
 def deliveries(restrictions: Sequence[Restriction], result: NetworkResult) -> Iterator[Delivery]:
