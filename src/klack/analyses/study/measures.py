@@ -423,7 +423,7 @@ def _stroke_measure(name: str, stops: list[str], ways: Sequence[str]) -> ChosenM
         raise InputError(
             "measures",
             got=f"'{name}' in the study of a whole valve",
-            expected=_known_words(stops),
+            expected=_known_words(stops, ways),
             hint="shots are drops of two bodies: study a case of an impact with a section 'shots'.",
         )
     return _OF_NOISE.get(name)
