@@ -573,6 +573,8 @@ def format_si(value: float, unit: str, digits: int = 4) -> str:
     ('3.6 um', '1.25 GN/m', '0 N')
     >>> format_si(4.51e-7, "m", 2)
     '450 nm'
+    >>> format_si(7.27e-24, "J", 3)
+    '7.27e-24 J'
     """
     if unit in ("", "-"):
         return f"{value:.{digits}g}"
@@ -581,7 +583,7 @@ def format_si(value: float, unit: str, digits: int = 4) -> str:
     rounded = abs(float(f"{value:.{digits}g}"))
     if not takes_prefix(unit):
         return f"{value:.{digits}g} {unit}"
-    power = next((p for p in sorted(_PREFIXES, reverse=True) if rounded >= 10.0**p), -15)
+    power = next((p for p in sorted(_PREFIXES, reverse=True) if rounded >= 10.0**p), 0)
     scaled = float(f"{value / 10.0**power:.{digits}g}")
     return f"{scaled:.{max(digits, 3)}g} {_PREFIXES[power]}{unit}"  # 450 nm, not 4.5e+02 nm
 

@@ -5,6 +5,7 @@ bodies, the same machine as a model and as a file, and the power of all parts.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -111,6 +112,19 @@ def test_a_mass_on_an_infinite_plate_over_time_and_in_energy() -> None:
     exposed = np.trapezoid(2.0 * np.abs(H * g) ** 2, f)
     assert ear.bands.energy[band] == pytest.approx(exposed, rel=1e-3)
     assert [path.share for path in ear.paths] == pytest.approx([1.0], rel=1e-12)
+
+
+def test_a_sound_that_is_cut_off_says_so() -> None:
+    """A mass on a spring without loss rings for ever; on a plate only forces can last as long."""
+    plate = on(receiver=INFINITE)
+    for found, is_cut in (
+        (plate, False),
+        (replace(plate, span=1.0), True),
+        (on(receiver={"springs": {"z": "1 N/um"}}), True),
+    ):
+        signal, _ = found.signal()
+        assert signal is not None
+        assert any("ends 0.8 s after" in note for note in signal.notes) == is_cut
 
 
 def test_a_spring_with_a_loss_factor_has_no_time_beside_the_axis() -> None:

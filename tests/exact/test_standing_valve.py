@@ -12,6 +12,7 @@ from klack.acoustics.coupling import Placement, axes_of, couple
 from klack.acoustics.interface import Freedom, InterfacePoint, Receiver, laplace
 from klack.acoustics.isolator import Spring
 from klack.acoustics.plate import Plate
+from klack.acoustics.receivers.measured import HeardReceiver
 from klack.acoustics.receivers.modal import (
     ModalReceiver,
     grounded,
@@ -341,7 +342,14 @@ def test_impact_of_a_mass_on_a_mass_on_a_plate(thickness: float) -> None:
         port_motion=one,
     )
     receiver = InfinitePlate(plate=plate, points=(FLANGE,))
-    found = standing_valve([block], (FLANGE,), receiver, placements={}, isolators={}, missing={})
+    heard = HeardReceiver(
+        receiver=receiver,
+        name="hall",
+        ears=("a",),
+        frequency=np.array([100.0, 200.0]),
+        transfers=np.ones((2, 1, 1), dtype=complex),
+    )  # ears of a file change nothing
+    found = standing_valve([block], (FLANGE,), heard, placements={}, isolators={}, missing={})
     ((_, impedance),) = found.dampers.values()
     assert impedance == pytest.approx(8.0 * np.sqrt(plate.bending_stiffness * plate.mass_per_area))
     housing = found.reduced("housing", ("seat",), HOUSING)

@@ -25,6 +25,7 @@ from klack.acoustics.at_mounts import freedoms_of_bodies
 from klack.acoustics.coupling import Missing, Placement, transformation
 from klack.acoustics.interface import Freedom, InterfacePoint, Receiver
 from klack.acoustics.isolator import Isolator, Spring
+from klack.acoustics.receivers.measured import HeardReceiver
 from klack.acoustics.receivers.modal import ModalReceiver
 from klack.acoustics.receivers.plates import InfinitePlate
 from klack.arrays import Matrix, Vector
@@ -116,6 +117,8 @@ def standing_valve(
     InputError
         For a receiver or an element that has no law in time.
     """
+    if isinstance(receiver, HeardReceiver):
+        receiver = receiver.receiver  # ears that were measured apart push nothing
     freedoms = freedoms_of_bodies(bodies, points)
     T, kept, _ = transformation(points, freedoms, receiver, placements, missing)
     modes, own = sum(body.omega.size for body in bodies), len(freedoms)

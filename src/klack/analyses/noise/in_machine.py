@@ -38,6 +38,10 @@ _APART, _MOST = 10.0, 16000  # [Hz] between lines at first, and lines
 _SETTLED = 0.01  # change of the energy when every second line is left out
 _RUNG = 1e-4  # share of the energy in the last tenth of a model's record
 _LONGEST = 0.8  # [s]
+_CUT = (
+    f"The sound at the ears ends {_LONGEST:g} s after it begins, while forces act or the machine "
+    "rings: peak, loudness and files are those of this part, exposures of all of it."
+)
 _FELT = 0.01  # velocity of the mounts over that of the needle
 _LEFT_OUT = 0.01  # share of the blocked force outside of the measured band
 
@@ -90,8 +94,9 @@ class Installed:
             )
             energy = np.sum(found.velocity**2, axis=1)
             tail = float(energy[-energy.size // 10 :].sum())
-            if tail <= _RUNG * float(energy.sum()) or duration >= _LONGEST:
-                return found
+            whole = self.span + _LEAD <= duration and tail <= _RUNG * float(energy.sum())
+            if whole or duration >= _LONGEST:
+                return found if whole else replace(found, notes=(*found.notes, _CUT))
             duration *= 2.0
 
     def _on_lines(self) -> CoupledSignal:
