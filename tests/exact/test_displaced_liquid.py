@@ -21,7 +21,7 @@ from klack.hydraulics.pressure_source import PressureSource
 from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
 from klack.network.network import Network
-from klack.simulation.displaced_liquid import liquid_doubts
+from klack.simulation.displaced_liquid import liquid_doubts, told_once
 from klack.simulation.network_result import ChannelData
 from klack.simulation.network_run import simulate_network
 from klack.units import MASS as MASSES
@@ -73,13 +73,16 @@ def swing(rows, duration=7e-3):
     )
 
 
-def added_mass(result):
-    """From the time of whole periods, less the mass of the body."""
-    y = result.channels["mass.body displacement"].values + PUSH / STIFFNESS
+def added_mass(result, more=0.0):
+    """From the time of whole periods, less the mass of the body.
+
+    ``more`` is what another piston adds to the stiffness, over it.
+    """
+    y = result.channels["mass.body displacement"].values + PUSH / STIFFNESS / (1.0 + more)
     i = np.flatnonzero((y[:-1] > 0.0) & (y[1:] <= 0.0))
     times = result.time[i] + np.diff(result.time)[i] * y[i] / (y[i] - y[i + 1])
     omega = 2.0 * pi * (len(times) - 1) / (times[-1] - times[0])
-    return STIFFNESS / omega**2 - MASS
+    return STIFFNESS * (1.0 + more) / omega**2 - MASS
 
 
 def notes(passages, pace=5e3, speed=0.05, **more):
@@ -97,7 +100,7 @@ def notes_on(rows, pace=5e3, speed=0.05, pressure=AMBIENT):
 
 def stated(note):
     """Added mass of a note [kg]."""
-    return parse_quantity(note.split("act like ")[1].split(" on its")[0], MASSES)
+    return parse_quantity(re.split(" on its| at '", note.split("act like ")[1])[0], MASSES)
 
 
 def test_column_swings_as_an_added_mass() -> None:
@@ -176,6 +179,71 @@ def test_many_passages_in_a_row_name_one() -> None:
     (note,) = notes_on(rows, speed=1e-4)
     assert re.search(r"through 'hole\d+'.*, whose inertia", note)
     assert "Try: join hole" in note
+
+
+SECOND, FURTHER = 0.1e-3, 4e-3  # mass of another piston, diameter of its face
+
+
+def pistons(before=None):
+    """Two masses on springs: what one displaces passes a hole and drives the other."""
+    joints = [["mass.body", "spring.end", "face.body"], ["other.body", "back.end", "far.body"]]
+    near = ["room.fluid", "face.fluid"]
+    parts = {
+        "mass": RigidMass(mass=MASS),
+        "spring": Spring(stiffness=STIFFNESS, preload=PUSH),
+        "face": PressureFace(direction="opening", outer_diameter=FACE),
+        "room": Chamber(volume=0.1 * VOLUME, pressure=AMBIENT),
+        "hole": HOLE,
+        "end": Chamber(volume=0.1 * VOLUME, pressure=AMBIENT),
+        "far": PressureFace(direction="opening", outer_diameter=FURTHER),
+        "other": RigidMass(mass=SECOND),
+        "back": Spring(stiffness=STIFFNESS, preload=0.0),
+    }
+    if before is not None:
+        parts |= {"liquid": before, "mouth": Chamber(volume=0.1 * VOLUME, pressure=AMBIENT)}
+        joints.append([*near, "liquid.a"])
+        near = ["liquid.b", "mouth.fluid"]
+    joints += [[*near, "hole.a"], ["hole.b", "end.fluid", "far.fluid"]]
+    return Network(parts, joints, fluid=HEPTANE).rows()
+
+
+def test_two_pistons_share_the_liquid_between_them() -> None:
+    """One note on both: Rayleigh's rho/d on m + (A/A')^2 m', and what its inertance adds to them.
+
+    Two digits of the note, and the compliance of three rooms: 2 %.
+    """
+    with pytest.warns(UserWarning, match="inertia is left out") as warned:
+        bare = swing(pistons())
+    (note,) = [str(w.message) for w in warned if "displace" in str(w.message)]
+    ratio = (FACE / FURTHER) ** 2
+    assert note.startswith("'mass' and 'other' displace liquid through 'hole'")
+    assert stated(note) == pytest.approx(RHO / HOLE.diameter * AREA**2, rel=0.05, abs=0.0)
+    assert f"where {1e3 * (MASS + ratio**2 * SECOND):.3g} g move" in note
+    length, area = (float(note.split(f"{key}: ")[1].split(" mm")[0]) for key in ("length", "area"))
+    whole = swing(pistons(Inertance(length=1e-3 * length, area=1e-6 * area, friction="none")))
+    found = added_mass(whole, ratio**2) - added_mass(bare, ratio**2)
+    assert found == pytest.approx(stated(note), rel=0.02, abs=0.0)
+
+
+def test_a_long_hole_holds_what_it_is_long() -> None:
+    long = HOLE.model_copy(update={"length": 5e-3})
+    (note,), (thin,) = notes({"hole": long}, speed=1e-4), notes({"hole": HOLE}, speed=1e-4)
+    added = RHO * 5e-3 / HOLE.hole_area * AREA**2
+    assert stated(note) - stated(thin) == pytest.approx(added, rel=0.03, abs=0.0)  # two digits
+    assert "thin plate" in thin
+    assert "thin plate" not in note
+
+
+def test_a_body_that_trembles_has_no_note() -> None:
+    """1 nm on a stop, or a hundredth of what another body travels."""
+    assert notes({"gap": GAP}, speed=1e-6) == []
+    assert notes({"gap": GAP}, speed=1e-4) != []
+
+
+def test_a_note_is_told_once_for_all_variants() -> None:
+    first, second = notes({"gap": GAP}), notes({"gap": GAP}, speed=0.1)
+    found = list(told_once(["one", *first, "two", *second, "two"]))
+    assert found == ["one", *first, "two", "two"]
 
 
 def test_a_body_on_its_machine_displaces_as_a_free_one() -> None:

@@ -215,6 +215,12 @@ class Orifice(Component):
         default=None, gt=0, description="4 area / perimeter; of a circle by default."
     )
     count: Count = Field(default=1, description="Number of such holes in parallel.")
+    length: Length | None = Field(
+        default=None,
+        gt=0,
+        description="Of the hole along the flow, for the weight of its liquid in notes; as in a "
+        "thin plate by default. The flow does not depend on it.",
+    )
     discharge: Ratio = Field(
         default=0.7,
         gt=0,
@@ -261,15 +267,19 @@ class Orifice(Component):
         return self.discharge * area, number, throat, vapour_pressure
 
     def liquid(self, density: float) -> Liquid:
-        """Liquid in and about the holes as if in a thin plate, ``rho/d`` each.
+        """Liquid in and about the holes, of a thin plate ``rho/d`` each.
 
         Exact for potential flow through a circular hole in an infinite thin wall (Rayleigh, Theory
         of Sound II, 1878, sec. 306): a column ``pi/4 d`` long.  A wall adds its thickness.
         """
         area = self.count * self.hole_area
-        length = 0.25 * pi * sqrt(4.0 * self.hole_area / pi)
-        loss = 0.5 * density / (self.discharge * area) ** 2
-        return Liquid(inertance=density * length / area, length=length, loss=loss, thin=True)
+        length = 0.25 * pi * sqrt(4.0 * self.hole_area / pi) + (self.length or 0.0)
+        return Liquid(
+            inertance=density * length / area,
+            length=length,
+            loss=0.5 * density / (self.discharge * area) ** 2,
+            thin=self.length is None,
+        )
 
     def add_rows(self, rows: Rows) -> None:
         """Add one branch."""

@@ -12,11 +12,12 @@ with the flows ``Q_e`` that share the displaced one: the amplitudes at the pace 
 .. math:: i\omega \frac{V_n}{K} p_n + A_n v + \sum_e Q_e = 0, \qquad
           p_n - p_m = (i\omega L_e + R_e + C_e |Q_e|)\,Q_e .
 
-``K`` is that at the mean pressure while the body moves.  So parallel passages share the flow, a
-guide that is too tight leaves it to others, and a chamber that is large enough takes it.  Where
-chambers swing at that pace they would multiply it; the mass is at most that in rigid ones.  The sum
-is over passages whose inertia the rows leave out, except those behind an inertance or a line that
-has it: at a volume without a moving wall.
+Other bodies move along by their share ``v' v / v^2`` of the recorded velocities, with their faces
+and masses.  ``K`` is that at the mean pressure while the body moves.  So parallel passages share
+the flow, a guide that is too tight leaves it to others, and a chamber that is large enough takes
+it.  Where chambers swing at that pace they would multiply it; the mass is at most that in rigid
+ones.  The sum is over passages whose inertia the rows leave out, except those behind an inertance
+or a line that has it: at a volume without a moving wall.
 
 Limits: seats, edges and other restrictions that move, and accumulators, take any flow without
 inertia, which makes the mass a lower limit; liquid within chambers is left out.  Source: Lamb,
@@ -33,12 +34,15 @@ from klack.network.rows import AMBIENT, BodyRow, BranchRow, Liquid, Rows
 from klack.simulation.network_result import ChannelData
 from klack.units import format_si
 
-__all__ = ["liquid_doubts"]
+__all__ = ["liquid_doubts", "told_once"]
 
 _SHARE = 0.05  # of the mass of a body, from which on liquid without inertia is doubted
 _NAMED = 0.1  # of the liquid that is missing, for a passage to be named, as the largest is
 _KEPT = 0.5  # of the inertance of passages, in an inertance before them, that stands for them
 _OPEN, _RIGID = 1e-5, 1e-4  # of the least inertance; of the compliance of chambers
+_AT_REST = 2e-8  # [m] of travel: bodies that rest tremble on their stops
+_TREMBLES = 0.01  # of the longest travel of all bodies
+_LEFT_OUT = ", whose inertia is left out"
 _SETTLED = 6  # repetitions of the resistance at the amplitude
 
 
@@ -61,23 +65,41 @@ def liquid_doubts(rows: Rows, channels: Mapping[str, ChannelData], record: float
     if rows.fluid is None or not rows.walls:
         return
     passages = tuple(_passages(rows))
-    for row in rows.bodies:
-        if not row.body.moves or row.course is not None:
+    moving = [row for row in rows.bodies if row.body.moves and row.course is None]
+    speeds = {row.component: channels[f"{row.component} velocity"].values for row in moving}
+    travels = {name: float(np.ptp(np.cumsum(v))) * record for name, v in speeds.items()}
+    told = set[frozenset[str]]()
+    for row in moving:
+        speed, travel = speeds[row.component], travels[row.component]
+        if travel <= max(_AT_REST, _TREMBLES * max(travels.values())):
             continue
-        areas = _areas(rows, row)
-        limit = _SHARE * row.body.mass
-        widest = sum(map(abs, areas.values())) ** 2
-        if all(passage.missing * widest < limit for passage in passages):
+        share = {name: float(v @ speed) / float(speed @ speed) for name, v in speeds.items()}
+        mass = sum(share[other.component] ** 2 * other.body.mass for other in moving)
+        areas = _areas(rows, moving, share)
+        if all(p.missing * sum(map(abs, areas.values())) ** 2 < _SHARE * mass for p in passages):
             continue
-        speed = channels[f"{row.component} velocity"].values
-        travel = float(np.ptp(np.cumsum(speed))) * record
         fastest = float(np.max(np.abs(speed)))
-        if not travel > 0.0:
-            continue
         pressures = _pressures(rows, channels, np.square(speed / fastest))
         masses = _masses(rows, passages, areas, pressures, 2.0 * fastest / travel, fastest)
-        if masses.sum() >= limit:
-            yield _sentence(rows, row, passages, masses)
+        along = [
+            other.component
+            for other in moving
+            if other is not row and share[other.component] ** 2 * other.body.mass > _SHARE * mass
+        ]
+        group = frozenset([row.component, *along])
+        if masses.sum() >= _SHARE * mass and group not in told:
+            told.add(group)
+            yield _sentence(rows, row, along, mass, passages, masses)
+
+
+def told_once(notes: Sequence[str]) -> Iterator[str]:
+    """Leave out sentences on bodies that one before is on: numbers of variants differ a little."""
+    told = set[str]()
+    for note in notes:
+        whose, is_on_liquid, _ = note.partition(_LEFT_OUT)
+        if not is_on_liquid or whose not in told:
+            yield note
+        told.add(whose)
 
 
 def _pressures(
@@ -97,17 +119,19 @@ def _pressures(
     return found
 
 
-def _areas(rows: Rows, row: BodyRow) -> dict[int, float]:
-    """By node: volume that opens there per displacement of the whole body [m^2]."""
-    body = row.body
-    rigid = body.port_shapes[: body.rigid_count].T @ body.rigid_axial
-    if body.momentum is not None:
-        rigid = body.port_shapes.T @ body.momentum
-    moves = dict(zip(row.ports, map(float, rigid), strict=True))
+def _areas(rows: Rows, moving: Sequence[BodyRow], share: Mapping[str, float]) -> dict[int, float]:
+    """By node: volume [m^2] that opens there per displacement that bodies share."""
+    moves: dict[int, float] = {}
+    for row in moving:
+        body = row.body
+        rigid = body.port_shapes[: body.rigid_count].T @ body.rigid_axial
+        if body.momentum is not None:
+            rigid = body.port_shapes.T @ body.momentum
+        moves |= dict(zip(row.ports, share[row.component] * rigid, strict=True))
     areas: dict[int, float] = {}
     for wall in rows.walls:
         if wall.port in moves:
-            areas[wall.node] = areas.get(wall.node, 0.0) + wall.area * moves[wall.port]
+            areas[wall.node] = areas.get(wall.node, 0.0) + float(wall.area * moves[wall.port])
     return areas
 
 
@@ -192,7 +216,14 @@ def _masses(
     return min(found, key=np.sum)
 
 
-def _sentence(rows: Rows, row: BodyRow, passages: Sequence[_Passage], masses: Vector) -> str:
+def _sentence(
+    rows: Rows,
+    row: BodyRow,
+    along: Sequence[str],
+    whole: float,
+    passages: Sequence[_Passage],
+    masses: Vector,
+) -> str:
     total = float(masses.sum())
     named_from = min(_NAMED * total, float(masses.max()))
     ways: dict[frozenset[int], list[_Passage]] = {}
@@ -203,11 +234,14 @@ def _sentence(rows: Rows, row: BodyRow, passages: Sequence[_Passage], masses: Ve
     names = " and ".join(f"'{passage.row.component}'" for passage in named if passage.row)
     thin = ""
     if any(passage.liquid.thin for passage in named):
-        thin = " A hole counts as one in a thin plate: longer ones hold more."
+        thin = " A hole counts as one in a thin plate: longer ones hold more; give its length."
+    others = "".join(f" and '{name}'" for name in along)
+    weight = format_si(1e3 * whole, "g", 3)
+    at = f"at '{row.component}', where {weight} move together" if along else f"on its {weight}"
     return (
-        f"'{row.component}' displaces liquid through {names}, whose inertia is left out: it would "
-        f"act like {format_si(1e3 * total, 'g', 2)} on its {format_si(1e3 * row.body.mass, 'g', 3)}"
-        f", so its motion is too fast.{thin}\n"
+        f"'{row.component}'{others} displace{'' if along else 's'} liquid through {names}"
+        f"{_LEFT_OUT}: it would act like {format_si(1e3 * total, 'g', 2)} {at}"
+        f", so {'their' if along else 'its'} motion is too fast.{thin}\n"
         f"Try: {'; '.join(_advice(rows, way) for way in ways.values())}."
     )
 

@@ -48,6 +48,7 @@ from klack.network.network import Network
 from klack.network.ranges import Travel
 from klack.network.rows import Rows
 from klack.schematic.picture import schematic_svg
+from klack.simulation.displaced_liquid import told_once
 from klack.simulation.network_result import IncompleteRunError, NetworkResult
 from klack.simulation.network_run import SpatialMotion, State, Watch, simulate_network
 from klack.simulation.step_sizes import StepSizes, scaled
@@ -132,7 +133,7 @@ def stroke_notes(
     moving = [moving_note(name, variant.result) for name, variant in variants.items()]
     return (
         *controller_notes(case),
-        *warned,
+        *told_once(warned),
         *begun,
         *filter(None, [*at_rest, *moving]),
         *_record_notes(case, variants),
