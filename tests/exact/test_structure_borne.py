@@ -361,14 +361,16 @@ def test_missing_freedoms_are_listed_and_blocked_or_freed_on_demand() -> None:
 
 
 def test_what_a_known_receiver_does_is_not_assumed() -> None:
-    """Of a direction that it knows an error, of a mount in general a note; nothing changes."""
+    """A note, and nothing changes; what is taken has its own note."""
     pair = Pair()
-    with pytest.raises(InputError, match=r"missing: a\.z: got 'free'"):
-        couple(pair.source, pair.receiver, missing={"a.z": "free"})
-    found = couple(pair.source, pair.receiver, missing={"a": "free"})
+    found = couple(pair.source, pair.receiver, missing={"a": "free", "a.z": "free"})
     (note,) = found.notes
-    assert "missing: a: free has no effect" in note
+    assert note == "missing: no effect at a, a.z: the receiver is known there."
     assert np.array_equal(found.force, couple(pair.source, pair.receiver).force)
+    receiver = pair.of(pair.Y_R, freedoms_of("a", ("x", "y", "z")))
+    taken, idle = couple(pair.source, receiver, missing={"a": "free", "a.x": "free"}).notes
+    assert taken.startswith("a.rx, a.ry, a.rz: ")
+    assert idle.startswith("missing: no effect at a.x: ")
 
 
 def test_blocked_force_in_situ_through_isolators() -> None:

@@ -134,7 +134,7 @@ def test_towers_of_powers_are_not_evaluated(text):
         (999.99, "N", "1 kN"),  # rounding may not give 1000 N
         (7850.0, "kg/m^3", "7850 kg/m^3"),
         (0.9871, "-", "0.9871"),
-        (1e-20, "s", "1e-05 fs"),
+        (1e-20, "s", "1e-20 s"),
         (math.nan, "s", "nan s"),
     ],
 )

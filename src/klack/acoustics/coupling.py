@@ -331,7 +331,7 @@ def transformation(
     points = {point.name: point for point in receiver.points}
     rows, kept, open_ones = [], [], []
     taken: dict[str, list[str]] = {}
-    idle = {name for name in missing if name in mounts}
+    idle = set(missing) & {*mounts, *map(str, freedoms)}
     for i, freedom in enumerate(freedoms):
         place = placements.get(freedom.point, Placement())
         name = place.point or freedom.point
@@ -343,15 +343,8 @@ def transformation(
             hint="say where the mount stands (placement: point).",
         )
         row, rest = _row(freedom, mounts[freedom.point], points[name], receiver.freedoms, place)
-        refuse_if(
-            rest <= _ALONG and str(freedom) in missing,
-            f"missing: {freedom}",
-            got=f"'{missing.get(str(freedom))}' for a direction in which the receiver is known",
-            expected="directions in which it is not",
-            hint=f"remove {freedom}: what the receiver does there counts.",
-        )
         if rest > _ALONG:
-            idle.discard(freedom.point)
+            idle -= {freedom.point, str(freedom)}
             wanted = missing.get(str(freedom)) or missing.get(freedom.point)
             if wanted is None:
                 open_ones.append(str(freedom))
@@ -373,10 +366,8 @@ def transformation(
         f"{', '.join(names)}: the receiver is not known there; taken as {wanted}."
         for wanted, names in taken.items()
     )
-    notes += tuple(
-        f"missing: {name}: {missing[name]} has no effect: the receiver is known in all directions."
-        for name in sorted(idle)
-    )
+    if idle:
+        notes += (f"missing: no effect at {', '.join(sorted(idle))}: the receiver is known there.",)
     return np.array(rows), kept, notes
 
 
