@@ -9,6 +9,7 @@ import scipy
 
 from klack.acoustics.at_mounts import freedoms_of_bodies, points_of, source_at_mounts
 from klack.acoustics.coupling import Placement, axes_of, couple
+from klack.acoustics.force_response import port_forces
 from klack.acoustics.interface import Freedom, InterfacePoint, Receiver, laplace
 from klack.acoustics.isolator import Spring
 from klack.acoustics.plate import Plate
@@ -24,6 +25,7 @@ from klack.acoustics.standing import StandingValve, standing_valve
 from klack.analyses.noise.body import Transfers
 from klack.analyses.noise.in_machine import in_machine, installed
 from klack.analyses.noise.machine import Machine, machine_of
+from klack.analyses.noise.run import noise_design
 from klack.analyses.noise.source import stroke_sources
 from klack.analyses.stroke.record import StrokeStudy
 from klack.analyses.stroke.run import run_stroke, variant_network
@@ -471,6 +473,24 @@ def test_numbers_of_the_whole_change_smoothly_with_its_steps() -> None:
         sizes = step_sizes(rows, "normal", step=step)
         found = numbers_at_rest(compile_network(rows, sizes), None, [], sizes)
         assert any(np.any(slope) for *_, slope in found.by_step)
+
+
+def test_stops_that_are_joined_by_a_law_push_their_bodies(sheet: StrokeStudy) -> None:
+    """Truth: their force is that of the records at the port, and leaves its work in the modes."""
+    (source,) = stroke_sources(sheet, ("dry",))
+    assert source.held is not None
+    forces = {stop.name: stop.force for stop in source.stops}
+    for structure, port in zip(source.structures, ("seat", "stop"), strict=True):
+        fine = port_forces(structure, forces)[port].values
+        known = source.held.forces[structure.name][:, structure.port_names.index(port)]
+        means = fine.reshape(known.size, -1).mean(axis=1)
+        assert np.abs(known).max() > 100.0
+        assert np.abs(known - means).max() < 1e-12 * np.abs(known).max()
+    found = noise_design(source)
+    assert [body.name for body in found.bodies] == ["base", "pole"]
+    for body in found.bodies:
+        assert body.injected.sum() > 0.0
+        assert abs(body.residual) < 1e-9
 
 
 def test_a_variant_without_what_it_needs_is_refused() -> None:

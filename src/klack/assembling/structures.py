@@ -25,6 +25,7 @@ from klack.case.schema import Case
 from klack.case.valve import ValveCase
 from klack.errors import InputError
 from klack.input.problem import one_of
+from klack.mechanics.flexible_body import FlexibleBody
 
 __all__ = [
     "IMPACT_STOP",
@@ -99,6 +100,7 @@ def valve_structures(
     """Structures of the held bodies of a valve; mappings by body, contacts by stop."""
     held = [name for name, body in bodies.items() if body.is_fixed]
     references = mount_references(case.noise, bodies)
+    joined = _joined_stops(case)
     every = {
         name: [*ports[name], *reaction_ports(case.noise, bodies[name], ports[name])]
         for name in held
@@ -107,7 +109,7 @@ def valve_structures(
         _structure(
             case,
             bodies[name],
-            [_pushed(port, name, contacts) for port in every[name]],
+            [_pushed(port, name, contacts, joined) for port in every[name]],
             kept_modes(
                 selection_of(case.reduction.choice(name)), pools[name], _patterns(ports[name])
             ),
@@ -183,13 +185,37 @@ def _patterns(ports: Sequence[Port]) -> NDArray[np.float64]:
     return np.column_stack([port.pattern for port in ports])
 
 
-def _pushed(port: Port, body: str, contacts: Mapping[str, StopContact]) -> StructurePort:
+def _joined_stops(case: ValveCase) -> dict[tuple[str, str], tuple[str, float]]:
+    """Stop and its sign at each point of a body that is joined to one end of it."""
+    network = case.network.network()
+    found = {}
+    for connection in network.connections:
+        ports = [port.partition(".")[::2] for port in connection]
+        ends = [(name, _SIGNS[end]) for name, end in ports if end in _SIGNS]
+        for name, point in ports if ends else ():
+            part = network.components.get(name)
+            if isinstance(part, FlexibleBody):
+                found[part.body, point] = ends[0]
+    return found
+
+
+_SIGNS = {"upper": 1.0, "lower": -1.0}
+"""Of the force of a stop on what is joined to its ends, along +z."""
+
+
+def _pushed(
+    port: Port,
+    body: str,
+    contacts: Mapping[str, StopContact],
+    joined: Mapping[tuple[str, str], tuple[str, float]],
+) -> StructurePort:
     for name, contact in contacts.items():
         sides = (contact.pair.upper.name, contact.pair.lower.name)
-        for side, own, sign in zip(sides, contact.ports, (1.0, -1.0), strict=True):
+        for side, own, sign in zip(sides, contact.ports, _SIGNS.values(), strict=True):
             if side == body and own is port:
                 return StructurePort(port=port, stop=name, sign=sign)
-    return StructurePort(port=port)
+    stop, sign = joined.get((body, port.name), ("", 1.0))
+    return StructurePort(port=port, stop=stop, sign=sign)
 
 
 def _contact_names(case: Case, body: str) -> list[str]:
