@@ -22,6 +22,7 @@ __all__ = [
     "KINDS",
     "Acceleration",
     "Angle",
+    "AngularVelocity",
     "Area",
     "Capacitance",
     "Compliance",
@@ -165,6 +166,14 @@ ROTATION = Kind(
     ("rpm", "1/min", "1/s"),
     {"rpm": 1.0 / 60.0, "1/min": 1.0 / 60.0, "min^-1": 1.0 / 60.0, "1/s": 1.0},
 )
+ANGULAR_VELOCITY = Kind(
+    "an angular velocity",
+    "rad/s",
+    "100 rad/s",
+    ("rad/s", "deg/s", "rpm"),
+    {"rad/s": 1.0, "deg/s": pi / 180, "°/s": pi / 180, "rpm": pi / 30},
+    largest=1e9,
+)
 AREA = Kind("an area", "m^2", "12 mm^2", ("m^2", "cm^2", "mm^2", "um^2"), smallest=1e-24)
 VOLUME = Kind(
     "a volume", "m^3", "50 mm^3", ("m^3", "cm^3", "mm^3", "l", "ml"), smallest=1e-36, largest=1e18
@@ -237,6 +246,7 @@ KINDS = (
     FREQUENCY,
     RATE,
     ROTATION,
+    ANGULAR_VELOCITY,
     AREA,
     VOLUME,
     MASS,
@@ -669,6 +679,7 @@ Angle = Annotated[float, *typed(ANGLE)]
 Frequency = Annotated[float, *typed(FREQUENCY)]
 Rate = Annotated[float, *typed(RATE)]
 Rotation = Annotated[float, *typed(ROTATION)]
+AngularVelocity = Annotated[float, *typed(ANGULAR_VELOCITY)]
 Area = Annotated[float, *typed(AREA)]
 Volume = Annotated[float, *typed(VOLUME)]
 Mass = Annotated[float, *typed(MASS)]

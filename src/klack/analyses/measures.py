@@ -50,6 +50,7 @@ _SUFFIXES = {
     "rad": "_rad",
     "N s": "_Ns",
     "m/s": "_m_s",
+    "rad/s": "_rad_s",
     "sone": "_sone",
     "phon": "_phon",
     "acum": "_acum",

@@ -6,7 +6,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TypeVar
+from typing import Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,6 +81,8 @@ class BodyPair:
         Of both faces, not in the meshes.
     layer
         Of both faces.
+    slave
+        Side of the contact points; None: the finer one.
     """
 
     upper: ElasticBody
@@ -91,6 +93,7 @@ class BodyPair:
     gauges: tuple[Gauge, ...] = ()
     form: FaceForm | None = None
     layer: AsperityLayer | None = None
+    slave: Literal["b"] | None = None
 
     @property
     def shift(self) -> float:
@@ -223,6 +226,7 @@ def build_bodies(case: Case, progress: Progress) -> BodyPair:
         gauges=place_gauges(case, {moving.body: (upper, pose), stop.body: (lower, None)}),
         form=placed.form,
         layer=layer_of_faces(case, upper, placed.upper_surface, lower, placed.lower_surface),
+        slave=None if case.dimension == 2 or case.motion.is_straight else "b",
     )
 
 

@@ -165,7 +165,7 @@ def _space(
         pair.lower.mesh,
         pair.lower_surface,
         reach=reach,
-        slave=slave,
+        slave=pair.slave if slave is None else slave,
         form=pair.form,
     )
 

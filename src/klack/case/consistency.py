@@ -82,6 +82,13 @@ def check_given(case: ImpactSections) -> None:
                 hint=f"remove '{section}', or give '{name}' a mesh.",
                 on_key=True,
             )
+    if not case.motion.is_straight:
+        raise CaseProblem(
+            ("motion",),
+            got=f"a motion sideways or a spin with '{name}', {what}",
+            expected="a motion along the axis: a port moves along it alone",
+            hint="remove 'sideways_speed' and 'spin'.",
+        )
     if not case.motion.placement.is_centred:
         raise CaseProblem(
             ("motion", "placement"),
@@ -183,6 +190,7 @@ def check_consistency(case: ImpactSections) -> None:
         _check_roughness,
         _check_solid_only,
         _check_off_axis,
+        _check_oblique,
         _check_guide,
         _check_shots,
         _check_outputs,
@@ -190,7 +198,9 @@ def check_consistency(case: ImpactSections) -> None:
         _check_ends,
     ):
         check(case)
-    centred = case.motion.placement.is_centred and case.guide is None and case.shots is None
+    motion = case.motion
+    centred = motion.placement.is_centred and motion.is_straight
+    centred = centred and case.guide is None and case.shots is None
     # worn faces are those of a centred impact
     if case.contact.worn is not None and not (centred and case.has_surfaces):
         raise CaseProblem(
@@ -442,9 +452,32 @@ def _check_off_axis(case: ImpactSections) -> None:
         if is_there:
             raise CaseProblem(
                 key,
-                got=f"{what} of axisymmetric bodies off-axis (motion.placement)",
+                got=f"{what} of axisymmetric bodies off-axis (motion)",
                 expected="faces without roughness, and no sensors",
                 hint=f"remove '{key[-1]}', or take 'model: swept' with 'layers: 18' for both.",
+                on_key=True,
+            )
+
+
+def _check_oblique(case: ImpactSections) -> None:
+    """Reject what knows no motion across the axis."""
+    motion = case.motion
+    if motion.is_straight:
+        return
+    key = "sideways_speed" if motion.sideways_speed else "spin"
+    asked = {"shots": "shots", "noise": "noise", "run_in": "impacts one after another"}
+    wanted = {
+        "shots": case.shots is not None,
+        "noise": case.noise is not None,
+        "run_in": case.run.run_in or case.run.impacts > 1,
+    }
+    for name, what in asked.items():
+        if wanted[name]:
+            raise CaseProblem(
+                ("motion", key),
+                got=f"a motion sideways or a spin, and {what}",
+                expected="one of them: those start along the axis",
+                hint=f"remove '{key}', or '{name}'.",
                 on_key=True,
             )
 

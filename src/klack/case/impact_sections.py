@@ -10,6 +10,7 @@ from math import pi, radians
 from typing import Annotated, Literal, Self
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, Strict, field_validator, model_validator
 
 from klack.case.bodies import BodySurface, CaseBody, CaseFile, Reduction, SurfaceName
@@ -28,6 +29,7 @@ from klack.input.problem import CaseProblem
 from klack.input.section import Count, Name, Section
 from klack.units import (
     Angle,
+    AngularVelocity,
     Force,
     Frequency,
     Length,
@@ -440,6 +442,30 @@ class Motion(Section):
     placement: Placement = Field(
         default=Placement(), description="Eccentricity and tilt; default centred and upright."
     )
+    sideways_speed: Speed = Field(
+        default=0.0,
+        ge=0,
+        description="Speed of the centre of mass across z at the start; levels interface and full.",
+    )
+    sideways_direction: Angle = Field(default=0.0, description="Its direction, from x towards y.")
+    spin: tuple[AngularVelocity, AngularVelocity, AngularVelocity] = Field(
+        default=(0.0, 0.0, 0.0),
+        examples=[["0 rad/s", "100 rad/s", "0 rad/s"]],
+        description="Angular velocity about x, y and z through the centre of mass at the start; "
+        "the same levels. A body that rolls towards x turns about +y.",
+    )
+
+    @property
+    def is_straight(self) -> bool:
+        """Whether the body starts along z alone, without spin."""
+        return self.sideways_speed == 0.0 and not any(self.spin)
+
+    @property
+    def across(self) -> NDArray[np.float64]:
+        """Motion at the start beside ``speed``: (6,) [m/s], [rad/s]."""
+        towards = self.sideways_direction
+        velocity = self.sideways_speed * np.array([np.cos(towards), np.sin(towards), 0.0])
+        return np.concatenate([velocity, self.spin])
 
     @property
     def closing_force(self) -> float:
@@ -577,8 +603,9 @@ class ImpactSections(CaseFile):
 
     @property
     def leaves_axis(self) -> bool:
-        """Whether axisymmetric bodies meet off their axis."""
-        return self.dimension == 2 and not self.motion.placement.is_centred
+        """Whether axisymmetric bodies meet off their axis, or move across it."""
+        motion = self.motion
+        return self.dimension == 2 and not (motion.placement.is_centred and motion.is_straight)
 
     def without_friction(self) -> Self:
         """The same with smooth faces."""

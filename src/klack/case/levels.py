@@ -2,7 +2,15 @@
 
 from typing import Literal, get_args
 
-__all__ = ["LEVELS", "OFF_AXIS_LEVELS", "ROUGH_LEVELS", "VARIANTS", "Level", "Variant"]
+__all__ = [
+    "LEVELS",
+    "OBLIQUE_LEVELS",
+    "OFF_AXIS_LEVELS",
+    "ROUGH_LEVELS",
+    "VARIANTS",
+    "Level",
+    "Variant",
+]
 
 
 Level = Literal[
@@ -27,6 +35,9 @@ ROUGH_LEVELS: tuple[Level, ...] = (
 
 OFF_AXIS_LEVELS: tuple[Level, ...] = ("lumped", "interface")
 """Levels of axisymmetric bodies off-axis."""
+
+OBLIQUE_LEVELS: tuple[Level, ...] = ("interface", "full")
+"""Levels of a body that moves sideways or spins."""
 
 
 Variant = Literal["wet", "dry", "dry-mounted", "wet-lumped", "dry-lumped"]

@@ -7,9 +7,10 @@ from pydantic import model_validator
 
 from klack.case.consistency import check_consistency, check_noise
 from klack.case.impact_sections import ImpactSections
-from klack.case.levels import LEVELS, OFF_AXIS_LEVELS, ROUGH_LEVELS, Level
+from klack.case.levels import LEVELS, OBLIQUE_LEVELS, OFF_AXIS_LEVELS, ROUGH_LEVELS, Level
 from klack.errors import InputError
 from klack.input.problem import nearest, one_of
+from klack.units import format_si
 
 __all__ = ["Case"]
 
@@ -51,15 +52,33 @@ class Case(ImpactSections):
                 expected=f"levels that have a layer of asperities: {one_of(ROUGH_LEVELS)}",
                 hint="leave the level out, or the roughness.",
             )
+        along = [level for level in wanted if level not in OBLIQUE_LEVELS]
+        if along:
+            self.require_straight(f"the level '{along[0]}'", "--level interface, or full of solids")
         on_axis = [level for level in wanted if level not in OFF_AXIS_LEVELS]
         if self.leaves_axis and on_axis:
             raise self._off_axis(f"the level '{on_axis[0]}'")
         return tuple(level for level in LEVELS if level in wanted)
 
     def require_on_axis(self, what: str) -> None:
-        """Reject off-axis axisymmetric bodies: interface level alone."""
+        """Reject off-axis axisymmetric bodies: interface level alone; and oblique motion."""
+        self.require_straight(what)
         if self.leaves_axis:
             raise self._off_axis(what)
+
+    def require_straight(self, what: str, levels: str = "--level interface") -> None:
+        """Reject motion across z and spin, which models along the axis leave out."""
+        motion = self.motion
+        if motion.is_straight:
+            return
+        key = "sideways_speed" if motion.sideways_speed else "spin"
+        value = motion.sideways_speed if motion.sideways_speed else max(map(abs, motion.spin))
+        raise InputError(
+            f"{self._path or 'case'}: motion.{key}",
+            got=f"{what} of a body with {format_si(value, 'm/s' if key != 'spin' else 'rad/s')}",
+            expected=f"klack impact with {levels}, whose bodies move in every way",
+            hint="take that, or remove motion.sideways_speed and motion.spin.",
+        )
 
     def _off_axis(self, what: str) -> InputError:
         return InputError(

@@ -38,6 +38,7 @@ __all__ = [
     "ContactLadder",
     "ReachError",
     "StaticContact",
+    "StuckCompliance",
     "check_rim",
     "check_state",
     "compliances_of",
@@ -50,6 +51,7 @@ __all__ = [
     "ring_radius",
     "size_over_half_width",
     "static_contact",
+    "stuck_compliance",
 ]
 
 _CHUNK = 64
@@ -227,6 +229,65 @@ class StaticContact:
         """Half width of the contact [m] at an axial force [N]."""
         forces, widths = np.append(0.0, self.force), np.append(0.0, self.half_width)
         return float(np.interp(force, forces, widths))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StuckCompliance:
+    """Compliance [m/N] of a contact whose loaded points all stick.
+
+    Small changes of the approach *d* and of the tangential displacement *s* of body a past b, both
+    of the bodies far from the contact, follow from those of the normal force *P* and of the
+    tangential force *T* on body a as ``d = normal P + coupling T``, ``s = coupling P + tangential
+    T``.  Of a ring along the face at every point, s and T outwards; of a contact round one point
+    along z and x.
+
+    Parameters
+    ----------
+    normal, tangential, coupling
+        The last two are nan for a contact of bodies of revolution round their axis, which cannot
+        move sideways.
+    force [N]
+        Axial, of the static state.
+    """
+
+    normal: float
+    tangential: float
+    coupling: float
+    force: float
+
+
+def stuck_compliance(
+    static: StaticContact,
+    force: float,
+    faces: FaceFriction,
+    flexibility_a: Flexibility,
+    flexibility_b: Flexibility,
+) -> StuckCompliance:
+    """Compliance of the points that carry at an axial force [N]; all rows of ``faces`` exist."""
+    space, pattern = static.space, static.pattern_at(force)
+    points = np.flatnonzero(pattern > 0)
+    ways = faces.T_a.shape[0] // space.count
+    tangents = (space.count * np.arange(ways)[:, None] + points).ravel()
+    rows_a = csr_array(vstack([space.G_a[points], faces.T_a[tangents]]))
+    rows_b = csr_array(vstack([space.G_b[points], faces.T_b[tangents]]))
+    C = condensed_compliance(rows_a, rows_b, flexibility_a, flexibility_b)
+    C = with_still_directions(C)
+    n, d = len(points), space.dimension
+    is_ring = ring_radius(space, pattern) is not None
+    if is_ring:
+        motions = np.zeros((len(C), 2))
+        motions[:n, 0], motions[n : 2 * n, 1] = -1.0, 1.0
+    else:
+        far = np.zeros((space.G_a.shape[1], 2))
+        far[d - 1 :: d, 0], far[0::d, 1] = -1.0, 1.0
+        motions = np.asarray(rows_a @ far)
+        if d == 2:
+            motions = motions[:, :1]
+    c = np.linalg.inv(motions.T @ np.linalg.solve(C, motions))
+    normal, coupling, tangential = float(c[0, 0]), float("nan"), float("nan")
+    if c.shape[0] == 2:
+        coupling, tangential = float(c[0, 1]), float(c[1, 1])
+    return StuckCompliance(normal=normal, tangential=tangential, coupling=coupling, force=force)
 
 
 def extended_compliance(

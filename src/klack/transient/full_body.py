@@ -42,7 +42,9 @@ from klack.bodies.elasticity.factorization import (
 )
 from klack.errors import InputError
 from klack.transient.body_damping import BodyDamping, DampingMatrix, LowRankSolve, sparse_damping
+from klack.transient.interface_model import rigid_motion
 from klack.transient.interface_solve import InterfaceSolve, interface_solve
+from klack.transient.placed_bodies import rigid_coordinates
 
 __all__ = [
     "FullBody",
@@ -367,25 +369,31 @@ class FullBody:
     def _products(self, x: NDArray[np.float64]) -> list[NDArray[np.float64]]:
         return [self.K @ x, self.M @ x]
 
-    def across(self, velocity: tuple[float, float]) -> NDArray[np.float64]:
-        """Rigid motion along x and y [m/s].
+    def across(self, velocity: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Rigid motion (6,) [m/s], [rad/s] about the centre of mass.
 
         Raises
         ------
         InputError
             For an axisymmetric body, or one held sideways.
         """
-        if not any(velocity):
+        if not np.any(velocity):
             return np.zeros(len(self.free))
         direction = self.free % self.dimension
         if self.dimension < 3 or np.count_nonzero(direction < 2) < 2 * (self.dof_count // 3):
             raise InputError(
                 f"simulate_full_order: sideways motion of body '{self.name}'",
-                got=f"({velocity[0]:g}, {velocity[1]:g}) m/s",
-                expected="(0, 0) m/s for an axisymmetric body, or one that is held sideways",
+                got=f"({velocity[0]:g}, {velocity[1]:g}) m/s, spin "
+                f"{np.linalg.norm(velocity[3:]):g} rad/s",
+                expected="none for an axisymmetric body, or one that is held sideways",
                 hint="model a solid that is free to move across the axis.",
             )
-        return np.array([*velocity, 0.0])[direction]
+        own = rigid_coordinates(rigid_motion(self.body), velocity)
+        return np.asarray(self.body.rigid_modes[self.free] @ own)
+
+    def rigid_velocity(self, field: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Rigid motion (6,) [m/s], [rad/s] with the momenta of a whole field."""
+        return rigid_motion(self.body) @ (self.body.rigid_modes.T @ (self.whole_mass @ field))
 
     def refresh(self) -> None:
         """Recompute K u and K v, which every step only adds to."""

@@ -126,7 +126,7 @@ def simulate_full_order(
     damping: tuple[BodyDamping | None, BodyDamping | None] = (None, None),
     friction: FaceFriction | None = None,
     layer: AsperityLayer | None = None,
-    sideways: tuple[float, float] = (0.0, 0.0),
+    across: NDArray[np.float64] | None = None,
     stop_after_separation: float | None = None,
     known: Sequence[KnownBody] | None = None,
     energy_interval: int = 10,
@@ -168,8 +168,9 @@ def simulate_full_order(
         Between the faces, of these contact points.
     layer
         Of the faces, elastic; not with friction nor the massless scheme.
-    sideways [m/s]
-        Velocity of a along x and y at the start, in addition to ``speed``; of solids only.
+    across (6,) [m/s], [rad/s]
+        Rigid velocity of a at the start besides ``speed``, about its centre of mass; of solids
+        only.
     stop_after_separation [s]
         End the run early when no point has carried a force for this long after a contact.
     known
@@ -256,7 +257,7 @@ def simulate_full_order(
                 for b in bodies
             ]
         )
-        start, retraction = run.place(sideways)
+        start, retraction = run.place(np.zeros(6) if across is None else across)
         set_up_time = perf_counter() - begin
         steps = ceil(duration / step * (1.0 - 1e-9))
         # products of contact size: more threads only wait for each other, at twice the time
@@ -342,7 +343,7 @@ class _Run:
         self.outside = axial_force
         self.rounds = self.repeats = self.steps = self.steps_in_contact = self.watch_sum = 0
 
-    def place(self, sideways: tuple[float, float]) -> tuple[float, float]:
+    def place(self, across: NDArray[np.float64]) -> tuple[float, float]:
         """Place a just before the first touch; returns the time flown and the retraction."""
         needle, axial = self.bodies[0], self.space.axial
         facing = axial > 1e-6
@@ -358,11 +359,11 @@ class _Run:
         if retraction > 0:
             _log.info("bodies overlap by %.3g um; body a starts further back", retraction * 1e6)
         flown = 0
-        if self.axial_force == 0.0 == needle.spring and not any(sideways):
+        if self.axial_force == 0.0 == needle.spring and not np.any(across):
             flown = max(0, floor(touch / (self.speed * self.step)) - 1)
         needle.force = needle.axial_mass * (self.axial_force / needle.mass)
         needle.u = needle.axis * (retraction - self.speed * flown * self.step)
-        needle.v = -self.speed * needle.axis + needle.across(sideways)
+        needle.v = -self.speed * needle.axis + needle.across(across)
         needle.refresh()
         self.ends = self.at_rest + sum(body.rows @ body.u for body in self.bodies)
         self.watch(self.gap < self.margin)
@@ -745,6 +746,7 @@ def _result(
         area=run.space.area,
         energy=book,
         fields=fields,
+        rigid_velocity=bodies[0].rigid_velocity(fields[0].end_velocity),
         approach=max(0.0, record.first_touch - record.lowest) if record.touched else 0.0,
         retraction=retraction,
         statistics=_statistics(run, times),

@@ -189,6 +189,8 @@ class FullOrderResult:
         Of the contact points.
     fields
         Of body a and, unless it is a rigid wall, body b.
+    rigid_velocity (6,) [m/s], [rad/s]
+        Of body a at the end: centre of mass and spin, of its momenta.
     approach [m]
         Largest approach of the centre of mass of a after the first touch.
     retraction [m]
@@ -200,6 +202,7 @@ class FullOrderResult:
     area: NDArray[np.float64]
     energy: EnergyRecord
     fields: tuple[FieldsOfBody, ...]
+    rigid_velocity: NDArray[np.float64]
     approach: float
     retraction: float
     statistics: SolverStatistics

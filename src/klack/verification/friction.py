@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from math import cos, pi, radians, sin, sqrt, tan
+from math import cos, pi, radians, sin, sqrt
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from klack.verification.interface_bodies import (
 )
 from klack.verification.transient import STEEL, free_blocks, needle_over_seat
 
-__all__ = ["checks"]
+__all__ = ["checks", "ring_restitution"]
 
 
 _POINT = "Coulomb slider on springs: own events (stick, slip, reversal), 1e-12"
@@ -332,22 +332,61 @@ def _frames() -> list[Check]:
     ]
 
 
+_SEATS = (  # half angle [deg], friction, stiffness along over across the cone, coupling
+    (30.0, 0.1, 0.8235, 0.0),
+    (45.0, 0.1, 0.8235, 0.0),
+    (45.0, 0.3, 0.8235, 0.0),
+    (60.0, 0.3, 0.8235, 0.0),
+    (45.0, 0.08, 0.806, -0.169),
+    (52.5, 0.25, 0.843, -0.19),
+)
+
+
 def _seat() -> Iterator[Check]:
     """Rigid needle on a cone whose ring is compliant along and across."""
-    stiffer = 0.8235
-    for half_angle, mu in ((30.0, 0.1), (45.0, 0.1), (45.0, 0.3), (60.0, 0.3)):
+    for half_angle, mu, stiffer, coupling in _SEATS:
         a = radians(half_angle)
-        ratio = stiffer / (tan(a) * mu)
-        loss = 2.0 * mu * cos(a) / (sin(a) + mu * cos(a)) * (ratio - 1.0) / (ratio + 1.0)
+        coupled = f", coupling {coupling:g}" if coupling else ", no coupling"
         yield check(
-            f"needle on a cone of half angle {half_angle:g} degrees, friction {mu:g}: "
+            f"needle on a cone of half angle {half_angle:g} degrees, friction {mu:g}{coupled}: "
             "restitution [-]",
-            expected=sqrt(1.0 - loss),
-            computed=seat_restitution(a, mu, stiffer),
+            expected=ring_restitution(a, mu, 1.0, 1.0 / stiffer, coupling),
+            computed=seat_restitution(a, mu, stiffer, coupling),
             tolerance=2e-5,
             source="Coulomb's slider on the springs of the ring; Jaeger 1994, 64:235",
             absolute=True,
         )
+
+
+def ring_restitution(
+    half_angle: float, friction: float, normal: float, tangential: float, coupling: float
+) -> float:
+    r"""Restitution of a rigid needle on a cone with these compliances of its ring.
+
+    It slips inwards while it closes, sticks while it turns round, slips outwards while it opens:
+
+    .. math:: e^2 = \frac{\Delta u \, (F + F_2) + u_2 F_2}{u F}
+
+    from the closed state (*u*, *F*) over the end (2) of sticking.  The springs of a real ring are
+    coupled: a normal force moves it along the cone, and without that the loss is wrong by a
+    quarter.
+
+    Parameters
+    ----------
+    half_angle [rad]
+    normal, tangential, coupling [m/N]
+        As :class:`klack.contact.statics.StuckCompliance`.
+    """
+    s, c = sin(half_angle), cos(half_angle)
+    # rates of the normal and the outward tangential force on the needle while it sticks
+    P1, T1 = np.linalg.solve([[normal, coupling], [coupling, tangential]], [s, -c])
+    if -T1 <= friction * P1:
+        return 1.0
+    closed = (normal - friction * coupling) / s  # at a normal force of 1, T = -friction
+    way = 2.0 * friction / (friction * P1 - T1)
+    force, later = s + friction * c, (1.0 - way * P1) * (s - friction * c)
+    back = way * (force + later) + (closed - way) * later
+    return float(sqrt(back / (closed * force)))
 
 
 def _blocks() -> list[Check]:

@@ -660,14 +660,25 @@ class PointImpact:
         )
 
 
-def seat_restitution(half_angle: float, friction: float, stiffer: float, steps: int = 800) -> float:
-    """Restitution of a rigid needle on a frictional cone, compliant at the ring alone."""
+def seat_restitution(
+    half_angle: float, friction: float, stiffer: float, coupling: float = 0.0, steps: int = 800
+) -> float:
+    """Restitution of a rigid needle on a frictional cone, compliant at the ring alone.
+
+    Parameters
+    ----------
+    half_angle [rad]
+    stiffer
+        Stiffness along the cone over that along its normal.
+    coupling
+        Displacement of the needle out of the cone under a normal force, over that along the normal.
+    """
     s, c = np.sin(half_angle), np.cos(half_angle)
     model = modal_model(
         masses=(1.0, inf),
         omega=np.zeros(1),
         traces=np.array([[s]]),
-        compliance=np.diag([1.0, 1.0 / stiffer]),
+        compliance=np.array([[1.0, -coupling], [-coupling, 1.0 / stiffer]]),
         gap=np.zeros(1),
         tangents=np.array([[c]]),
         axial_across=np.array([c]),

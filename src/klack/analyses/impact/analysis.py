@@ -4,6 +4,7 @@
 """
 
 from collections.abc import Iterator
+from math import isfinite
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -14,7 +15,9 @@ from klack.analyses.impact.measures import (
     CONTACT_TIME,
     DEVIATION_MEASURES,
     LEVEL_MEASURES,
+    OBLIQUE_MEASURES,
     PEAK_FORCE,
+    measures_of,
 )
 from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.json_parts import JsonForm, Key, Real, measured_keys, schema_key
@@ -31,6 +34,7 @@ __all__ = [
     "IMPACT",
     "answer_line",
     "answer_so_far",
+    "compliance_line",
     "estimate_lines",
     "gauge_rows",
     "gauge_text",
@@ -68,10 +72,21 @@ _OUTPUT = JsonForm(
     Key("highest", Real),
     Key("highest_at_s", Real, of="highest_at"),
 )
+_OBLIQUE = JsonForm(
+    "ObliqueJson",
+    "Motion across the axis after the impact.",
+    *measured_keys(OBLIQUE_MEASURES),
+)
 _LEVEL = JsonForm(
     "LevelJson",
     "Impact at one level.",
     *measured_keys(LEVEL_MEASURES),
+    Key(
+        "oblique",
+        (_OBLIQUE, None),
+        "Null for a body that starts along the axis.",
+        lambda level: None if level.oblique is None else level,
+    ),
     Key("doubts", list[str], "Why the level may be wrong."),
     Key(
         "outputs",
@@ -92,6 +107,16 @@ _RUNNING_IN = JsonForm(
     Key("lost_J", list[Real], "In yield.", "lost"),
     Key("set_m", list[Real], "How much lower the bodies touch after it.", "set"),
     Key("land_m", list[Real], "Width of the strip in contact so far; level reduced.", "land"),
+)
+_STUCK = JsonForm(
+    "ContactComplianceJson",
+    "Approach d and tangential displacement s of the bodies for small changes of the forces along "
+    "and across the normal while all points stick: d = normal P + coupling T, "
+    "s = coupling P + tangential T.",
+    Key("normal_m_per_N", Real, of="normal"),
+    Key("tangential_m_per_N", Real, "Null round the axis of half sections.", "tangential"),
+    Key("coupling_m_per_N", Real, "The same.", "coupling"),
+    Key("force_N", Real, "Axial force of the static state.", "force"),
 )
 STUDY = JsonForm(
     "ImpactJson",
@@ -126,6 +151,12 @@ STUDY = JsonForm(
         "estimate_margins",
     ),
     Key("contact", CONTACT, "All levels but lumped share it."),
+    Key(
+        "contact_compliance",
+        (_STUCK, None),
+        "Of half sections, and of faces that rub.",
+        lambda study: study.contact.stuck,
+    ),
     Key("running_in", (_RUNNING_IN, None), "Null for one impact, or elastic faces."),
     Key("warnings", list[str]),
 )
@@ -134,12 +165,17 @@ STUDY = JsonForm(
 def study_told(study: ImpactStudy) -> Iterator[TextTable | str]:
     """Levels side by side, the answer, the error of the others."""
     yield text_table(study.title, "level", LEVEL_MEASURES, study.levels.items())
+    oblique = [item for item in study.levels.items() if item[1].oblique is not None]
+    if oblique:
+        yield text_table("Across the axis", "level", OBLIQUE_MEASURES, oblique)
     yield answer_line(study)
     if doubt := contact_doubt(study.contact):
         yield doubt
     if line := elastic_above(study.contact):
         yield line
     yield from estimate_lines(study)
+    if line := compliance_line(study):
+        yield line
     if rows := gauge_rows(study):
         yield TextTable(title="Outputs", columns=GAUGE_COLUMNS, rows=rows, left=3)
     if found := study.running_in:
@@ -148,6 +184,20 @@ def study_told(study: ImpactStudy) -> Iterator[TextTable | str]:
             columns=found.heads,
             rows=found.rows(format_si),
         )
+
+
+def compliance_line(study: ImpactStudy) -> str:
+    """Compliance of a contact that sticks along and across its normal; empty if unknown."""
+    stuck = study.contact.stuck
+    rubs = any(level.energies.get("friction") for level in study.ordered)
+    if stuck is None or not rubs or not isfinite(stuck.tangential):
+        return ""
+    return (
+        f"Compliance of the contact at {format_si(stuck.force, 'N', 3)} while it sticks: along the "
+        f"normal {stuck.normal:.4g} m/N, across it {stuck.tangential:.4g} m/N "
+        f"({stuck.tangential / stuck.normal:.3f} of it), coupling {stuck.coupling:.3g} m/N "
+        f"({stuck.coupling / stuck.normal:+.3f})."
+    )
 
 
 GAUGE_COLUMNS = ("output", "what", "level", "lowest", "at", "highest", "at")
@@ -182,7 +232,7 @@ def gauge_text(record: GaugeRecord, value: float) -> str:
 def study_measured(study: ImpactStudy) -> Iterator[Measured]:
     """Every level with its measures."""
     for name, level in study.levels.items():
-        yield name, level, LEVEL_MEASURES
+        yield name, level, measures_of(level)
 
 
 def answer_line(study: ImpactStudy) -> str:
@@ -285,6 +335,10 @@ _UNITS = {
     "angle": "rad",
     "instants": "s",
     "stress": "Pa",
+    "velocity_before": "m/s",
+    "velocity_after": "m/s",
+    "spin_before": "rad/s",
+    "spin_after": "rad/s",
     "touch": "m",
     "displacement": "m",
     "magnitude": "m",
@@ -307,6 +361,7 @@ IMPACT = StoredAnalysis(
     told=study_told,
     measures={
         "impact level": LEVEL_MEASURES,
+        "oblique impact level": OBLIQUE_MEASURES,
         "difference of two levels": DEVIATION_MEASURES,
     },
     measured=study_measured,

@@ -10,7 +10,7 @@ import numpy as np
 
 from klack.analyses.impact.analysis import GAUGE_COLUMNS, gauge_rows, no_estimate
 from klack.analyses.impact.figures import charts
-from klack.analyses.impact.measures import DEVIATION_MEASURES, LEVEL_MEASURES
+from klack.analyses.impact.measures import DEVIATION_MEASURES, measures_of
 from klack.analyses.impact.pressure_view import friction_views, pressure_rows, study_views
 from klack.analyses.impact.record import ImpactStudy, LevelResult
 from klack.analyses.impact.wording import (
@@ -163,7 +163,7 @@ def _number_table(study: ImpactStudy) -> Table:
     names = [result.level for result in results]
     rows = [
         (measure.title or measure.name, *(_number(study, measure, result) for result in results))
-        for measure in LEVEL_MEASURES
+        for measure in measures_of(*results)
         if measure.page
     ]
     rows += [
@@ -224,6 +224,7 @@ def _computed(study: ImpactStudy) -> Section:
                 f"{contact.size_ratio:.2f} ({size_verdict(contact.size_ratio)})",
             ),
             ("contact points across", str(contact.points_across or "–")),
+            *_stuck_rows(study),
             ("doubts about the contact", "\n".join(contact.doubts) or "–"),
         ]
     facts.append(("local law", law.kind))
@@ -231,6 +232,19 @@ def _computed(study: ImpactStudy) -> Section:
         title="Input",
         tables=(body_table(study.bodies), Table(columns=("contact", ""), rows=tuple(facts))),
     )
+
+
+def _stuck_rows(study: ImpactStudy) -> list[tuple[str, str]]:
+    stuck = study.contact.stuck
+    if stuck is None:
+        return []
+    rows = [("compliance along the normal, all points stick", stuck.normal)]
+    if isfinite(stuck.tangential):
+        rows += [
+            ("compliance across the normal", stuck.tangential),
+            ("coupling of both", stuck.coupling),
+        ]
+    return [(name, f"{1e9 * value:.4g} nm/N") for name, value in rows]
 
 
 def _estimates(study: ImpactStudy) -> Section:
@@ -390,7 +404,7 @@ def _energy_table(study: ImpactStudy) -> Table:
 
 def _definitions(study: ImpactStudy) -> tuple[tuple[str, str], ...]:
     return (
-        *glossary(LEVEL_MEASURES),
+        *glossary(measures_of(*study.ordered)),
         *glossary(DEVIATION_MEASURES),
         (
             "spectrum",

@@ -6,7 +6,12 @@ from dataclasses import replace
 import numpy as np
 
 from klack.analyses.impact.gauges import FullGauges
-from klack.analyses.impact.levels import level_result, pressure_record
+from klack.analyses.impact.levels import (
+    level_result,
+    oblique_doubts,
+    oblique_motion,
+    pressure_record,
+)
 from klack.analyses.impact.record import FrictionRecord, LevelResult
 from klack.assembling.modes import damping_of, is_damped
 from klack.assembling.problem import ContactProblem
@@ -85,6 +90,7 @@ def simulate_in_full(
         known=_known(problem, kept)
         if snapshots is None and space is problem.static.space
         else None,
+        across=case.motion.across,
         longest_period=longest_period,
         precision="single",
         threads=threads or 2,
@@ -155,7 +161,9 @@ def run_full(
     )
     unchecked = () if case.contact.faces.is_constant else (_JUMPS,)
     gauges = reading.records(case.run.full_step)
-    return replace(level, gauges=gauges).doubted(*unchecked), result
+    oblique = oblique_motion(case, level, result.rigid_velocity)
+    level = replace(level, gauges=gauges, oblique=oblique)
+    return level.doubted(*unchecked, *oblique_doubts(problem, level)), result
 
 
 def _friction(case: Case, result: FullOrderResult) -> FrictionRecord | None:

@@ -9,7 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.analyses.impact.gauges import interface_gauges
-from klack.analyses.impact.levels import level_result, pressure_record
+from klack.analyses.impact.levels import (
+    level_result,
+    oblique_doubts,
+    oblique_motion,
+    pressure_record,
+)
 from klack.analyses.impact.record import FrictionRecord, LevelResult
 from klack.assembling.bodies import BodyPair
 from klack.assembling.modes import damping_of, selection_of
@@ -68,6 +73,7 @@ _FEWEST = 30
 _REACH_GROWTH = 2.0
 _IN_THE_WALL = 1e-3  # of the clearance: the axis of a meshed shaft is known as well
 _RICHER = 2.0
+_TURN = 1e-5  # [rad]
 _MOST_RECORDS = 30_000_000
 _SET_BEYOND = 1.2  # of the deepest one that is known: a straight line goes on so far
 _OTHER_STEP = 2.0**0.5  # a step over the one it is compared with
@@ -155,7 +161,27 @@ def build_interface(
             )
         )
     model = interface_model(bodies, contacts)
+    if not problem.case.motion.is_straight:
+        model = _turning(problem, model)
     return replace(model, limit=limit if smooth else None, layer=pair.layer)
+
+
+def _turning(problem: ContactProblem, model: InterfaceModel) -> InterfaceModel:
+    """The model with the gaps of a body that turns about its centre, at the points of the other.
+
+    Where a body turns its face slides along itself, and the contact stays below the centre of a
+    sphere; points that turn with the body would carry the contact aside, and its force would brake
+    the spin.
+    """
+    gaps, mine = exact_gaps(problem), (model.owner == 0) & (model.omega == 0.0)
+    turns = np.zeros((3, 6))
+    turns[:, 3:] = _TURN * np.eye(3)
+    motions = model.rigid[:, mine]
+    rows = np.linalg.solve(motions.T, model.traces[:, mine].T).T
+    rows[:, 3:] = np.column_stack([gaps(turn) - gaps(-turn) for turn in turns]) / (2.0 * _TURN)
+    traces = model.traces.copy()
+    traces[:, mine] = rows @ motions
+    return replace(model, traces=traces)
 
 
 def _opposite_faces(case: Case) -> Friction:
@@ -387,6 +413,7 @@ def simulate_case(
         force=force,
         spring_stiffness=0.0 if spring is None else spring.stiffness,
         guide=guide,
+        velocity=case.motion.across,
         points=model.count * duration / step <= _MOST_RECORDS,
         worn=worn,
     )
@@ -469,11 +496,15 @@ def run_interface(
         ),
         frictionless=frictionless,
     )
+    ends = level.measures.first_touch + level.measures.total_contact_time
+    after = min(int(np.searchsorted(result.motion.time, ends)), len(result.motion.time) - 1)
+    level = replace(level, oblique=oblique_motion(case, level, result.motion.velocity[after]))
     return replace(
         level,
         gauges=interface_gauges(problem, model, result),
         doubts=(
             *level.doubts,
+            *oblique_doubts(problem, level),
             *_angle_doubts(case, model, result),
             *_step_doubts(case, model, guide, level.measures),
             *set_doubts(model, result),

@@ -1,6 +1,7 @@
 """Lumped and reduced levels."""
 
-from collections.abc import Mapping
+import warnings
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from time import perf_counter
 
@@ -13,6 +14,7 @@ from klack.analyses.impact.record import (
     LawSummary,
     LevelResult,
     ModalEnergy,
+    ObliqueMotion,
     PressureRecord,
 )
 from klack.analyses.impact.trust import doubts_of
@@ -23,8 +25,9 @@ from klack.contact.history import ImpactHistory
 from klack.contact.laws import ContactLaw, HuntCrossley, LinearLaw, gonthier_coefficient
 from klack.contact.restitution import Deviation, measure_impact
 from klack.contact.submodel import LocalStiffness
-from klack.errors import InputError
+from klack.errors import AccuracyWarning, InputError
 from klack.simulation.bodies import fixed_body, rigid_mass_body
+from klack.units import format_si
 
 __all__ = [
     "deviations",
@@ -32,6 +35,8 @@ __all__ = [
     "law_words",
     "level_result",
     "lumped_level",
+    "oblique_doubts",
+    "oblique_motion",
     "pressure_record",
     "run_lumped",
     "run_reduced",
@@ -133,6 +138,71 @@ def level_result(
         frictionless=None if frictionless is None else measure_impact(frictionless),
     )
     return replace(result, doubts=doubts_of(result))
+
+
+def oblique_motion(
+    case: Case, level: LevelResult, after: NDArray[np.float64]
+) -> ObliqueMotion | None:
+    """Rigid motion of a body that starts across the axis.
+
+    Parameters
+    ----------
+    after (6,) [m/s], [rad/s]
+        Motion after the impact.
+    """
+    motion, history = case.motion, level.history
+    if motion.is_straight:
+        return None
+    before = motion.across
+    return ObliqueMotion(
+        velocity_before=before[:3] - [0.0, 0.0, motion.speed],
+        velocity_after=after[:3],
+        spin_before=before[3:],
+        spin_after=after[3:],
+        mass=history.mass_a,
+        mass_ratio=history.mass_a / history.mass_b,
+        impulse=level.measures.impulse,
+    )
+
+
+_LARGEST_TURN = np.radians(5.0)
+_CARRIED = 0.02  # share of the moment of friction that contact points take with them
+_NO_FRICTION = (
+    "the faces are without friction: motion.sideways_speed and motion.spin change nothing on a "
+    "face across the axis, and act only through its slope elsewhere. Try: contact.friction."
+)
+
+
+def oblique_doubts(problem: ContactProblem, level: LevelResult) -> Iterator[str]:
+    """Doubts about a body that moves across the axis while it touches."""
+    motion, measures = level.oblique, level.measures
+    if motion is None:
+        return
+    if problem.case.contact.faces.is_none:
+        warnings.warn(_NO_FRICTION, AccuracyWarning, stacklevel=2)
+    time = measures.total_contact_time
+    speed = np.hypot(*(motion.velocity_before + motion.velocity_after)[:2]) / 2.0
+    spin = (motion.spin_before + motion.spin_after) / 2.0
+    width = problem.static.half_width_at(min(measures.peak_force, problem.static.max_force))
+    if speed * time > width:
+        yield (
+            f"the body moves {format_si(speed * time, 'm', 3)} sideways while it touches, more than "
+            f"the half width of the contact, {format_si(width, 'm', 3)}: the faces keep the normals "
+            "of their first touch, which holds for a flat lower face. Try: less "
+            "motion.sideways_speed."
+        )
+    angle = float(np.linalg.norm(spin)) * time
+    if angle > _LARGEST_TURN:
+        yield (
+            f"the body turns by {np.degrees(angle):.2g} degrees while it touches, and rotations are "
+            f"small ones, up to {np.degrees(_LARGEST_TURN):.0f} degrees. Try: less motion.spin."
+        )
+    carried = 0.5 * float(np.hypot(*spin[:2])) * time / max(motion.impulse_ratio, 1e-12)
+    if level.level == "full" and motion.impulse_ratio > 0.0 and carried > _CARRIED:
+        yield (
+            "contact points of the full order turn with the body, which brakes its spin by about "
+            f"{100 * carried:.1f} %. Try: level interface, whose contact stays below the centre."
+        )
 
 
 def law_summary(

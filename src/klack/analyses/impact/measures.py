@@ -1,5 +1,6 @@
 """Measures of a level, and of the difference of two."""
 
+from collections.abc import Callable
 from math import isfinite
 from operator import attrgetter
 
@@ -8,7 +9,15 @@ from klack.analyses.measures import Column, Measure, described_in
 from klack.contact.restitution import Deviation
 from klack.report.wording import count, quantity
 
-__all__ = ["CONTACT_TIME", "DEVIATION_MEASURES", "LEVEL_MEASURES", "PEAK_FORCE", "RESTITUTION"]
+__all__ = [
+    "CONTACT_TIME",
+    "DEVIATION_MEASURES",
+    "LEVEL_MEASURES",
+    "OBLIQUE_MEASURES",
+    "PEAK_FORCE",
+    "RESTITUTION",
+    "measures_of",
+]
 
 _THEORY = "theory/impact"
 
@@ -24,6 +33,16 @@ def _cut(level: LevelResult) -> str:
 def _contact(level: LevelResult, number: int) -> str:
     several = level.measures.sub_contacts
     return f" (contact {number} of {several})" if several > 1 else ""
+
+
+def _oblique(read: Callable[..., float]) -> Callable[[LevelResult], float | None]:
+    """Read the motion after the impact; None for a straight or cut-off one."""
+
+    def found(level: LevelResult) -> float | None:
+        motion = level.oblique
+        return None if motion is None or level.measures.cut_off else read(motion)
+
+    return found
 
 
 PEAK_FORCE = Measure[LevelResult](
@@ -64,6 +83,56 @@ RESTITUTION = Measure[LevelResult](
     column=Column("", 1.0, ".4f"),
     deviation="difference",
 )
+
+OBLIQUE_MEASURES: tuple[Measure[LevelResult], ...] = described_in(
+    "theory/friction",
+    Measure(
+        key="tangential_restitution",
+        symbol="e_t",
+        definition="Sideways velocity of the centre of mass after the impact over that before it, "
+        "along the sideways direction (relative velocity of both centres where both are free).",
+        page=True,
+        read=_oblique(lambda motion: motion.tangential_restitution),
+        form="fixed",
+        column=Column("", 1.0, ".4f"),
+    ),
+    Measure(
+        key="impulse_ratio",
+        symbol="J_t/J",
+        definition="Impulse on the moving body across the axis over that along it; the coefficient "
+        "of friction where flat faces slip all the time.",
+        page=True,
+        read=_oblique(lambda motion: motion.impulse_ratio),
+        form="fixed",
+        column=Column("", 1.0, ".5f"),
+    ),
+    *(
+        Measure(
+            key=f"velocity_{axis}_after",
+            symbol=f"v_{axis}",
+            unit="m/s",
+            definition=f"Velocity of the centre of mass of the moving body along {axis} after the "
+            "impact.",
+            page=True,
+            read=_oblique(lambda motion, i=i: float(motion.velocity_after[i])),
+            column=Column("m/s", 1.0, ".5g", f"v_{axis}"),
+        )
+        for i, axis in enumerate("xy")
+    ),
+    *(
+        Measure(
+            key=f"spin_{axis}_after",
+            symbol=f"w_{axis}",
+            unit="rad/s",
+            definition=f"Angular velocity of the moving body about {axis} after the impact.",
+            page=True,
+            read=_oblique(lambda motion, i=i: float(motion.spin_after[i])),
+            column=Column("rad/s", 1.0, ".5g", f"w_{axis}"),
+        )
+        for i, axis in enumerate("xyz")
+    ),
+)
+"""Of levels that move a body sideways; no others have a value."""
 
 LEVEL_MEASURES: tuple[Measure[LevelResult], ...] = described_in(
     _THEORY,
@@ -221,6 +290,12 @@ LEVEL_MEASURES: tuple[Measure[LevelResult], ...] = described_in(
     ),
 )
 """In the order of JSON and of exported files."""
+
+
+def measures_of(*levels: LevelResult) -> tuple[Measure[LevelResult], ...]:
+    """Measures that any of these levels has."""
+    oblique = any(level.oblique is not None for level in levels)
+    return (*LEVEL_MEASURES, *(OBLIQUE_MEASURES if oblique else ()))
 
 
 def _of_level(measure: Measure[LevelResult]) -> Measure[Deviation]:

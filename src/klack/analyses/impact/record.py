@@ -14,6 +14,7 @@ from klack.bodies.reduction.structure import Structure
 from klack.bodies.reduction.transfer import TransferComparison
 from klack.contact.history import ImpactHistory
 from klack.contact.restitution import Deviation, ImpactMeasures
+from klack.contact.statics import StuckCompliance
 from klack.mesh.skin import Skin
 
 __all__ = [
@@ -25,6 +26,7 @@ __all__ = [
     "LawSummary",
     "LevelResult",
     "ModalEnergy",
+    "ObliqueMotion",
     "PressureRecord",
     "RunningIn",
     "SectionPicture",
@@ -57,6 +59,8 @@ class ContactSummary:
         Yield stress from which on both bodies stay elastic; nan if unknown.
     layer
         Asperities of rough faces in words; empty for smooth ones.
+    stuck
+        Compliance of the contact while its points stick; of half sections and faces that rub.
     approach, force, area (n,) [m], [N], [m^2]
         Ladder from first touch.
     """
@@ -72,6 +76,7 @@ class ContactSummary:
     doubts: tuple[str, ...] = ()
     needed_yield: float = float("nan")
     layer: str = ""
+    stuck: StuckCompliance | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -156,6 +161,48 @@ class PressureRecord:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class ObliqueMotion:
+    """Rigid motion of the moving body that starts across the axis, before and after the impact.
+
+    Parameters
+    ----------
+    velocity_before, velocity_after (3,) [m/s]
+        Of its centre of mass.
+    spin_before, spin_after (3,) [rad/s]
+    mass [kg]
+        Of the moving body.
+    mass_ratio [-]
+        Over that of the body that it hits; 0 for a held one.
+    impulse [N s]
+        Of the contact, along the axis.
+    """
+
+    velocity_before: NDArray[np.float64]
+    velocity_after: NDArray[np.float64]
+    spin_before: NDArray[np.float64]
+    spin_after: NDArray[np.float64]
+    mass: float
+    mass_ratio: float
+    impulse: float
+
+    @property
+    def tangential_restitution(self) -> float:
+        """Sideways velocity of the centre after over before, of both bodies; nan without."""
+        before, after = self.velocity_before[:2], self.velocity_after[:2]
+        square = float(before @ before)
+        if not square > 0.0:
+            return float("nan")
+        # the lower body takes what the moving one loses
+        return float((after + self.mass_ratio * (after - before)) @ before) / square
+
+    @property
+    def impulse_ratio(self) -> float:
+        """Impulse of the contact across the axis over that along it [-]."""
+        change = self.velocity_after[:2] - self.velocity_before[:2]
+        return self.mass * float(np.hypot(*change)) / self.impulse
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class LevelResult:
     """One computed impact.
 
@@ -184,6 +231,8 @@ class LevelResult:
         Why this level can be no reference for others (:mod:`klack.analyses.impact.trust`).
     gauges
         Output channels; none at the level lumped.
+    oblique
+        Of a body that starts sideways or with a spin.
     """
 
     level: str
@@ -202,6 +251,7 @@ class LevelResult:
     frictionless: ImpactMeasures | None = None
     doubts: tuple[str, ...] = ()
     gauges: tuple[GaugeRecord, ...] = ()
+    oblique: ObliqueMotion | None = None
 
     def doubted(self, *doubts: str) -> Self:
         """The same with further doubts, if not empty."""

@@ -94,11 +94,18 @@ from klack.case.impact_sections import SubmodelLocalLaw
 from klack.case.levels import Level
 from klack.case.placed_errors import tells_place
 from klack.case.schema import Case
+from klack.contact.face_friction import FaceFriction
 from klack.contact.history import ImpactHistory
 from klack.contact.plasticity.loops import YieldingLoops
 from klack.contact.pressure_limit import PressureLimit
 from klack.contact.restitution import Deviation, measure_impact
-from klack.contact.statics import ReachError, StaticContact, static_contact
+from klack.contact.statics import (
+    ReachError,
+    StaticContact,
+    StuckCompliance,
+    static_contact,
+    stuck_compliance,
+)
 from klack.contact.submodel import LocalStiffness
 from klack.errors import AccuracyWarning, InputError
 from klack.files.closing import Closing
@@ -304,6 +311,7 @@ class _Work:
         self.ran: RunningIn | None = None
         self.certificate = _Certificate()
         self.classical: LocalStiffness | None = None
+        self.stuck: StuckCompliance | None = None
         self.structures: tuple[Structure, ...] = ()
         self.transfer: tuple[TransferComparison, ...] = ()
         self.pictures: tuple[BodyPicture, ...] = ()
@@ -404,6 +412,8 @@ class _Work:
             worn_by=0.0 if worn is None else worn.force,
             has_yield=self.yielding.limit is not None or self.yielding.loops is not None,
         )
+        what = "the compliance of the contact"
+        self.stuck = for_comparison(what, lambda: _stuck(self.problem, static, loaded))
 
     def find_structures(self, near: Mapping[str, NearLoads] | None, clock: StageClock) -> None:
         clock("radiating surfaces", 0.0)
@@ -464,7 +474,7 @@ class _Work:
             gap=case.contact.gap or 0.0,
             **run_fields(begin, clock),
             bodies=_summaries(self.problem, self.own),
-            contact=_contact_summary(self.problem, self.check),
+            contact=replace(_contact_summary(self.problem, self.check), stuck=self.stuck),
             law=_law_summary(self.own, self.classical, self.peak),
             levels=results,
             reference=reference,
@@ -762,6 +772,17 @@ def _as_loaded(
     except ReachError:
         return problem.static, problem.static.max_force
     return heavier, force
+
+
+def _stuck(problem: ContactProblem, static: StaticContact, force: float) -> StuckCompliance | None:
+    """Compliance while all points stick; solids without friction save its solves."""
+    pair, faces = problem.pair, problem.case.contact.faces
+    if static.space.dimension == 3 and faces.is_none:
+        return None
+    sides = (pair.upper.mesh, pair.upper_surface, pair.lower.mesh, pair.lower_surface)
+    rows = FaceFriction.on(faces, static.space, *sides)
+    bodies = (problem.flexibility_upper, problem.flexibility_lower)
+    return stuck_compliance(static, min(force, static.max_force), rows, *bodies)
 
 
 def _surfaces(case: Case) -> str:

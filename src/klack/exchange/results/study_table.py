@@ -6,7 +6,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from klack.analyses.impact.measures import LEVEL_MEASURES
+from klack.analyses.impact.measures import measures_of
 from klack.analyses.impact.record import ImpactStudy, LevelResult
 from klack.analyses.measures import Measure
 from klack.analyses.noise.record import NoiseStudy
@@ -180,7 +180,7 @@ def _history(history: ImpactHistory) -> list[ResultChannel]:
 
 def _scalars(level: LevelResult) -> tuple[ResultScalar, ...]:
     return (
-        *(measure_scalar(measure, level) for measure in LEVEL_MEASURES),
+        *(measure_scalar(measure, level) for measure in measures_of(level)),
         *(
             ResultScalar(name=f"energy {key}", unit="J", value=float(value), meaning="ledger")
             for key, value in level.energies.items()

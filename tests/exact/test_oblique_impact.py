@@ -1,0 +1,216 @@
+"""Bodies that start sideways or with a spin: momentum, symmetry, gross slip, sticking."""
+
+import re
+from dataclasses import replace
+from functools import cache
+from math import pi
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from klack.analyses.impact.analysis import IMPACT
+from klack.analyses.impact.full_level import simulate_in_full
+from klack.analyses.impact.interface_level import build_interface, run_interface
+from klack.analyses.impact.record import LevelResult
+from klack.analyses.impact.run import impact_bodies, run_impact
+from klack.assembling.problem import ContactProblem, contact_problem
+from klack.assembling.reduced_pair import first_stiffness, own_pair
+from klack.bodies.elasticity.eigen import Modes
+from klack.case.reader import read_case
+from klack.case.schema import Case
+from klack.contact.friction import Friction
+from klack.errors import InputError
+from klack.machine.progress import silent
+from klack.transient.interface_model import InterfaceModel
+
+pytestmark = pytest.mark.slow
+
+BODY = """
+    geometry:
+      model: swept
+      layers: 8
+      profile:
+        unit: mm
+        parts:
+          {name}: {{start: {start}, edges: [{edges}, {{close: true, name: axis}}]}}
+    material: steel
+    mesh: {{size: 1.5 mm, contact: {{size: {size} mm, extent: 0.2 mm}}}}
+"""
+SPHERE = BODY.format(
+    name="sphere",
+    start="[0, 0]",
+    edges="{arc: [2, 2], centre: [0, 2], name: tip}, {arc: [0, 4], centre: [0, 2], name: top}",
+    size=0.05,
+)
+PLATE = BODY.format(
+    name="plate",
+    start="[0, -4]",
+    edges="{line: [4, -4], name: foot}, {line: [4, 0], name: side}, {line: [0, 0], name: face}",
+    size=0.04,
+)
+TEXT = f"""klack: 1
+title: Sphere on a plate
+materials:
+  steel: {{young: 210 GPa, poisson: 0.3, density: 7850 kg/m^3}}
+bodies:
+  sphere:{SPHERE}
+  plate:{PLATE}    fixed: [{{surface: foot}}]
+contact: {{between: [sphere.tip, plate.face], gap: 0 um, friction: 0.1}}
+motion: {{speed: 0.5 m/s, sideways_speed: 0.2 m/s}}
+reduction: {{modes: {{sphere: {{count: 6}}, plate: {{count: 20}}}}}}
+run: {{levels: [interface], duration: 30 us, interface_step: 60 ns}}
+"""
+RADIUS = 2e-3
+
+
+@cache
+def bodies() -> tuple[ContactProblem, InterfaceModel]:
+    case = read_case(TEXT, Path("sphere.yaml"))
+    placed = impact_bodies(case, levels=["interface"], certify=False)
+    problem = contact_problem(case, placed.placed, silent)
+    own = own_pair(problem, placed.pools, stiffness=first_stiffness(problem))
+    return problem, build_interface(problem, placed.pools, ports=own.ports)
+
+
+def moving(sideways: float = 0.0, **more) -> Case:
+    case = bodies()[0].case
+    motion = case.motion.model_copy(update={"sideways_speed": sideways, **more})
+    return case.model_copy(update={"motion": motion})
+
+
+def hit(sideways: float = 0.0, mu: float = 0.1, **more) -> LevelResult:
+    problem, model = bodies()
+    case = moving(sideways, **more)
+    law = Friction.coulomb(mu)
+    model = replace(model, friction=(law,)) if mu else model.without_friction()
+    return run_interface(replace(problem, case=case), model, None, setup_time=0.0)
+
+
+def after(level: LevelResult) -> np.ndarray:
+    assert level.oblique is not None
+    return np.concatenate([level.oblique.velocity_after, level.oblique.spin_after])
+
+
+def test_without_friction_the_plate_takes_nothing_sideways():
+    """Newton; the force is that of the straight impact."""
+    straight, oblique = hit(mu=0.0), hit(0.7, mu=0.0)
+    assert after(oblique)[:2] == pytest.approx([0.7, 0.0], abs=7e-10)
+    np.testing.assert_allclose(
+        oblique.history.force, straight.history.force, atol=1e-9 * straight.history.force.max()
+    )
+
+
+def test_gross_slip_has_coulombs_impulse_and_the_arm_of_the_radius():
+    """J_t = mu J, and I w = R J_t: the contact stays below the centre while the sphere turns."""
+    level = hit(3.0, mu=0.05)
+    found, body = level.oblique, bodies()[0].pair.upper
+    assert found is not None
+    assert found.impulse_ratio == pytest.approx(0.05, rel=1e-4)
+    taken = body.mass * (3.0 - found.velocity_after[0])
+    assert found.spin_after[1] * body.inertia[1, 1] == pytest.approx(RADIUS * taken, rel=3e-3)
+
+
+@pytest.mark.parametrize("mu", [0.1, 2.0])
+def test_moment_of_momentum_about_the_touch(mu):
+    """Forces in the plane of contact have no moment about it, however the points stick."""
+    level, body = hit(0.2, mu=mu), bodies()[0].pair.upper
+    v, w = after(level)[0], after(level)[4]
+    assert w * body.inertia[1, 1] == pytest.approx(RADIUS * body.mass * (0.2 - v), rel=1e-2)
+
+
+def test_full_stick_loses_nothing():
+    """An elastic contact that never slips gives its work back."""
+    level = hit(0.2, mu=2.0)
+    assert abs(level.energies["friction"]) < 1e-6 * level.energies["initial kinetic"]
+
+
+def test_a_rolling_sphere_rolls_on():
+    """No slip, no tangential force between like materials."""
+    level = hit(0.2, spin=(0.0, 0.2 / RADIUS, 0.0))
+    assert after(level)[0] == pytest.approx(0.2, rel=5e-3)
+    assert after(level)[4] == pytest.approx(0.2 / RADIUS, rel=5e-3)
+
+
+def test_mirrored_and_turned_motion():
+    """Bodies of eight layers: a half and a quarter of a turn are symmetries of both meshes."""
+    v, w = np.split(after(hit(0.2)), 2)
+    for angle in (pi, pi / 2.0):
+        c, s = np.cos(angle), np.sin(angle)
+        turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        turned_v, turned_w = np.split(after(hit(0.2, sideways_direction=angle)), 2)
+        np.testing.assert_allclose(turned_v, turn @ v, atol=1e-6)
+        np.testing.assert_allclose(turned_w, turn @ w, atol=1e-6 / RADIUS)
+
+
+def test_reversed_spin_mirrors_the_motion():
+    first, back = (after(hit(spin=(0.0, sign * 150.0, 0.0))) for sign in (1.0, -1.0))
+    assert first[0] > 0.05
+    np.testing.assert_allclose(back[[0, 4]], -first[[0, 4]], rtol=1e-5)
+    np.testing.assert_allclose(back[2], first[2], rtol=1e-6)
+
+
+def test_spin_about_the_normal_is_slowed_without_a_push():
+    """A disc of friction has a moment about its axis and no resultant."""
+    found = after(hit(spin=(0.0, 0.0, 500.0)))
+    assert 0.0 < found[5] < 500.0
+    np.testing.assert_allclose(found[:2], 0.0, atol=1e-6)
+
+
+def test_an_impact_from_end_to_end(tmp_path):
+    """Numbers of the record in JSON, on the terminal and in the report."""
+    study = run_impact(bodies()[0].case, levels=["interface"], certify=False)
+    level = study.levels["interface"]
+    assert level.oblique is not None
+    json = IMPACT.to_json(study)["levels"]["interface"]["oblique"]
+    assert json["tangential_restitution"] == pytest.approx(after(level)[0] / 0.2, rel=1e-12)
+    assert json["spin_y_after_rad_s"] == after(level)[4]
+    told = [part for part in IMPACT.told(study) if not isinstance(part, str)]
+    assert "Across the axis" in [table.title for table in told]
+    assert study.contact.stuck is not None
+    # equal spheres have (2 - nu)/(2 (1 - nu)) = 1.214 (Mindlin); the bulk of both adds to each
+    assert study.contact.stuck.tangential / study.contact.stuck.normal == pytest.approx(
+        1.7 / 1.4, rel=0.05
+    )
+    assert abs(study.contact.stuck.coupling) < 1e-3 * study.contact.stuck.normal
+
+
+@pytest.mark.parametrize(
+    ("new", "says"),
+    [
+        ("sideways_speed: 0.2 m/s", "motion.sideways_speed: got the level 'reduced' of a body"),
+        ("spin: [0, 3 rad/s, 0]", "motion.spin: got the level 'reduced' of a body with 3 rad/s"),
+    ],
+)
+def test_levels_along_the_axis_are_refused(new, says):
+    case = read_case(TEXT.replace("sideways_speed: 0.2 m/s", new), Path("sphere.yaml"))
+    with pytest.raises(InputError, match=re.escape(says)):
+        run_impact(case, levels=["reduced"])
+
+
+@pytest.mark.parametrize(
+    ("more", "says"),
+    [
+        ("shots: {count: 2, force: {uniform: [0 N, 1 N]}}", "or 'shots'"),
+        ("run: {duration: 30 us, levels: [interface], impacts: 3}", "or 'run_in'"),
+    ],
+)
+def test_what_starts_along_the_axis_is_refused(more, says):
+    text = TEXT[: TEXT.index("run:")] if more.startswith("run") else TEXT
+    with pytest.raises(InputError, match=says):
+        read_case(f"{text}{more}\n", Path("sphere.yaml"))
+
+
+def test_full_order_takes_the_same_motion():
+    """Every degree of freedom against modes, on one mesh: 0.01 of restitution, 2 % of the spin."""
+    problem, _ = bodies()
+    case = moving(0.2, spin=(0.0, -40.0, 0.0))
+    reduced = hit(0.2, spin=(0.0, -40.0, 0.0))
+    kept = {
+        body.name: Modes(np.zeros(0), np.zeros((body.dof_count, 0)))
+        for body in (problem.pair.upper, problem.pair.lower)
+    }
+    full = simulate_in_full(replace(problem, case=case), kept=kept, progress=silent, threads=1)
+    v, w = np.split(full.rigid_velocity, 2)
+    assert v[0] == pytest.approx(after(reduced)[0], abs=2e-3)
+    assert w[1] == pytest.approx(after(reduced)[4], rel=0.02)
