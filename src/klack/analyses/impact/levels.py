@@ -176,26 +176,27 @@ _NO_FRICTION = (
 def oblique_doubts(problem: ContactProblem, level: LevelResult) -> Iterator[str]:
     """Doubts about a body that moves across the axis while it touches."""
     motion, measures = level.oblique, level.measures
-    if motion is None:
+    if motion is None or measures.cut_off:
         return
     if problem.case.contact.faces.is_none:
         warnings.warn(_NO_FRICTION, AccuracyWarning, stacklevel=2)
     time = measures.total_contact_time
-    speed = np.hypot(*(motion.velocity_before + motion.velocity_after)[:2]) / 2.0
-    spin = (motion.spin_before + motion.spin_after) / 2.0
+    speed = 0.5 * sum(np.hypot(*v[:2]) for v in (motion.velocity_before, motion.velocity_after))
+    spin = 0.5 * (motion.spin_before + motion.spin_after)
     width = problem.static.half_width_at(min(measures.peak_force, problem.static.max_force))
     if speed * time > width:
         yield (
-            f"the body moves {format_si(speed * time, 'm', 3)} sideways while it touches, more than "
-            f"the half width of the contact, {format_si(width, 'm', 3)}: the faces keep the normals "
-            "of their first touch, which holds for a flat lower face. Try: less "
+            f"the body moves {format_si(speed * time, 'm', 3)} sideways while it touches, more "
+            f"than the half width of the contact, {format_si(width, 'm', 3)}: the faces keep the "
+            "normals of their first touch, which holds for a flat lower face. Try: less "
             "motion.sideways_speed."
         )
     angle = float(np.linalg.norm(spin)) * time
     if angle > _LARGEST_TURN:
         yield (
-            f"the body turns by {np.degrees(angle):.2g} degrees while it touches, and rotations are "
-            f"small ones, up to {np.degrees(_LARGEST_TURN):.0f} degrees. Try: less motion.spin."
+            f"the body turns by {np.degrees(angle):.2g} degrees while it touches, and only small "
+            f"rotations are right, up to {np.degrees(_LARGEST_TURN):.0f} degrees. Try: less "
+            "motion.spin."
         )
     carried = 0.5 * float(np.hypot(*spin[:2])) * time / max(motion.impulse_ratio, 1e-12)
     if level.level == "full" and motion.impulse_ratio > 0.0 and carried > _CARRIED:
