@@ -121,10 +121,15 @@ def test_moment_of_momentum_about_the_touch(mu):
     assert w * body.inertia[1, 1] == pytest.approx(RADIUS * body.mass * (0.2 - v), rel=1e-2)
 
 
-def test_full_stick_loses_nothing():
-    """An elastic contact that never slips gives its work back."""
-    level = hit(0.2, mu=2.0)
-    assert abs(level.energies["friction"]) < 1e-6 * level.energies["initial kinetic"]
+MAW = ((0.5, 0.0478318), (1.0, -0.0596967), (2.0, -0.83721), (3.0, -1.37968), (5.0, -0.764706))
+
+
+@pytest.mark.parametrize(("before", "truth"), MAW)
+def test_oblique_impact_of_like_bodies(before, truth):
+    """Maw, Barber & Fawcett 1976; the tolerance is that of three elements over the radius."""
+    unit = 0.1 / (1.4 / 1.7) * 0.5
+    found = after(hit(before * unit))
+    assert (found[0] - RADIUS * found[4]) / unit == pytest.approx(truth, abs=0.05)
 
 
 def test_a_rolling_sphere_rolls_on():
@@ -218,43 +223,41 @@ def test_full_order_takes_the_same_motion():
     assert w[1] == pytest.approx(after(reduced)[4], rel=0.02)
 
 
-@pytest.mark.parametrize(("mu", "tolerance"), [(0.08, 0.003), (0.25, 0.008)])
-def test_three_compliances_give_the_restitution_of_a_cone(mu, tolerance):
-    """Closed form with the coupling of the ring; partial slip within its width is left out.
-
-    Without the coupling it is 0.012 and 0.026 off.
-    """
+def valve(size: str, **contact) -> Case:
     text = find_case("demo-valve-axisymmetric").read_text(encoding="utf-8")
-    hard = "  hard: {young: 21000 GPa, poisson: 0.3, density: 7850 kg/m^3}\nbodies:"
-    text = text.replace("bodies:", hard, 1).replace("material: steel", "material: hard", 1)
-    case = read_case(text, Path("cone.yaml"))
-    rubbing = case.model_copy(update={"contact": case.contact.model_copy(update={"friction": mu})})
+    case = read_case(text.replace("size: 0.004 mm", f"size: {size}"), Path("needle.yaml"))
+    return case.model_copy(update={"contact": case.contact.model_copy(update=contact)})
+
+
+@pytest.mark.parametrize(("mu", "tolerance"), [(0.08, 0.005), (0.25, 0.009)])
+def test_three_compliances_give_the_restitution_of_a_cone(mu, tolerance):
+    """Closed form with the coupling; it has no partial slip within the width, 0.004 and 0.007.
+
+    Without the coupling it is 0.04 and 0.08 off.
+    """
     smooth, found = (
-        run_impact(one, levels=["interface"], certify=False) for one in (case, rubbing)
+        run_impact(valve("0.004 mm", friction=one), levels=["interface"], certify=False)
+        for one in (0.0, mu)
     )
     restitution = [one.levels["interface"].measures.restitution for one in (smooth, found)]
-    c = found.contact.stuck
+    share, c = restitution[1] / restitution[0], found.contact.stuck
     assert c is not None
-    assert -0.3 < c.coupling / c.normal < -0.1
-    closed = ring_restitution(pi / 4.0, mu, c.normal, c.tangential, c.coupling)
-    assert restitution[1] / restitution[0] == pytest.approx(closed, abs=tolerance)
-    uncoupled = ring_restitution(pi / 4.0, mu, c.normal, c.tangential, 0.0)
-    assert restitution[1] / restitution[0] - uncoupled > 2.0 * tolerance
+    three = c.normal, c.tangential, c.coupling
+    assert share == pytest.approx(ring_restitution(pi / 4.0, mu, *three), abs=tolerance)
+    assert share - ring_restitution(pi / 4.0, mu, *three[:2], 0.0) > 0.03
 
 
 def test_a_needle_that_moves_sideways_into_its_seat():
     """Half sections move in every way at the interface level: mirrored motions, spin about z."""
-    case = read_case(find_case("demo-valve-axisymmetric").read_text("utf-8"), Path("needle.yaml"))
+    case = valve("0.012 mm", friction=0.1, angles=12)
 
     def moved(**motion) -> np.ndarray:
-        contact = case.contact.model_copy(update={"friction": 0.1, "angles": 24})
-        motion = case.motion.model_copy(update=motion)
-        one = case.model_copy(update={"contact": contact, "motion": motion})
+        one = case.model_copy(update={"motion": case.motion.model_copy(update=motion)})
         return after(run_impact(one, levels=["interface"], certify=False).levels["interface"])
 
     there, back = moved(sideways_speed=0.02), moved(sideways_speed=0.02, sideways_direction=pi)
-    np.testing.assert_allclose(back[[0, 4]], -there[[0, 4]], rtol=1e-6)
-    np.testing.assert_allclose(back[2], there[2], rtol=1e-9)
+    np.testing.assert_allclose(back[[0, 4]], -there[[0, 4]], rtol=1e-5)
+    np.testing.assert_allclose(back[2], there[2], rtol=1e-6)
     turning = moved(spin=(0.0, 0.0, 50.0))
     assert 0.0 < turning[5] < 50.0
-    np.testing.assert_allclose(turning[:2], 0.0, atol=1e-9)
+    np.testing.assert_allclose(turning[:2], 0.0, atol=1e-8)

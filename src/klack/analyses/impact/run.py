@@ -777,7 +777,7 @@ def _as_loaded(
 def _stuck(problem: ContactProblem, static: StaticContact, force: float) -> StuckCompliance | None:
     """Compliance while all points stick; solids without friction save its solves."""
     pair, faces = problem.pair, problem.case.contact.faces
-    if static.space.dimension == 3 and faces.is_none:
+    if problem.pair.layer is not None or (static.space.dimension == 3 and faces.is_none):
         return None
     sides = (pair.upper.mesh, pair.upper_surface, pair.lower.mesh, pair.lower_surface)
     rows = FaceFriction.on(faces, static.space, *sides)

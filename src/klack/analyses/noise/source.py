@@ -52,6 +52,11 @@ __all__ = [
     "stroke_sources",
 ]
 
+_OBLIQUE = (
+    "the body was hit obliquely: only the force along the axis makes this sound, the one across "
+    "it is left out. Try: an impact without motion.sideways_speed and motion.spin."
+)
+
 _HEARD = 0.1  # of the fastest impact: slower ones have less than 1 % of its energy
 _AROUND = 5.0  # contact times shown on each side of the strongest impact
 
@@ -220,6 +225,7 @@ def impact_sources(
                     *failed,
                     *(f"level '{name}': {doubt}" for doubt in result.doubts),
                     *_yield_notes(result),
+                    *([] if result.oblique is None else [_OBLIQUE]),
                     *_contact_notes([study.contact] if name != "lumped" else ()),
                 ),
             )
