@@ -85,7 +85,7 @@ def run(problem, law: Friction | float | None, **options) -> FullOrderResult:
 
 def oblique(law, **options) -> FullOrderResult:
     return run(
-        balls, law, **({"sideways": (0.3, 0.2), "duration": 15e-6, "step": 200e-9} | options)
+        balls, law, **({"across": np.array([0.3, 0.2, 0.0, 0.0, 0.0, 0.0]), "duration": 15e-6, "step": 200e-9} | options)
     )
 
 
@@ -200,7 +200,7 @@ def test_a_ball_that_slides_gains_mu_times_the_impulse():
 
 def test_direction_of_the_motion_does_not_matter():
     """Bodies swept in 8 layers: a turn by a quarter is a symmetry of both."""
-    first, turned = oblique(0.1), oblique(0.1, sideways=(-0.2, 0.3))
+    first, turned = oblique(0.1), oblique(0.1, across=np.array([-0.2, 0.3, 0.0, 0.0, 0.0, 0.0]))
     assert turned.energy.friction[-1] == pytest.approx(first.energy.friction[-1], rel=1e-6)
     scale = first.history.force.max()
     np.testing.assert_allclose(turned.history.force, first.history.force, atol=1e-6 * scale)
@@ -217,7 +217,7 @@ def test_static_coefficient_holds_until_the_first_slip():
 
 def test_sideways_motion_of_an_axisymmetric_body_is_refused():
     with pytest.raises(InputError, match="axisymmetric"):
-        run(seat, None, sideways=(0.1, 0.0))
+        run(seat, None, across=np.array([0.1, 0.0, 0.0, 0.0, 0.0, 0.0]))
 
 
 def test_foreign_rows_are_refused():

@@ -415,7 +415,7 @@ def slide(law: Friction, duration: float, body: ElasticBody | None = None, **opt
         "speed": 1e-9,
         "step": STEP_SLIDING,
         "axial_force": -PRESS,
-        "sideways": SIDEWAYS,
+        "across": np.array([*SIDEWAYS, 0.0, 0.0, 0.0, 0.0]),
     } | options
     return simulate_full_order(
         body,
@@ -477,6 +477,6 @@ def test_a_plane_across_which_nothing_can_move_is_refused():
         name="held", mesh=held.mesh, K=held.K, M=held.M, fixed=np.array([0, 1], dtype=np.int64)
     )
     with pytest.raises(InputError, match="nothing can move across"):
-        slide(Friction.coulomb(0.2), 5e-6, held, sideways=(0.0, 0.0))
+        slide(Friction.coulomb(0.2), 5e-6, held, across=np.zeros(6))
     with pytest.raises(InputError, match="held sideways"):
         slide(Friction.coulomb(0.2), 5e-6, held)
