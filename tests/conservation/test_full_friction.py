@@ -85,7 +85,12 @@ def run(problem, law: Friction | float | None, **options) -> FullOrderResult:
 
 def oblique(law, **options) -> FullOrderResult:
     return run(
-        balls, law, **({"across": np.array([0.3, 0.2, 0.0, 0.0, 0.0, 0.0]), "duration": 15e-6, "step": 200e-9} | options)
+        balls,
+        law,
+        **(
+            {"across": np.array([0.3, 0.2, 0.0, 0.0, 0.0, 0.0]), "duration": 15e-6, "step": 200e-9}
+            | options
+        ),
     )
 
 

@@ -110,15 +110,18 @@ def test_gross_slip_has_coulombs_impulse_and_the_arm_of_the_radius():
     assert found is not None
     assert found.impulse_ratio == pytest.approx(0.05, rel=1e-4)
     taken = body.mass * (3.0 - found.velocity_after[0])
-    assert found.spin_after[1] * body.inertia[1, 1] == pytest.approx(RADIUS * taken, rel=3e-3)
+    assert found.spin_after[1] * body.inertia[1, 1] == pytest.approx(RADIUS * taken, rel=1.5e-3)
 
 
 @pytest.mark.parametrize("mu", [0.1, 2.0])
 def test_moment_of_momentum_about_the_touch(mu):
-    """Forces in the plane of contact have no moment about it, however the points stick."""
+    """Forces in the plane of contact have no moment about it, however the points stick.
+
+    0.0006 left; points that turn with the sphere miss it by 0.0035 and 0.0095.
+    """
     level, body = hit(0.2, mu=mu), bodies()[0].pair.upper
     v, w = after(level)[0], after(level)[4]
-    assert w * body.inertia[1, 1] == pytest.approx(RADIUS * body.mass * (0.2 - v), rel=1e-2)
+    assert w * body.inertia[1, 1] == pytest.approx(RADIUS * body.mass * (0.2 - v), rel=1.5e-3)
 
 
 MAW = ((0.5, 0.0478318), (1.0, -0.0596967), (2.0, -0.83721), (3.0, -1.37968), (5.0, -0.764706))
@@ -135,8 +138,8 @@ def test_oblique_impact_of_like_bodies(before, truth):
 def test_a_rolling_sphere_rolls_on():
     """No slip, no tangential force between like materials."""
     level = hit(0.2, spin=(0.0, 0.2 / RADIUS, 0.0))
-    assert after(level)[0] == pytest.approx(0.2, rel=5e-3)
-    assert after(level)[4] == pytest.approx(0.2 / RADIUS, rel=5e-3)
+    assert after(level)[0] == pytest.approx(0.2, rel=1e-3)
+    assert after(level)[4] == pytest.approx(0.2 / RADIUS, rel=1e-3)
 
 
 def test_mirrored_and_turned_motion():
