@@ -14,6 +14,7 @@ from klack.analyses.impact.full_level import simulate_in_full
 from klack.analyses.impact.interface_level import build_interface, run_interface
 from klack.analyses.impact.record import LevelResult
 from klack.analyses.impact.run import impact_bodies, run_impact
+from klack.analyses.impact.wording import answer
 from klack.assembling.problem import ContactProblem, contact_problem
 from klack.assembling.reduced_pair import first_stiffness, own_pair
 from klack.bodies.elasticity.eigen import Modes
@@ -175,6 +176,9 @@ def test_an_impact_from_end_to_end(tmp_path):
     json = IMPACT.to_json(study)["levels"]["interface"]["oblique"]
     assert json["tangential_restitution"] == pytest.approx(after(level)[0] / 0.2, rel=1e-12)
     assert json["spin_y_after_rad_s"] == after(level)[4]
+    # a sphere of 4 mm keeps next to nothing of a slow impact
+    assert 0.0 <= level.measures.vibration_share < 0.01
+    assert "sideways speed" in answer(study)
     told = [part for part in IMPACT.told(study) if not isinstance(part, str)]
     assert "Across the axis" in [table.title for table in told]
     assert study.contact.stuck is not None

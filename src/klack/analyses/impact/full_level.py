@@ -9,8 +9,8 @@ from klack.analyses.impact.gauges import FullGauges
 from klack.analyses.impact.levels import (
     level_result,
     oblique_doubts,
-    oblique_motion,
     pressure_record,
+    with_oblique,
 )
 from klack.analyses.impact.record import FrictionRecord, LevelResult
 from klack.assembling.modes import damping_of, is_damped
@@ -161,8 +161,7 @@ def run_full(
     )
     unchecked = () if case.contact.faces.is_constant else (_JUMPS,)
     gauges = reading.records(case.run.full_step)
-    oblique = oblique_motion(case, level, result.rigid_velocity)
-    level = replace(level, gauges=gauges, oblique=oblique)
+    level = with_oblique(problem, replace(level, gauges=gauges), result.rigid_velocity)
     return level.doubted(*unchecked, *oblique_doubts(problem, level)), result
 
 

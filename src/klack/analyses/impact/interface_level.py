@@ -12,8 +12,8 @@ from klack.analyses.impact.gauges import interface_gauges
 from klack.analyses.impact.levels import (
     level_result,
     oblique_doubts,
-    oblique_motion,
     pressure_record,
+    with_oblique,
 )
 from klack.analyses.impact.record import FrictionRecord, LevelResult
 from klack.assembling.bodies import BodyPair
@@ -498,7 +498,7 @@ def run_interface(
     )
     ends = level.measures.first_touch + level.measures.total_contact_time
     after = min(int(np.searchsorted(result.motion.time, ends)), len(result.motion.time) - 1)
-    level = replace(level, oblique=oblique_motion(case, level, result.motion.velocity[after]))
+    level = with_oblique(problem, level, result.motion.velocity[after])
     return replace(
         level,
         gauges=interface_gauges(problem, model, result),

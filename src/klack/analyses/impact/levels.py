@@ -36,10 +36,10 @@ __all__ = [
     "level_result",
     "lumped_level",
     "oblique_doubts",
-    "oblique_motion",
     "pressure_record",
     "run_lumped",
     "run_reduced",
+    "with_oblique",
 ]
 
 _INSTANTS = 120
@@ -140,29 +140,43 @@ def level_result(
     return replace(result, doubts=doubts_of(result))
 
 
-def oblique_motion(
-    case: Case, level: LevelResult, after: NDArray[np.float64]
-) -> ObliqueMotion | None:
-    """Rigid motion of a body that starts across the axis.
+def with_oblique(
+    problem: ContactProblem, level: LevelResult, after: NDArray[np.float64]
+) -> LevelResult:
+    """The level with the rigid motion of a body that starts across the axis, and its energy apart.
 
     Parameters
     ----------
     after (6,) [m/s], [rad/s]
         Motion after the impact.
     """
-    motion, history = case.motion, level.history
+    motion, history, body = problem.case.motion, level.history, problem.pair.upper
     if motion.is_straight:
-        return None
-    before = motion.across
-    return ObliqueMotion(
+        return level
+    before, spin = motion.across, after[3:]
+    oblique = ObliqueMotion(
         velocity_before=before[:3] - [0.0, 0.0, motion.speed],
         velocity_after=after[:3],
         spin_before=before[3:],
-        spin_after=after[3:],
+        spin_after=spin,
         mass=history.mass_a,
         mass_ratio=history.mass_a / history.mass_b,
         impulse=level.measures.impulse,
     )
+    rigid = 0.5 * float(body.mass * after[:2] @ after[:2] + spin @ body.inertia @ spin)
+    own = f"{body.name} vibration"
+    energies = {}
+    for name, energy in level.energies.items():
+        if name == own:
+            energies[f"{body.name} sideways and spin"] = rigid
+        energies[name] = energy - rigid * (name == own)
+    # how a free lower body turns is not known apart from its vibration
+    left = sum(energy for name, energy in energies.items() if name.endswith(" vibration"))
+    share = left / (0.5 * body.mass * level.measures.approach_speed**2)
+    measures = replace(
+        level.measures, vibration_share=share if np.isinf(history.mass_b) else float("nan")
+    )
+    return replace(level, oblique=oblique, energies=energies, measures=measures)
 
 
 _LARGEST_TURN = np.radians(5.0)

@@ -1,6 +1,6 @@
 """The answer of an impact in one paragraph."""
 
-from math import isfinite
+from math import hypot, isfinite
 
 from klack.analyses.contact_doubts import contact_doubt, elastic_above
 from klack.analyses.impact.measures import DEVIATION_MEASURES
@@ -48,9 +48,11 @@ def answer(study: ImpactStudy) -> str:
             f"with a peak force of {quantity(numbers.peak_force, 'N', 3)}"
             f"{which_contact(numbers, numbers.strongest)}, stays in contact for "
             f"{quantity(numbers.contact_time, 's', 3)}{which_contact(numbers, 1)} and rebounds "
-            f"with {share(numbers.restitution, 2)} of its speed at first touch; "
-            f"{share(numbers.vibration_share)} of the impact energy remains as vibration. "
+            f"with {share(numbers.restitution, 2)} of its speed at first touch"
         )
+        if isfinite(numbers.vibration_share):
+            text += f"; {share(numbers.vibration_share)} of the impact energy remains as vibration"
+        text += f". {_across(reference)}"
     text += f"These numbers come from the {_called(study.reference)} run"
     if study.reference == "full":
         text += ", which follows every degree of freedom and every contact point"
@@ -66,6 +68,20 @@ def answer(study: ImpactStudy) -> str:
     elif study.reference == "reduced" and "reduced" in study.estimates and study.estimates_settled:
         text += f" {_estimated(study.estimates['reduced'])}"
     return text
+
+
+def _across(level: LevelResult) -> str:
+    """Motion across the axis after the impact; empty for a straight one."""
+    motion = level.oblique
+    if motion is None:
+        return ""
+    sideways = "leaves"
+    if isfinite(motion.tangential_restitution):
+        sideways = f"keeps {share(motion.tangential_restitution, 1)} of its sideways speed, leaves"
+    return (
+        f"It {sideways} with a spin of {hypot(*motion.spin_after):.4g} rad/s, and "
+        f"the impulse across the axis is {motion.impulse_ratio:.4f} of that along it. "
+    )
 
 
 def leaves_axis(study: ImpactStudy) -> bool:
