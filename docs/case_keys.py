@@ -1,4 +1,4 @@
-"""Write the pages of all keys, docs/reference/case-keys.md and valve-keys.md, from the schema.
+"""Write the pages of all keys, docs/reference/*-keys.md, from the schema.
 
 Run it in the folder of the project: ``python docs/case_keys.py``.  The schema is that of
 ``klack schema``; nothing on these pages is written by hand.
@@ -13,6 +13,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from klack.analyses.magnet.case import magnet_case_schema
 from klack.case import case_schema
 from klack.case.any_case import valve_case_schema
 from klack.units import KINDS, Kind, format_si
@@ -47,6 +48,13 @@ PAGES = {
         "examples: [cases of a whole valve](valve-case.md). The same for editors: "
         "`klack schema --kind stroke`.",
         valve_case_schema,
+    ),
+    "magnet-keys": (
+        "Keys of the case of a magnet",
+        "Every key that `klack magnet` reads. With examples: "
+        "[bring a magnet map](../how-to/bring-a-magnet-map.md#from-a-drawing). The same for "
+        "editors: `klack schema --kind magnet`.",
+        magnet_case_schema,
     ),
 }
 _NOTES = """\

@@ -66,6 +66,7 @@ __all__ = [
     "optimise",
     "run_heat",
     "run_impact",
+    "run_magnet",
     "run_many",
     "run_shots",
     "run_stroke",
@@ -497,6 +498,18 @@ def run_heat(
     checked = _of_kind(case, ValveCase, "a whole valve")
     record = run(checked, variant=variant, soak=soak, progress=progress, threads=threads)
     return Result(record, HEAT)
+
+
+def run_magnet(case: str | Path, *, progress: Progress = silent) -> Result:
+    """Compute the map of a drawn magnet.
+
+    See :func:`klack.analyses.magnet.analysis.run_magnet`.
+    """
+    from klack.analyses.magnet.analysis import MAGNET
+    from klack.analyses.magnet.analysis import run_magnet as run
+    from klack.analyses.magnet.case import load_magnet_case
+
+    return Result(run(load_magnet_case(case), progress=progress), MAGNET)
 
 
 def run_many(

@@ -74,6 +74,11 @@ ANALYSES: tuple[Entry, ...] = (
         "sensitivities.analysis:SENSITIVITIES",
         example="klack sensitivities demo-stroke --parameter network.components.spring.preload",
     ),
+    Entry(
+        "magnet.analysis:MAGNET",
+        "klack magnet map",
+        "klack magnet my-magnet.yaml",
+    ),
     Entry("noise.analysis:NOISE", "klack noise study", "klack noise demo-valve-axisymmetric"),
     Entry(
         "reduction.analysis:REDUCTION",

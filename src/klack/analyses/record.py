@@ -16,7 +16,7 @@ from klack import __version__
 from klack.machine.stages import StageClock
 
 if TYPE_CHECKING:
-    from klack.case.any_case import AnyCase
+    from klack.case.bodies import WrittenCase
 
 __all__ = ["CaseRecord", "Record", "case_fields", "run_fields"]
 
@@ -108,7 +108,7 @@ def run_fields(begin: float, clock: StageClock, *libraries: str) -> dict[str, An
     }
 
 
-def case_fields(case: "AnyCase | CaseRecord", case_text: str | None = None) -> dict[str, Any]:
+def case_fields(case: "WrittenCase | CaseRecord", case_text: str | None = None) -> dict[str, Any]:
     """Fields of a case, or of a record that an analysis starts from."""
     notes: tuple[str, ...]
     if isinstance(case, CaseRecord):

@@ -45,6 +45,7 @@ __all__ = [
     "RayleighCoefficients",
     "Reduction",
     "SurfaceName",
+    "WrittenCase",
 ]
 
 
@@ -437,8 +438,8 @@ class Reduction(Section):
         return tuple(shift_at(frequency) for frequency in self.shifts[body])
 
 
-class CaseFile(Section):
-    """Common part of every case: title, materials, elastic bodies, and its file."""
+class WrittenCase(Section):
+    """Common part of every case: title, parameters, and its file."""
 
     klack: Literal[1] = Field(description="Format version of the file: 1.")
     title: Text = Field(min_length=1, description="One line.")
@@ -446,16 +447,6 @@ class CaseFile(Section):
         default="", description="What the case shows, and the source of its numbers."
     )
     parameters: Mapping[PlainName, Written] = Field(default_factory=dict, description=PARAMETERS)
-    materials: Mapping[Name, CaseMaterial] = Field(
-        default_factory=dict, description="name: properties."
-    )
-    bodies: Mapping[Name, CaseBody] = Field(description="name: body.")
-    unusual: bool = Field(
-        default=False,
-        strict=True,
-        description="true: numbers that no valve has, such as 300 m/s, are computed with a note; "
-        "else they are an error.",
-    )
 
     _path: Path | None = PrivateAttr(None)
     _source: str = PrivateAttr("")
@@ -503,26 +494,6 @@ class CaseFile(Section):
         """As :meth:`ExpandedCase.behind`."""
         return self._expanded.behind(key) if self._expanded is not None else (key,)
 
-    def plausible_numbers(self) -> Iterator[Number]:
-        """Numbers whose size tells of a wrong unit."""
-        return iter(())
-
-    def require_possible(self) -> None:
-        """Reject numbers that cannot be, unless the case confirms them."""
-        if self.unusual:
-            return
-        for number in self.plausible_numbers():
-            number.require_possible(self._where(number.key))
-        for name, given in self.materials.items():
-            if (question := given.named(name).question) is not None:
-                got, _, reason = question.partition(": ")[2].partition(" would ")
-                raise InputError(
-                    self._where(("materials", name)),
-                    got=got,
-                    expected=f"a solid: this one would {reason.partition('. Try')[0]}",
-                    hint=f"steel has 210 GPa and 7850 kg/m^3; {GO_ON}",
-                )
-
     def _where(self, key: Key) -> str:
         if self._expanded is None:
             return f"{self._path or 'case'}: {key_text(key)}"
@@ -531,8 +502,7 @@ class CaseFile(Section):
     @property
     def doubts(self) -> tuple[str, ...]:
         """What is doubtful about its numbers."""
-        found = (number.doubt for number in self.plausible_numbers())
-        return tuple(doubt for doubt in found if doubt is not None)
+        return ()
 
     @property
     def input_notes(self) -> tuple[str, ...]:
@@ -560,6 +530,47 @@ class CaseFile(Section):
         if self._path is None:
             return "case"
         return self._path.resolve().parent.name if self._path.stem == "case" else self._path.stem
+
+
+class CaseFile(WrittenCase):
+    """Case with materials and elastic bodies."""
+
+    materials: Mapping[Name, CaseMaterial] = Field(
+        default_factory=dict, description="name: properties."
+    )
+    bodies: Mapping[Name, CaseBody] = Field(description="name: body.")
+    unusual: bool = Field(
+        default=False,
+        strict=True,
+        description="true: numbers that no valve has, such as 300 m/s, are computed with a note; "
+        "else they are an error.",
+    )
+
+    def plausible_numbers(self) -> Iterator[Number]:
+        """Numbers whose size tells of a wrong unit."""
+        return iter(())
+
+    def require_possible(self) -> None:
+        """Reject numbers that cannot be, unless the case confirms them."""
+        if self.unusual:
+            return
+        for number in self.plausible_numbers():
+            number.require_possible(self._where(number.key))
+        for name, given in self.materials.items():
+            if (question := given.named(name).question) is not None:
+                got, _, reason = question.partition(": ")[2].partition(" would ")
+                raise InputError(
+                    self._where(("materials", name)),
+                    got=got,
+                    expected=f"a solid: this one would {reason.partition('. Try')[0]}",
+                    hint=f"steel has 210 GPa and 7850 kg/m^3; {GO_ON}",
+                )
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What is doubtful about its numbers."""
+        found = (number.doubt for number in self.plausible_numbers())
+        return tuple(doubt for doubt in found if doubt is not None)
 
     def materials_of(self, body: str, solids: Iterable[str]) -> dict[str, Material]:
         """Material of each solid of a body; rejects one without."""

@@ -5,13 +5,13 @@ from collections.abc import Callable
 from functools import wraps
 from typing import Concatenate, ParamSpec, TypeVar
 
-from klack.case.bodies import CaseFile
+from klack.case.bodies import WrittenCase
 from klack.errors import InputError
 from klack.input.problem import CaseProblem, Key
 
 __all__ = ["tells_place"]
 
-C = TypeVar("C", bound=CaseFile)
+C = TypeVar("C", bound=WrittenCase)
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -42,7 +42,7 @@ def tells_place(
     return told
 
 
-def _place(case: CaseFile, error: InputError) -> str | None:
+def _place(case: WrittenCase, error: InputError) -> str | None:
     """File, line and key, if the error names one and the case has a file."""
     found = _KEY.fullmatch(error.where)
     if case.expanded is None or found is None:

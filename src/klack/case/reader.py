@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from klack.case.bodies import CaseFile
+from klack.case.bodies import CaseFile, WrittenCase
 from klack.case.case_text import Lines, parse, text_of
 from klack.case.first_error import first_error
 from klack.case.merging import Merging, filled, has_expression, shown_include
@@ -133,8 +133,15 @@ def validated(
     components: Mapping[str, type] | None = None,
 ) -> _Kind:
     """Check parsed data; own components by their types."""
+    if "magnet" in data and "magnet" not in kind.model_fields:
+        raise InputError(
+            f"{path}:{lines.find(('magnet',), on_key=True)}: magnet",
+            got="a case of a magnet",
+            expected="a case of an impact or of a whole valve",
+            hint="run it with klack magnet.",
+        )
     found = ExpandedCase.plain(data, lines, path)
-    if issubclass(kind, CaseFile):
+    if issubclass(kind, WrittenCase):
         if "include" in kind.model_fields and data.get("include"):
             text, data, lines = self_contained(text, path, data, lines)
         found = expanded(data, lines, path)

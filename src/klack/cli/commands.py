@@ -312,12 +312,12 @@ def report(
 def schema(
     *,
     kind: Annotated[
-        Literal["impact", "stroke", "study", "result"],
+        Literal["impact", "stroke", "magnet", "study", "result"],
         Parameter(
             name="--kind",
             help="impact: two bodies that hit each other (klack impact, klack reduce); stroke: a "
-            "whole valve with all components of its network (klack stroke); study: a study in a "
-            "file of its own; result: what every command writes with --json.",
+            "whole valve with all components of its network (klack stroke); magnet: the drawing of "
+            "a magnet (klack magnet); study: a study in a file of its own; result: what every command writes with --json.",
         ),
     ] = "impact",
     json: Annotated[
@@ -341,6 +341,11 @@ def _schema_of(kind: str) -> dict[str, Any]:
         from klack.case.any_case import valve_case_schema
 
         return valve_case_schema()
+
+    if kind == "magnet":
+        from klack.analyses.magnet.case import magnet_case_schema
+
+        return magnet_case_schema()
 
     if kind == "study":
         from klack.case.reader import schema_of

@@ -1,6 +1,6 @@
 r"""Maps of force and flux linkage from the drawing of a magnet of revolution (NGSolve).
 
-Rings of iron, those that move and those that do not, and a coil.  Unknown is the potential
+Parts of iron, those that move and those that do not, and a coil.  Unknown is the potential
 :math:`A_\varphi`, cubic on triangles, zero on the axis and far away; it is where
 
 .. math:: \int \Bigl[w(|B|) - J A_\varphi\Bigr] 2\pi r\,\mathrm dr\,\mathrm dz, \qquad
@@ -11,13 +11,17 @@ is stationary, with the energy density ``w`` of the iron; Newton's method with a
 force is Maxwell's stress times the slope of a weight that is 1 on what moves and 0 on all other
 solids (virtual work of the air between), the linkage :math:`N/S\int A_\varphi\,2\pi r`.
 
+Two errors of every point: of the mesh, the difference to one of twice the size everywhere; of the
+end of the air, on that mesh, the difference to a potential of zero at half the distance.  The field
+far away is one of a dipole, so the latter is several times the true one.
+
 Limits: no magnets, no eddy currents, no hysteresis; one coil; motion along the axis.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
-from math import hypot
+from itertools import combinations, product
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -32,10 +36,13 @@ from klack.errors import (
     require_nonnegative,
     require_positive,
 )
+from klack.machine.progress import Progress, silent
 from klack.magnetics.iron import VACUUM_PERMEABILITY, IronCurve
+from klack.mesh.occ import MM, plane_face
+from klack.mesh.profile import Line, Profile
 from klack.units import format_si
 
-__all__ = ["DrawnMagnet", "FieldMap", "Ring"]
+__all__ = ["DrawnMagnet", "DrawnPart", "FieldMap", "section"]
 
 Vector = NDArray[np.float64]
 
@@ -43,65 +50,68 @@ _ORDER = 3
 _FAR = 5.0  # air around, over the size of the magnet
 _COARSE = 2.0  # ratio of the two meshes
 _SETTLED = 1e-6
-_TOUCH = 1e-9  # of a radius: what touches as drawn may overlap by round-off
+_TOUCH = 1e-9  # [-] of an area: what touches as drawn may overlap by round-off
+_NARROWEST = 2e-4  # air between parts, over the size of the magnet
 _MOST_STEPS = 60
 
 
-@dataclass(frozen=True, slots=True)
-class Ring:
-    """Body of revolution with a rectangular section: radii, and ends along the axis [m]."""
+def section(*corners: tuple[float, float]) -> Profile:
+    """Half section (r, z) [m]: its corners in turn; two of them are those of a rectangle."""
+    if len(corners) == 2:
+        (r, z), (far, high) = corners
+        corners = ((r, z), (far, z), (far, high), (r, high))
+    return Profile(corners[0], tuple(Line(corner) for corner in (*corners[1:], corners[0])))
 
-    inner: float
-    outer: float
-    low: float
-    high: float
 
-    def __post_init__(self) -> None:
-        if not (0.0 <= self.inner < self.outer and self.low < self.high):
-            raise InputError(
-                "Ring",
-                got=f"radii {self.inner:g} and {self.outer:g} m, ends {self.low:g} and "
-                f"{self.high:g} m",
-                expected="inner radius below outer radius, lower end below upper end",
-                hint="order: inner, outer, low, high, in m.",
-            )
+@dataclass(frozen=True, slots=True, eq=False)
+class DrawnPart:
+    """Body of revolution of one iron, whose curve is known up to ``limit`` [T]."""
 
-    def raised(self, way: float) -> "Ring":
-        """Return it, moved along the axis [m]."""
-        return Ring(self.inner, self.outer, self.low + way, self.high + way)
-
-    def distance(self, other: "Ring") -> float:
-        """Shortest distance [m]; 0 where they touch or overlap."""
-        across = max(other.inner - self.outer, self.inner - other.outer, 0.0)
-        along = max(other.low - self.high, self.low - other.high, 0.0)
-        return hypot(across, along)
-
-    def overlaps(self, other: "Ring") -> bool:
-        """Whether both share more than an edge, round-off apart."""
-        across = min(self.outer, other.outer) - max(self.inner, other.inner)
-        along = min(self.high, other.high) - max(self.low, other.low)
-        return min(across, along) > _TOUCH * max(self.outer, other.outer)
+    name: str
+    profile: Profile
+    iron: IronCurve
+    limit: float = inf
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class FieldMap:
     """Linkage [Wb] and force [N], negative where it closes the gap, over current [A] and gap [m].
 
-    ``linkage_error`` and ``force_error`` are differences to a mesh of twice the size everywhere.
+    Parameters
+    ----------
+    linkage_mesh, force_mesh
+        Differences to a mesh of twice the size everywhere.
+    linkage_air, force_air
+        Differences to half as much air around.
+    beyond [-]
+        Largest share of the volume of a part beyond its limit.
     """
 
     current: Vector
     gap: Vector
     linkage: Vector
     force: Vector
-    linkage_error: Vector
-    force_error: Vector
+    linkage_mesh: Vector
+    force_mesh: Vector
+    linkage_air: Vector
+    force_air: Vector
+    beyond: Vector
+
+    @property
+    def linkage_error(self) -> Vector:
+        """Both errors [Wb]."""
+        return np.asarray(np.abs(self.linkage_mesh) + np.abs(self.linkage_air))
+
+    @property
+    def force_error(self) -> Vector:
+        """Both errors [N]."""
+        return np.asarray(np.abs(self.force_mesh) + np.abs(self.force_air))
 
     @property
     def error(self) -> float:
         """Largest error, of the largest linkage or force [-]."""
         pairs = ((self.linkage_error, self.linkage), (self.force_error, self.force))
-        return max(float(np.max(np.abs(e)) / (np.max(np.abs(v)) or 1.0)) for e, v in pairs)
+        return max(float(np.max(e) / (np.max(np.abs(v)) or 1.0)) for e, v in pairs)
 
     def write(self, file: Path) -> None:
         """Write the table that a ``force-map-solenoid`` reads: one row for each point."""
@@ -119,18 +129,17 @@ class DrawnMagnet:
     Parameters
     ----------
     fixed, moving
-        Rings of iron; those of one group may touch or overlap.
+        Iron; parts of one group and one iron may touch or overlap.
     coil
         Section of the winding, with the turns spread evenly.
     opens
-        1 where the moving rings rise along the axis as the gap opens, -1 where they sink.
+        1 where the moving parts rise along the axis as the gap opens, -1 where they sink.
     """
 
-    fixed: tuple[Ring, ...]
-    moving: tuple[Ring, ...]
-    coil: Ring
+    fixed: tuple[DrawnPart, ...]
+    moving: tuple[DrawnPart, ...]
+    coil: Profile
     turns: float
-    iron: IronCurve
     opens: int = 1
 
     def __post_init__(self) -> None:
@@ -140,37 +149,70 @@ class DrawnMagnet:
             "DrawnMagnet: opens",
             got=f"{self.opens}",
             expected="1 or -1",
-            hint="1 where the moving rings rise as the gap opens, -1 where they sink.",
+            hint="1 where the moving parts rise as the gap opens, -1 where they sink.",
         )
         refuse_if(
             not (self.fixed and self.moving),
             "DrawnMagnet",
-            got=f"{len(self.fixed)} fixed and {len(self.moving)} moving rings",
+            got=f"{len(self.fixed)} fixed and {len(self.moving)} moving parts",
             expected="at least one of each",
-            hint="give the iron as rings.",
+            hint="draw the iron of both.",
         )
-        refuse_if(
-            any(self.coil.overlaps(ring) for ring in self.fixed),
-            "DrawnMagnet: coil",
-            got="a coil that overlaps a fixed ring",
-            expected="a section without iron; both may touch",
-            hint="draw the winding alone, without its bobbin.",
+        for part in self.fixed:
+            refuse_if(
+                _overlap(self.coil, part.profile),
+                "DrawnMagnet: coil",
+                got=f"a coil that overlaps '{part.name}'",
+                expected="a section without iron; both may touch",
+                hint="draw the winding alone, without its bobbin, inside its window.",
+            )
+        for one, other in (*combinations(self.fixed, 2), *combinations(self.moving, 2)):
+            refuse_if(
+                one.iron is not other.iron and _overlap(one.profile, other.profile),
+                f"DrawnMagnet: {other.name}",
+                got=f"a part that overlaps '{one.name}', which has another iron",
+                expected="one iron at every place; both may touch",
+                hint="let the two parts share an edge and nothing else.",
+            )
+
+    @property
+    def extent(self) -> float:
+        """Size of the magnet [m]: of its height and its radius the larger."""
+        (_, low), (outer, high) = self._box()
+        return max(high - low, outer)
+
+    def _box(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        profiles = (self.coil, *(part.profile for part in (*self.fixed, *self.moving)))
+        ends = np.array([curve.at(s) for p in profiles for curve in p.curves for s in (0.0, 0.5)])
+        low, high = ends.min(axis=0), ends.max(axis=0)
+        return (float(low[0]), float(low[1])), (float(high[0]), float(high[1]))
+
+    def clearance(self, gap: float) -> tuple[float, str, str]:
+        """Shortest distance [m] between what moves and what does not, and which parts."""
+        still = [*((part.name, part.profile) for part in self.fixed), ("coil", self.coil)]
+        return min(
+            (self._moved(part, gap).Distance(plane_face(profile)) / MM, part.name, name)
+            for part in self.moving
+            for name, profile in still
         )
 
-    def clearance(self, gap: float) -> float:
-        """Shortest distance [m] between what moves and what does not, at a working gap [m]."""
-        moved = [ring.raised(self.opens * gap) for ring in self.moving]
-        return min(a.distance(b) for a, b in product(moved, (*self.fixed, self.coil)))
+    def _moved(self, part: DrawnPart, gap: float) -> Any:
+        return plane_face(part.profile).Move((0.0, self.opens * gap * MM, 0.0))
 
     def field_map(
-        self, current: Sequence[float], gap: Sequence[float], *, mesh_size: float | None = None
+        self,
+        current: Sequence[float],
+        gap: Sequence[float],
+        *,
+        mesh_size: float | None = None,
+        progress: Progress = silent,
     ) -> FieldMap:
         """Compute the map on two meshes.
 
         Parameters
         ----------
         current, gap [A], [m]
-            Increasing; gaps from 0.
+            Increasing; currents from 0, gaps from 0.
         mesh_size [m]
             At corners of the iron, at most the shortest distance between what moves and what does
             not, which is the default.
@@ -184,69 +226,87 @@ class DrawnMagnet:
                 expected="increasing numbers",
                 hint=f"give each {name} once, the smallest first, in SI.",
             )
-        require_nonnegative("DrawnMagnet: gap", float(x[0]), "m")
+            require_nonnegative(f"DrawnMagnet: {name}", float(values[0]), "A m"[2 * (values is x)])
         for j in x:
-            self._require_resolved(float(j), mesh_size)
-        tables = []
-        for coarse in (1.0, _COARSE):
-            columns = []
-            for j in x:
-                size = mesh_size or self.clearance(float(j))
-                solution = _Solution(self, float(j), 0.5 * size, coarse)
-                columns.append([solution.point(float(one)) for one in i])
-            tables.append(np.array(columns).transpose(2, 1, 0))
-        fine, rough = tables
+            self.require_resolved(float(j), mesh_size)
+        points = np.zeros((3, 3, i.size, x.size))  # meshes and air, results, currents, gaps
+        for j, width in enumerate(x):
+            size = 0.5 * (mesh_size or self.clearance(float(width))[0])
+            done = 0
+            for k, (coarse, ends) in enumerate(((1.0, ("far",)), (_COARSE, ("far", "near|far")))):
+                progress("fields", (j + 0.5 * k) / x.size)
+                mesh = _mesh(self, float(width), size, coarse)
+                for end in ends:
+                    solution = _Solution(self, mesh, end)
+                    for c, amperes in enumerate(i):
+                        points[done, :, c, j] = solution.point(float(amperes))
+                    done += 1
+        fine, rough, near = points
         return FieldMap(
             current=i,
             gap=x,
             linkage=fine[0],
             force=self.opens * fine[1],
-            linkage_error=fine[0] - rough[0],
-            force_error=self.opens * (fine[1] - rough[1]),
+            linkage_mesh=fine[0] - rough[0],
+            force_mesh=self.opens * (fine[1] - rough[1]),
+            linkage_air=rough[0] - near[0],
+            force_air=self.opens * (rough[1] - near[1]),
+            beyond=fine[2],
         )
 
-    def _require_resolved(self, gap: float, mesh_size: float | None) -> None:
-        least = self.clearance(gap)
-        if least <= 0.0:
+    def require_resolved(self, gap: float, mesh_size: float | None) -> None:
+        """Raise where parts touch at a working gap [m], or a mesh does not resolve the air."""
+        least, moving, still = self.clearance(gap)
+        where = f"DrawnMagnet at a gap of {format_si(gap, 'm')}"
+        if least <= _NARROWEST * self.extent:
             raise InputError(
-                f"DrawnMagnet at a gap of {format_si(gap, 'm')}",
-                got="a moving ring that touches a fixed one or the coil",
-                expected="air between them",
+                where,
+                got=f"'{moving}' that touches '{still}'"
+                if least <= 0.0
+                else f"{format_si(least, 'm')} of air between '{moving}' and '{still}'",
+                expected=f"more than {format_si(_NARROWEST * self.extent, 'm', 2)} of air between "
+                "what moves and what does not",
                 hint="draw the residual gap, too, or leave out that gap.",
             )
         if mesh_size is not None:
             require_positive("DrawnMagnet: mesh_size", mesh_size, "m")
             if mesh_size > least:
                 raise InputError(
-                    f"DrawnMagnet at a gap of {format_si(gap, 'm')}",
+                    where,
                     got=f"a mesh of {format_si(mesh_size, 'm')} for {format_si(least, 'm')} of air",
                     expected="a mesh that resolves the air between what moves and what does not",
                     hint=f"give a mesh_size of at most {format_si(least, 'm')}, or leave it out.",
                 )
 
 
-class _Solution:
-    """Field at one gap; ``point`` starts from the last current."""
+def _overlap(one: Profile, other: Profile) -> bool:
+    shared = sum(face.mass for face in (plane_face(one) * plane_face(other)).faces) / MM**2
+    return bool(shared > _TOUCH * min(one.area, other.area))
 
-    def __init__(self, magnet: DrawnMagnet, gap: float, size: float, coarse: float) -> None:
+
+class _Solution:
+    """Field on one mesh, zero at ``end``; ``point`` starts from the last current."""
+
+    def __init__(self, magnet: DrawnMagnet, mesh: Any, end: str) -> None:
         self.ng = ng = optional_package("ngsolve", "fields of a drawn magnet", "ngsolve")
-        self.mesh = _mesh(magnet, gap, size, coarse)
-        self.space = ng.H1(self.mesh, order=_ORDER, dirichlet="far|axis")
+        self.mesh, self.opens = mesh, magnet.opens
+        self.space = ng.H1(self.mesh, order=_ORDER, dirichlet=f"{end}|axis")
         self.potential = ng.GridFunction(self.space)
         u, r = self.space.TrialFunction(), ng.x
         B2 = self._density(u) * self._density(u)
         B = np.append(np.linspace(0.0, 2.4, 481), [4.0, 20.0])
-        energy = ng.BSpline(2, [0.0, *B], [*map(float, magnet.iron.field(B))]).Integrate()
-        iron, rest = self.mesh.Materials("fixed|moving"), self.mesh.Materials("air|coil")
         self.form = ng.BilinearForm(self.space, symmetric=True)
         whole, vacuum = 2 * np.pi * r, np.pi / VACUUM_PERMEABILITY * r
-        # |B| is kept from 0, where its slope is not defined
-        stored = (whole * energy(ng.sqrt(B2 + 1e-16))).Compile()
-        self.form += ng.Variation(stored * ng.dx(definedon=iron))
+        self.limits = []
+        for name, parts in _groups(magnet).items():
+            curve = ng.BSpline(2, [0.0, *B], [*map(float, parts[0].iron.field(B))])
+            # |B| is kept from 0, where its slope is not defined
+            stored = (whole * curve.Integrate()(ng.sqrt(B2 + 1e-16))).Compile()
+            self.form += ng.Variation(stored * ng.dx(definedon=mesh.Materials(name)))
+            self.limits.append((mesh.Materials(name), min(part.limit for part in parts)))
+        rest = mesh.Materials("air|coil")
         self.form += ng.Variation((vacuum * B2).Compile() * ng.dx(definedon=rest))
-        coil = magnet.coil
-        section = (coil.outer - coil.inner) * (coil.high - coil.low)
-        turns = magnet.turns / section * whole * self.space.TestFunction()
+        turns = magnet.turns / magnet.coil.area * whole * self.space.TestFunction()
         self.load = ng.LinearForm(turns * ng.dx("coil")).Assemble().vec
         self.weight = self._weight()
 
@@ -262,21 +322,30 @@ class _Solution:
         air = ng.dx(definedon=mesh.Materials("air"))
         stiffness = ng.BilinearForm(ng.grad(p) * ng.grad(q) * air).Assemble().mat
         weight = ng.GridFunction(space)
-        weight.Set(1.0, definedon=mesh.Materials("moving"))
+        weight.Set(1.0, definedon=mesh.Materials("moving.*"))
         rest = (stiffness * weight.vec).Evaluate()
-        free = ~space.GetDofs(mesh.Materials("fixed|coil|moving")) & space.FreeDofs()
+        free = ~space.GetDofs(mesh.Materials("fixed.*|coil|moving.*")) & space.FreeDofs()
         weight.vec.data -= stiffness.Inverse(free, "sparsecholesky") * rest
         return weight
 
-    def point(self, current: float) -> tuple[float, float]:
-        """Linkage [Wb] and force along the axis [N]."""
+    def point(self, current: float) -> tuple[float, float, float]:
+        """Linkage [Wb], force along the axis [N], share of iron beyond its limit [-]."""
         ng, r = self.ng, self.ng.x
         self._solve(current)
         B, slope = self._density(self.potential), ng.grad(self.weight)
         stress = (B[1] * (B * slope) - 0.5 * (B * B) * slope[1]) / VACUUM_PERMEABILITY
         air = self.mesh.Materials("air")
         force = -float(ng.Integrate(2 * np.pi * r * stress, self.mesh, definedon=air))
-        return float(ng.InnerProduct(self.load, self.potential.vec)), force
+        linkage = float(ng.InnerProduct(self.load, self.potential.vec))
+        return linkage, force, max(self._beyond(B, *limit) for limit in self.limits)
+
+    def _beyond(self, B: Any, region: Any, limit: float) -> float:
+        if limit == inf:
+            return 0.0
+        ng, r = self.ng, self.ng.x
+        high = r * ng.IfPos(B * B - limit**2, 1.0, 0.0)
+        above, volume = (ng.Integrate(f, self.mesh, definedon=region) for f in (high, r))
+        return float(above / volume)
 
     def _solve(self, current: float) -> None:
         ng, A = self.ng, self.potential.vec
@@ -307,36 +376,49 @@ class _Solution:
         )
 
 
+def _groups(magnet: DrawnMagnet) -> dict[str, list[DrawnPart]]:
+    """Parts of one iron that move together, by the name of their region."""
+    curves = list({id(part.iron): 0 for part in (*magnet.fixed, *magnet.moving)})
+    groups: dict[str, list[DrawnPart]] = {}
+    for word, parts in (("fixed", magnet.fixed), ("moving", magnet.moving)):
+        for part in parts:
+            groups.setdefault(f"{word}{curves.index(id(part.iron))}", []).append(part)
+    return groups
+
+
 def _mesh(magnet: DrawnMagnet, gap: float, size: float, coarse: float) -> Any:
     """Triangles of a size [m] at the corners of the iron; all sizes times ``coarse``."""
     ng = optional_package("ngsolve", "fields of a drawn magnet", "ngsolve")
     from netgen import occ
 
-    def face(rings: Sequence[Ring]) -> Any:
-        faces = [
-            occ.MoveTo(r.inner, r.low).Rectangle(r.outer - r.inner, r.high - r.low).Face()
-            for r in rings
-        ]
-        return sum(faces[1:], faces[0])
+    extent = magnet.extent * MM
+    (_, low), (_, high) = magnet._box()
+    middle, reach = 0.5 * (low + high) * MM, _FAR * extent
 
-    moved = [ring.raised(magnet.opens * gap) for ring in magnet.moving]
-    every = (*magnet.fixed, *moved, magnet.coil)
-    low, high = min(r.low for r in every), max(r.high for r in every)
-    extent = max(high - low, max(r.outer for r in every))
-    reach = _FAR * extent
-    fixed, moving, coil = face(magnet.fixed), face(moved), face([magnet.coil])
-    air = face([Ring(0.0, reach, 0.5 * (low + high) - reach, 0.5 * (low + high) + reach)])
-    air.edges.name = "far"
-    air = air - fixed - moving - coil
-    parts = {"fixed": fixed, "moving": moving, "coil": coil, "air": air}
-    for name, part in parts.items():
-        part.faces.name = name
-        for edge in part.edges:
-            if abs(edge.center.x) < 1e-9 * extent:
-                edge.name = "axis"
-    fixed.maxh = moving.maxh = coarse * extent / 20
-    for part in (fixed, moving):
-        for vertex in part.vertices:
-            vertex.maxh = coarse * size
-    shape = occ.OCCGeometry(occ.Glue([*parts.values()]), dim=2)
-    return ng.Mesh(shape.GenerateMesh(maxh=coarse * reach / 5, grading=0.3))
+    def air(reach: float, name: str) -> Any:
+        face = occ.MoveTo(0.0, middle - reach).Rectangle(reach, 2.0 * reach).Face()
+        face.edges.name = name
+        return face
+
+    iron = []
+    for name, parts in _groups(magnet).items():
+        faces = [magnet._moved(part, gap if name.startswith("moving") else 0.0) for part in parts]
+        body = sum(faces[1:], faces[0])
+        body.faces.name, body.faces.maxh = name, coarse * extent / 20
+        for vertex in body.vertices:
+            vertex.maxh = coarse * size * MM
+        iron.append(body)
+    coil = plane_face(magnet.coil)
+    coil.faces.name = "coil"
+    near = air(0.5 * reach, "near")
+    around = air(reach, "far") - near
+    for body in (*iron, coil):
+        near = near - body
+    near.faces.name = around.faces.name = "air"
+    shape = occ.Glue([*iron, coil, near, around])
+    for edge in shape.edges:
+        if abs(edge.center.x) < 1e-9 * extent:
+            edge.name = "axis"
+    made = occ.OCCGeometry(shape, dim=2).GenerateMesh(maxh=coarse * reach / 5, grading=0.3)
+    made.Scale(1.0 / MM)
+    return ng.Mesh(made)

@@ -1,5 +1,6 @@
 """Choice of the iron in a case: from the library, by a formula, or by a table."""
 
+from math import inf
 from typing import Self
 
 from pydantic import Field, model_validator
@@ -83,3 +84,9 @@ class IronChoice(NamedSection):
             return measured_loop(self.loop.flux_density, self.loop.field_strength)
         assert self.table is not None
         return measured(self.table.flux_density, self.table.field_strength)
+
+    @property
+    def highest(self) -> float:
+        """Highest measured flux density [T]; infinite for a formula."""
+        points = self.table or self.loop
+        return inf if points is None else max(points.flux_density)
