@@ -317,7 +317,8 @@ def schema(
             name="--kind",
             help="impact: two bodies that hit each other (klack impact, klack reduce); stroke: a "
             "whole valve with all components of its network (klack stroke); magnet: the drawing of "
-            "a magnet (klack magnet); study: a study in a file of its own; result: what every command writes with --json.",
+            "a magnet (klack magnet); study: a study in a file of its own; result: what every "
+            "command writes with --json.",
         ),
     ] = "impact",
     json: Annotated[

@@ -232,15 +232,15 @@ class DrawnMagnet:
         points = np.zeros((3, 3, i.size, x.size))  # meshes and air, results, currents, gaps
         for j, width in enumerate(x):
             size = 0.5 * (mesh_size or self.clearance(float(width))[0])
-            done = 0
-            for k, (coarse, ends) in enumerate(((1.0, ("far",)), (_COARSE, ("far", "near|far")))):
-                progress("fields", (j + 0.5 * k) / x.size)
+            for first, coarse, ends in ((0, 1.0, ("far",)), (1, _COARSE, ("far", "near|far"))):
+                progress("fields", (j + 0.6 * first) / x.size)
                 mesh = _mesh(self, float(width), size, coarse)
-                for end in ends:
-                    solution = _Solution(self, mesh, end)
-                    for c, amperes in enumerate(i):
-                        points[done, :, c, j] = solution.point(float(amperes))
-                    done += 1
+                solutions = [_Solution(self, mesh, end) for end in ends]
+                for c, amperes in enumerate(i):
+                    for k, solution in enumerate(solutions):
+                        if k:
+                            solution.begin_at(solutions[0])
+                        points[first + k, :, c, j] = solution.point(float(amperes))
         fine, rough, near = points
         return FieldMap(
             current=i,
@@ -289,7 +289,7 @@ class _Solution:
 
     def __init__(self, magnet: DrawnMagnet, mesh: Any, end: str) -> None:
         self.ng = ng = optional_package("ngsolve", "fields of a drawn magnet", "ngsolve")
-        self.mesh, self.opens = mesh, magnet.opens
+        self.mesh = mesh
         self.space = ng.H1(self.mesh, order=_ORDER, dirichlet=f"{end}|axis")
         self.potential = ng.GridFunction(self.space)
         u, r = self.space.TrialFunction(), ng.x
@@ -338,6 +338,11 @@ class _Solution:
         force = -float(ng.Integrate(2 * np.pi * r * stress, self.mesh, definedon=air))
         linkage = float(ng.InnerProduct(self.load, self.potential.vec))
         return linkage, force, max(self._beyond(B, *limit) for limit in self.limits)
+
+    def begin_at(self, other: "_Solution") -> None:
+        """Start the next point from the field of another end on the same mesh."""
+        keep = self.ng.Projector(self.space.FreeDofs(), True)
+        self.potential.vec.data = keep * other.potential.vec
 
     def _beyond(self, B: Any, region: Any, limit: float) -> float:
         if limit == inf:

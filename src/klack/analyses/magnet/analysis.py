@@ -170,18 +170,23 @@ def run_magnet(case: MagnetCase, *, progress: Progress = silent) -> MagnetRecord
             expected="one that closes it",
             hint=f"opens: {other}, where the gap opens the other way, or correct the drawing.",
         )
-    table = {"current": found.current, "gap": found.gap, "linkage": found.linkage}
     with collected_warnings() as warned:
-        made = FluxMap.of(**table, force=found.force)
+        made = FluxMap.of(
+            current=found.current, gap=found.gap, linkage=found.linkage, force=found.force
+        )
     compared = made.compare_force(found.current, found.linkage, found.force)
     beyond = float(np.max(found.beyond))
-    fields = ("linkage_mesh", "force_mesh", "linkage_air", "force_air")
     return MagnetRecord(
         **case_fields(case),
         **run_fields(begin, clock, "ngsolve"),
-        **table,
+        current=found.current,
+        gap=found.gap,
+        linkage=found.linkage,
         force=found.force,
-        **{name: getattr(found, name) for name in fields},
+        linkage_mesh=found.linkage_mesh,
+        force_mesh=found.force_mesh,
+        linkage_air=found.linkage_air,
+        force_air=found.force_air,
         virtual_work=compared.share,
         beyond=beyond,
         outlines=_outlines(case),
