@@ -116,7 +116,8 @@ MAGNET_MEASURES: tuple[Measure[MagnetRecord], ...] = described_in(
     ),
     Measure(
         key="force_error_of_mesh",
-        definition="Largest change of a force by a mesh of twice the size, over the largest one.",
+        definition="Twice the largest change of a force by a mesh of twice the size, over the "
+        "largest force.",
         read=lambda record: _largest(record.force_mesh, record.force),
         form="share",
         column=Column("%", 100.0, ".2g"),
