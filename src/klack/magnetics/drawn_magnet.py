@@ -12,8 +12,9 @@ force is Maxwell's stress times the slope of a weight that is 1 on what moves an
 solids (virtual work of the air between), the linkage :math:`N/S\int A_\varphi\,2\pi r`.
 
 Two errors of every point: of the mesh, twice the difference to one of twice the size everywhere,
-because fields at corners converge slowly; of the end of the air, on that mesh, the difference to a potential of zero at half the distance.  The field
-far away is one of a dipole, so the latter is several times the true one.
+because fields at corners converge slowly; of the end of the air, on that mesh, the difference to a
+potential of zero at half the distance.  The field far away is one of a dipole, so the latter is
+several times the true one.
 
 Limits: no magnets, no eddy currents, no hysteresis; one coil; motion along the axis.
 """
