@@ -23,7 +23,7 @@ from klack.case.bodies import CaseFile
 from klack.case.guide import Placement
 from klack.case.schema import Case
 from klack.case.valve import ValveCase
-from klack.contact.gap_update import PlacedGaps, RigidGaps, RingGaps
+from klack.contact.gap_update import ABOVE, BELOW, PlacedGaps, RigidGaps, RingGaps
 from klack.contact.mortar import ContactSpace, contact_space
 from klack.contact.rings import RingFriction, RingSpace
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
@@ -315,7 +315,7 @@ def off_axis_space(
     else:
         moved = RingGaps.of(wide, *surfaces, angle=angle, centre=centre, form=pair.form)
         axial = np.repeat(wide.axial, len(angle))
-    gaps = PlacedGaps((moved,), (upper_moves,))
+    gaps = PlacedGaps((moved,), (ABOVE if upper_moves else BELOW,))
     keep = wide.gap <= wide.gap.min() + _SOFTER * reach
     for placement in farthest:
         near = _gaps_in_touch(gaps, axial, placement, upper_moves) <= _SOFTER * reach

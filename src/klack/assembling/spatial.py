@@ -3,10 +3,12 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import cos, hypot, pi, sin
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.assembling.bodies import BodyPair
 from klack.assembling.modes import damping_of, selection_of, shape_marks
 from klack.assembling.off_axis import off_axis_space, touch_height
 from klack.assembling.placement import axis_through, in_disc
@@ -21,7 +23,7 @@ from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles
 from klack.contact.face_friction import FaceFriction
 from klack.contact.friction import Friction
-from klack.contact.gap_update import PlacedGaps, RigidGaps, RingGaps
+from klack.contact.gap_update import Pairing, PlacedGaps, RigidGaps, RingGaps
 from klack.contact.mortar import ContactSpace
 from klack.contact.rings import RingSpace
 from klack.contact.statics import contact_compliance, extended_compliance
@@ -44,10 +46,10 @@ from klack.units import format_si
 
 __all__ = [
     "Meeting",
-    "about_axis",
+    "Movers",
     "build_spatial",
     "check_heights",
-    "farthest_positions",
+    "drawn_beside",
     "modes_in_network",
     "placement_of",
     "seat_height",
@@ -116,11 +118,12 @@ class Meeting:
     reach [m]
         Largest gap of the centred bodies in touch.
     arm (3,) [m]
-        Middle of the points from the centre of mass of the needle.
+        Middle of the points from the centre of mass of the mover: the upper body, unless it is
+        held.
     gaps
         At any rigid placement.
-    upper_moves
-        The needle is the upper body.
+    pairing
+        The mover, and what it meets.
     """
 
     name: str
@@ -128,7 +131,136 @@ class Meeting:
     reach: float
     arm: Vector
     gaps: RigidGaps | RingGaps
-    upper_moves: bool
+    pairing: Pairing
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Movers:
+    """Bodies of a valve that move, the needle first, and where they may be.
+
+    Parameters
+    ----------
+    names
+        Of the bodies.
+    guides
+        Of those that have one.
+    placements (n, 6) [m], [rad]
+        At the start.
+    farthest
+        Of each: placements that contact points must suffice for, and how far off-axis these are
+        [m].  The first two are along x, the others turned.
+    """
+
+    names: tuple[str, ...]
+    guides: Mapping[str, ValveGuide]
+    placements: Vector
+    farthest: tuple[tuple[list[Vector], float], ...]
+
+    @classmethod
+    def of(
+        cls, case: ValveCase, needle: str, bodies: Mapping[str, ElasticBody], height: float
+    ) -> Self:
+        """Those of a case; ``height`` [m] is that of the seat in the drawing of the needle."""
+        names = [needle, *(n for n in bodies if n != needle and not bodies[n].is_fixed)]
+        guides = dict(case.guides) if case.guide is None else {needle: case.guide, **case.guides}
+        placements, farthest = [], []
+        for name in names:
+            body, guide = bodies[name], guides.get(name)
+            centre = body.centre_in_space
+            at = height if name == needle else float(centre[2])
+            about = np.array([0.0, 0.0, at]), centre
+            if name == needle:
+                placed = placement_of(case, at)
+            else:
+                seed = None if case.placement is None else case.placement.seed
+                placed = drawn_beside(case, name, at, None if seed is None else [seed])
+            placements.append(rigid_placement(*placed, *about))
+            far = farthest_positions(guide, placed, at)
+            farthest.append(
+                ([rigid_placement(*each, *about) for each in far], max(hypot(*a) for a, _ in far))
+            )
+        return cls(
+            names=tuple(names),
+            guides={name: guides[name] for name in names if name in guides},
+            placements=np.array(placements),
+            farthest=tuple(farthest),
+        )
+
+    def pairing(self, pair: BodyPair, gap: float) -> Pairing:
+        """Which of them meet at a stop, its upper body raised by the gap [m]."""
+        upper, lower = pair.upper, pair.lower
+        if upper.name not in self.names:
+            return Pairing(self.names.index(lower.name), -1, np.zeros(3), is_upper=False)
+        other = self.names.index(lower.name) if lower.name in self.names else -1
+        lever = upper.centre_in_space - lower.centre_in_space + [0.0, 0.0, gap]
+        return Pairing(self.names.index(upper.name), other, lever)
+
+    def reach(self, pairing: Pairing, turns: int = _DIRECTIONS) -> tuple[list[Vector], float]:
+        """Farthest placements of the mover of a contact as the other body sees it.
+
+        Two bodies that move lean opposite ways.
+
+        Parameters
+        ----------
+        turns
+            Directions round the axis.
+        """
+        far, aside = self.farthest[pairing.mover]
+        if pairing.other < 0:
+            return far[: 2 * turns], aside
+        beside, more = self.farthest[pairing.other]
+        there = {pairing.mover: _by_direction(far), pairing.other: _by_direction(beside)}
+        found = []
+        for k in range(turns):
+            for ours in there[pairing.mover][k]:
+                for theirs in there[pairing.other][(k + _DIRECTIONS // 2) % _DIRECTIONS]:
+                    placed = np.zeros((len(self.names), 6))
+                    placed[pairing.mover], placed[pairing.other] = ours, theirs
+                    found.append(pairing.relative(placed))
+        return found, aside + more
+
+    def joined(self, guides: Mapping[str, Guide]) -> tuple[Guide | None, tuple[int, ...]]:
+        """Guides of all bodies in one, and the body at each height."""
+        if not guides:
+            return None, ()
+        ordered = [(k, guides[name]) for k, name in enumerate(self.names) if name in guides]
+        parts = zip(*(guide for _, guide in ordered), strict=True)
+        joined = Guide(*(np.concatenate(part) for part in parts))
+        return joined, tuple(k for k, guide in ordered for _ in guide.heights)
+
+    def bearing(self) -> BearingFilm | None:
+        """Films at the heights of all guides."""
+        films = [guide.film for guide in self.guides.values() for _ in guide.heights]
+        if not any(films):
+            return None
+        return BearingFilm(
+            length=np.array([0.0 if film is None else film.length for film in films]),
+            cut_off=np.array([0.0 if film is None else film.cut_off for film in films]),
+        )
+
+
+def drawn_beside(
+    case: ValveCase, name: str, height: float, seed: Sequence[int] | None
+) -> tuple[Vector, Vector]:
+    """Position at a height, and slope, of the axis of a body beside the needle.
+
+    It is drawn within its own guide; centred without a seed or guide.
+    """
+    guide = case.guides.get(name)
+    if seed is None or guide is None:
+        return np.zeros(2), np.zeros(2)
+    own = list(case.bodies).index(name)
+    shares = np.random.default_rng([*seed, own]).random(4)
+    c = guide.clearance
+    return axis_through(guide, height, in_disc(shares[:2], c), in_disc(shares[2:], c))
+
+
+def _by_direction(far: list[Vector]) -> list[list[Vector]]:
+    """Placements of each direction round the axis."""
+    size = len(far) // _DIRECTIONS
+    if not size:
+        return [far] * _DIRECTIONS
+    return [far[size * k : size * (k + 1)] for k in range(_DIRECTIONS)]
 
 
 def build_spatial(
@@ -149,18 +281,13 @@ def build_spatial(
     parts = case.network.components
     needle = str(getattr(parts[roles.needle], "body", ""))
     kept = {name: modes_in_network(case, name, pools, ports) for name in bodies}
-    height = seat_height(contacts, needle)
-    off_axis = farthest_positions(case, height)
-    about = about_axis(height, bodies[needle])
+    movers = Movers.of(case, needle, bodies, seat_height(contacts, needle))
     rubs = case.rubs
     found = [
         _meeting(
             contact,
-            needle,
-            bodies[needle],
+            movers,
             flexibilities,
-            [rigid_placement(aside, lean, *about) for aside, lean in off_axis],
-            max(hypot(*aside) for aside, _ in off_axis),
             float(getattr(parts[name], "gap", 0.0)),
             Friction.coulomb(case.stops[name].friction) if rubs else None,
         )
@@ -190,29 +317,25 @@ def build_spatial(
             )
         ],
     )
-    guide = None
-    if case.guide is not None:
-        law = case.guide.law
-        guide = guide_of_shaft(
+    guides = {
+        name: guide_of_shaft(
             model,
-            bodies[needle],
-            np.hstack([bodies[needle].rigid_modes, kept[needle].shapes]),
-            flexibilities[needle],
-            surface=case.guide.surface,
-            heights=case.guide.heights,
-            clearance=case.guide.clearance,
-            stiffness=law.stiffness if isinstance(law, LinearGuideLaw) else law.bore,
-            consistent=not isinstance(law, LinearGuideLaw),
-            friction=case.guide.friction,
-            viscous=case.guide.viscous,
+            bodies[name],
+            np.hstack([bodies[name].rigid_modes, kept[name].shapes]),
+            flexibilities[name],
+            surface=guide.surface,
+            heights=guide.heights,
+            clearance=guide.clearance,
+            stiffness=guide.law.stiffness
+            if isinstance(guide.law, LinearGuideLaw)
+            else guide.law.bore,
+            consistent=not isinstance(guide.law, LinearGuideLaw),
+            friction=guide.friction,
+            viscous=guide.viscous,
         )
-    spatial = valve_of_meetings(
-        case,
-        model,
-        [meeting for meeting, *_ in found],
-        guide,
-        rigid_placement(*placement_of(case, height), *about),
-    )
+        for name, guide in movers.guides.items()
+    }
+    spatial = valve_of_meetings(case, model, [meeting for meeting, *_ in found], guides, movers)
     shapes = [np.hstack([bodies[name].rigid_modes, kept[name].shapes]) for name in model.bodies]
     return replace(spatial, shape_marks=np.concatenate([shape_marks(each) for each in shapes]))
 
@@ -221,8 +344,8 @@ def valve_of_meetings(
     case: ValveCase,
     model: InterfaceModel,
     meetings: Sequence[Meeting],
-    guide: Guide | None,
-    placement: Vector,
+    guides: Mapping[str, Guide],
+    movers: Movers,
 ) -> SpatialValve:
     """Join the bodies of a valve that meet there.
 
@@ -230,26 +353,30 @@ def valve_of_meetings(
     ----------
     model
         With the contacts of the meetings.
-    placement (6,) [m], [rad]
-        Of the needle at the start.
+    guides
+        By body.
     """
     parts = case.network.components
     component = {str(getattr(part, "body", "")): name for name, part in parts.items()}
     arms = np.array([meeting.arm for meeting in meetings])
     gaps = PlacedGaps(
         tuple(meeting.gaps for meeting in meetings),
-        tuple(meeting.upper_moves for meeting in meetings),
+        tuple(meeting.pairing for meeting in meetings),
     )
+    reach = float(np.max(np.linalg.norm(arms, axis=1)))
+    guide, guided = movers.joined(guides)
     return SpatialValve(
         model=model,
         components=tuple(component[name] for name in model.bodies),
         stops=tuple(meeting.name for meeting in meetings),
         arms=arms,
         guide=guide,
+        guided=guided,
         gaps=gaps,
-        course=gap_course(gaps, float(np.max(np.linalg.norm(arms, axis=1)))),
-        placement=placement,
-        bearing=_bearing(case.guide),
+        course=gap_course(lambda at: gaps.between([at] * len(meetings)), reach),
+        pairings=gaps.pairings,
+        placement=movers.placements.ravel(),
+        bearing=movers.bearing(),
         films=tuple(
             tilting_film(meeting.name, film, meeting.space, meeting.reach)
             for meeting in meetings
@@ -287,21 +414,12 @@ def modes_in_network(
     )
 
 
-def _bearing(guide: ValveGuide | None) -> BearingFilm | None:
-    if guide is None or guide.film is None:
-        return None
-    return BearingFilm(length=guide.film.length, cut_off=guide.film.cut_off)
-
-
-def about_axis(height: float, needle: ElasticBody) -> tuple[Vector, Vector]:
-    """Point about which the needle is tilted, and its centre of mass, as drawn [m]."""
-    return np.array([0.0, 0.0, height]), needle.centre_in_space
-
-
 def seat_height(contacts: Mapping[str, StopContact], needle: str) -> float:
     """Height of first touch in the drawing of the needle: seat, else stop [m]."""
     below = [contact for contact in contacts.values() if contact.pair.upper.name == needle]
-    contact = (below or list(contacts.values()))[0]
+    above = [contact for contact in contacts.values() if contact.pair.lower.name == needle]
+    held = [contact for contact in below if contact.pair.lower.is_fixed]
+    contact = (held or below or above)[0]
     height = touch_height(contact.static.space)
     return height - contact.pair.shift if below else height
 
@@ -330,13 +448,14 @@ def placement_of(case: ValveCase, height: float) -> tuple[Vector, Vector]:
     return aside, lean
 
 
-def farthest_positions(case: ValveCase, height: float) -> list[tuple[Vector, Vector]]:
+def farthest_positions(
+    guide: ValveGuide | None, placement: tuple[Vector, Vector], height: float
+) -> list[tuple[Vector, Vector]]:
     """Positions and slopes of the axis that contact points must suffice for, all round.
 
     The first two are along x, the others turned.
     """
-    guide = case.guide
-    placement = aside, lean = placement_of(case, height)
+    aside, lean = placement
     if guide is None:
         turns = [_turned(2.0 * pi * k / _DIRECTIONS) for k in range(_DIRECTIONS)]
         return [(R @ aside, R @ lean) for R in turns] if np.any([aside, lean]) else [placement]
@@ -353,18 +472,17 @@ def _turned(angle: float) -> NDArray[np.float64]:
 
 def _meeting(
     contact: StopContact,
-    needle: str,
-    body: ElasticBody,
+    movers: Movers,
     flexibilities: Mapping[str, Flexibility],
-    farthest: Sequence[Vector],
-    off_axis: float,
     gap: float,
     friction: Friction | None,
 ) -> tuple[Meeting, ContactSpace, NDArray[np.float64], FaceFriction | None]:
     """A stop, its contact points, and the compliance of both bodies there."""
     pair, static = contact.pair, contact.static
-    upper_moves = pair.upper.name == needle
-    centre = pair.upper.centre_of_mass if upper_moves else body.centre_of_mass
+    pairing = movers.pairing(pair, gap)
+    upper_moves = pairing.is_upper
+    centre = (pair.upper if upper_moves else pair.lower).centre_of_mass
+    farthest, off_axis = movers.reach(pairing)
     space = off_axis_space(
         pair, static.space, farthest, off_axis, centre=centre, upper_moves=upper_moves
     )
@@ -393,6 +511,6 @@ def _meeting(
             centre=here,
             form=raised.form,
         ),
-        upper_moves=upper_moves,
+        pairing=pairing,
     )
     return meeting, open_by, compliance, faces

@@ -7,7 +7,7 @@ along the axis: only order 0 has a share in them.
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import hypot, inf
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +16,7 @@ from klack.assembling.modes import selection_of
 from klack.assembling.off_axis import ANGLES, off_axis_space, turned
 from klack.assembling.spatial import (
     Meeting,
-    about_axis,
-    farthest_positions,
-    placement_of,
+    Movers,
     seat_height,
     valve_of_meetings,
 )
@@ -29,14 +27,14 @@ from klack.bodies.elasticity.ring_points import RingSections
 from klack.bodies.reduction.ports import Port
 from klack.bodies.reduction.reduce import kept_modes
 from klack.bodies.reduction.reduced_body import ReducedBody
-from klack.case.guide import LinearGuideLaw
+from klack.case.guide import LinearGuideLaw, ValveGuide
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles
+from klack.contact.friction import Friction
 from klack.contact.gap_update import RingGaps
-from klack.contact.rings import RingSpace
+from klack.contact.rings import RingFriction, RingSpace
 from klack.errors import AccuracyWarning
 from klack.machine.cache.result_cache import result_cache
-from klack.mesh.rigid import rigid_placement
 from klack.transient.guide import guide_at_sections, shaft_sections, turned_sections
 from klack.transient.interface_arrays import Guide
 from klack.transient.interface_model import InterfaceModel
@@ -91,30 +89,25 @@ def build_spatial_rings(
     """
     needle = str(getattr(case.network.components[roles.needle], "body", ""))
     names = [needle, *(name for name in bodies if name != needle)]
-    height = seat_height(contacts, needle)
-    about = about_axis(height, bodies[needle])
+    movers = Movers.of(case, needle, bodies, seat_height(contacts, needle))
     count = ANGLES if case.angles is None else case.angles
     found = [
         _meeting(
             contact,
-            needle,
-            bodies[needle],
-            farthest_positions(case, height)[:2],
-            about,
+            movers,
             float(getattr(case.network.components[name], "gap", 0.0)),
             count,
+            Friction.coulomb(case.stops[name].friction) if case.rubs else None,
         )
         for name, contact in contacts.items()
     ]
-    sections = None
-    if case.guide is not None:
-        mesh, guided = bodies[needle].mesh, case.guide
-        sections = turned_sections(needle, mesh, guided.surface, guided.heights)
+    sections = {
+        name: turned_sections(name, bodies[name].mesh, guide.surface, guide.heights)
+        for name, guide in movers.guides.items()
+    }
     points, loads = reduced_bodies(
         [
-            _revolved(case, bodies[name], pools[name], ports[name], sections)
-            if name == needle
-            else _revolved(case, bodies[name], pools[name], ports[name], None)
+            _revolved(case, bodies[name], pools[name], ports[name], sections.get(name))
             for name in names
         ],
         [contact for _, contact in found],
@@ -127,8 +120,11 @@ def build_spatial_rings(
         case,
         model,
         [meeting for meeting, _ in found],
-        None if sections is None else _guide(case, model, sections, points[0]),
-        rigid_placement(*placement_of(case, height), *about),
+        {
+            name: _guide(guide, model, sections[name], points[names.index(name)])
+            for name, guide in movers.guides.items()
+        },
+        movers,
     )
     arcs = RingArcs(
         count=count,
@@ -146,22 +142,22 @@ def build_spatial_rings(
 
 def _meeting(
     contact: StopContact,
-    needle: str,
-    body: ElasticBody,
-    farthest: Sequence[tuple[Vector, Vector]],
-    about: tuple[Vector, Vector],
+    movers: Movers,
     gap: float,
     count: int,
+    friction: Friction | None,
 ) -> tuple[Meeting, RingContact]:
     pair, static = contact.pair, contact.static
-    upper_moves = pair.upper.name == needle
-    centre = pair.upper.centre_in_space if upper_moves else body.centre_in_space
+    pairing = movers.pairing(pair, gap)
+    upper_moves = pairing.is_upper
+    centre = (pair.upper if upper_moves else pair.lower).centre_in_space
+    farthest, off_axis = movers.reach(pairing, turns=1)
     angle = 2.0 * np.pi * np.arange(count) / count
     section = off_axis_space(
         pair,
         static.space,
-        [rigid_placement(*position, *about) for position in farthest],
-        max(hypot(*aside) for aside, _ in farthest),
+        farthest,
+        off_axis,
         angle=angle,
         centre=centre,
         upper_moves=upper_moves,
@@ -191,9 +187,19 @@ def _meeting(
             centre=centre + up if upper_moves else centre,
             form=pair.form,
         ),
-        upper_moves=upper_moves,
+        pairing=pairing,
     )
-    ring = RingContact(name=contact.name, upper=pair.upper.name, lower=pair.lower.name, space=space)
+    faces = None
+    if friction is not None:
+        surfaces = (pair.upper.mesh, pair.upper_surface, pair.lower.mesh, pair.lower_surface)
+        faces = RingFriction.on(friction, space.section, *surfaces)
+    ring = RingContact(
+        name=contact.name,
+        upper=pair.upper.name,
+        lower=pair.lower.name,
+        space=space,
+        faces=faces,
+    )
     return meeting, ring
 
 
@@ -210,11 +216,8 @@ def _revolved(
 
 
 def _guide(
-    case: ValveCase, model: InterfaceModel, sections: RingSections, shaft: RevolvedPoints
-) -> Guide | None:
-    given = case.guide
-    if given is None:
-        return None
+    given: ValveGuide, model: InterfaceModel, sections: RingSections, shaft: RevolvedPoints
+) -> Guide:
     law, found = given.law, shaft_sections(sections, shaft)
     linear = isinstance(law, LinearGuideLaw)
     return guide_at_sections(

@@ -6,7 +6,7 @@ from math import isfinite
 from klack.case.valve_roles import END_STOP, FLEXIBLE_BODY, Meeting, ValveRoles
 from klack.case.valve_sections import ValveSections
 from klack.errors import InputError
-from klack.input.problem import CaseProblem, Key
+from klack.input.problem import CaseProblem, Key, one_of
 from klack.network.across import OffAxisPart
 from klack.network.component import Component
 from klack.units import format_si
@@ -68,8 +68,8 @@ _FRICTION = ("guide-friction",)
 def check_motion(case: ValveSections, meetings: Mapping[str, Meeting], roles: ValveRoles) -> None:
     """Reject the first thing that a motion in space cannot have."""
     if case.motion == "axial":
-        for key in ("guide", "placement"):
-            if getattr(case, key) is not None:
+        for key in ("guide", "guides", "placement"):
+            if getattr(case, key):
                 raise CaseProblem(
                     (key,),
                     got=f"'{key}' of a needle that moves along its axis",
@@ -146,20 +146,6 @@ def _check_bodies(case: ValveSections) -> None:
             )
     if solid:
         _refuse_angles(case, "angles of bodies of three dimensions")
-        return
-    rubbing: list[Key] = [
-        ("stops", name, "friction") for name, stop in case.stops.items() if stop.friction > 0.0
-    ]
-    if case.shots is not None and case.shots.contact_friction is not None:
-        rubbing.append(("shots", "contact_friction"))
-    for key in rubbing:
-        raise CaseProblem(
-            key,
-            got="friction between the faces of axisymmetric bodies with motion: three-dimensional",
-            expected="smooth faces there, or bodies of three dimensions",
-            hint="remove it, or take 'model: swept' with 'layers: 18' for all bodies.",
-            on_key=True,
-        )
 
 
 def _refuse_angles(case: ValveSections, what: str) -> None:
@@ -201,38 +187,59 @@ def _check_stop(case: ValveSections, name: str, part: Component) -> None:
 
 
 def _check_ends(case: ValveSections, meetings: Mapping[str, Meeting], roles: ValveRoles) -> None:
-    sides: dict[bool, list[str]] = {True: [], False: []}
+    free = [name for name in _drawn(case) if not case.bodies[_drawn(case)[name]].fixed]
+    used: set[str] = set()
     for name, met in meetings.items():
-        at = [side is not None and side[0] == roles.needle for side in (met.upper, met.lower)]
-        if at[0] == at[1]:
+        at = [side[0] for side in (met.upper, met.lower) if side is not None]
+        used.update(at)
+        if not set(at) & set(free) or len(set(at)) < 2:
             raise CaseProblem(
                 ("network", "components", name),
-                got=f"the end stop '{name}', which '{roles.needle}' does not touch",
-                expected="stops of the needle only with motion: three-dimensional",
-                hint="remove it, or use motion: axial.",
+                got=f"the end stop '{name}' between {' and '.join(map(repr, at)) or 'nothing'}",
+                expected="two bodies of the case, one of which moves, with motion: "
+                "three-dimensional",
+                hint="remove it, or draw what it hits as a body with 'fixed'.",
             )
-        sides[at[0]].append(name)
-    for below, names in sides.items():
-        if len(names) > 1:
-            raise CaseProblem(
-                ("network", "components", names[1]),
-                got=f"a second end stop {'below' if below else 'above'} the needle",
-                expected="one at each end with motion: three-dimensional",
-                hint=f"'{names[0]}' is the first one; join both surfaces in one stop.",
-            )
-    used = {
-        met[0]
-        for name in meetings
-        for met in (meetings[name].upper, meetings[name].lower)
-        if met is not None
-    }
-    for name, part in case.network.components.items():
-        if part.type == FLEXIBLE_BODY and name not in used:
+    for name in _drawn(case):
+        if name not in used:
             raise CaseProblem(
                 ("network", "components", name),
                 got=f"the body '{name}', which touches nothing",
                 expected="the needle and what it hits with motion: three-dimensional",
                 hint="remove it, or give it an end stop.",
+            )
+    if case.shots is not None and case.shots.carry and len(free) > 1:
+        raise CaseProblem(
+            ("shots", "carry"),
+            got=f"strokes that begin where the one before has ended, and {len(free)} bodies that "
+            "move",
+            expected="one body that moves: the positions of others are not carried on",
+            hint="remove it: every stroke then starts from positions of its own.",
+            on_key=True,
+        )
+    _check_guides(case, [_drawn(case)[name] for name in free if name != roles.needle])
+
+
+def _drawn(case: ValveSections) -> dict[str, str]:
+    """Body of each component that is one."""
+    parts = case.network.components.items()
+    return {
+        name: str(getattr(part, "body", "")) for name, part in parts if part.type == FLEXIBLE_BODY
+    }
+
+
+def _check_guides(case: ValveSections, others: list[str]) -> None:
+    """Guides belong to bodies that move beside the needle."""
+    for name in case.guides:
+        if name not in others:
+            raise CaseProblem(
+                ("guides", name),
+                got=f"a guide of '{name}'",
+                expected=f"a body that moves beside the needle: {one_of(others)}"
+                if others
+                else "no section 'guides': only the needle moves",
+                hint="that of the needle is the section 'guide'; a body with 'fixed' has none.",
+                on_key=True,
             )
 
 

@@ -189,6 +189,10 @@ class ValveSections(CaseFile):
     guide: ValveGuide | None = Field(
         default=None, description="Guide of the needle in three dimensions; default none."
     )
+    guides: Mapping[Name, ValveGuide] = Field(
+        default_factory=dict,
+        description="name of a further body that moves in three dimensions: its guide.",
+    )
     placement: ValvePlacement | None = Field(
         default=None,
         description="Position of the needle at the start in three dimensions; default centred.",

@@ -24,13 +24,15 @@ iterated: the curve bends by the square of the small angle between line and plan
 three rounds are exact.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
+from scipy.spatial.transform import Rotation
 
 from klack.arrays import Floats
 from klack.contact.face_form import FaceForm
@@ -41,7 +43,7 @@ from klack.errors import InputError
 from klack.mesh.mesh import Mesh, Surface
 from klack.mesh.rigid import rotation_matrix
 
-__all__ = ["PlacedGaps", "RigidGaps", "RingGaps"]
+__all__ = ["ABOVE", "BELOW", "Pairing", "PlacedGaps", "RigidGaps", "RingGaps"]
 
 
 _ROUNDS = 8
@@ -316,28 +318,80 @@ class RigidGaps:
         return mean_gaps(self.weight, gap, self.form, self.away)
 
 
+class Pairing(NamedTuple):
+    """Which bodies of several that move meet in a contact.
+
+    Parameters
+    ----------
+    mover, other
+        Numbers among the bodies that move; ``other`` is -1 where it is held.
+    lever (3,) [m]
+        Centre of mass of the mover from that of the other one.
+    is_upper
+        Whether the mover is the upper body a; else a is moved the opposite way.
+    """
+
+    mover: int
+    other: int
+    lever: NDArray[np.float64]
+    is_upper: bool = True
+
+    def relative(self, placements: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Placement of the mover (6,) as the other sees it, of those (n, 6) of all bodies."""
+        placed = placements[self.mover]
+        if self.other < 0:
+            return placed
+        beside = placements[self.other]
+        back = rotation_matrix(beside[3:]).T
+        shift = back @ (self.lever + placed[:3] - beside[:3]) - self.lever
+        turn = Rotation.from_matrix(back @ rotation_matrix(placed[3:])).as_rotvec()
+        return np.concatenate([shift, turn])
+
+    def slopes(self, bodies: int) -> NDArray[np.float64]:
+        """Its derivatives with the placements, shape (6, 6 bodies)."""
+        out = np.zeros((6, bodies, 6))
+        out[:, self.mover] = np.eye(6)
+        if self.other >= 0:
+            x, y, z = self.lever
+            out[:, self.other] = -np.eye(6)
+            out[:3, self.other, 3:] = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
+        return out.reshape(6, -1)
+
+
+ABOVE, BELOW = Pairing(0, -1, np.zeros(3)), Pairing(0, -1, np.zeros(3), is_upper=False)
+"""The first body above one that is held, and below it."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class PlacedGaps:
-    """Gaps of all contacts of a moving body, one contact after the other.
+    """Gaps of all contacts of moving bodies, one contact after the other.
 
     Parameters
     ----------
     contacts
-        Centred in the centre of mass of the moving body.
-    is_upper
-        Whether the moving body is a; else a is moved the opposite way.
+        Centred in the centre of mass of the mover.
+    pairings
+        Of each contact.
     """
 
     contacts: tuple[RigidGaps | RingGaps, ...]
-    is_upper: tuple[bool, ...]
+    pairings: tuple[Pairing, ...]
 
-    def __call__(self, placement: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Gaps (nc,) [m] at a placement of the moving body, shape (6,) [m], [rad]."""
-        shift, rotation = placement[:3], placement[3:]
-        back = np.concatenate([-rotation_matrix(rotation).T @ shift, -rotation])
+    def __call__(self, placements: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Gaps (nc,) [m] at placements of the moving bodies, shape (6 bodies,) [m], [rad]."""
+        given = placements.reshape(-1, 6)
+        return self.between([pair.relative(given) for pair in self.pairings])
+
+    def between(self, relative: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+        """Gaps (nc,) [m] at the placement of the mover of each contact (6,) [m], [rad]."""
         return np.concatenate(
             [
-                gaps(placement if upper else back).ravel()
-                for gaps, upper in zip(self.contacts, self.is_upper, strict=True)
+                gaps(at if pair.is_upper else _opposite(at)).ravel()
+                for gaps, pair, at in zip(self.contacts, self.pairings, relative, strict=True)
             ]
         )
+
+
+def _opposite(placement: NDArray[np.float64]) -> NDArray[np.float64]:
+    shift, rotation = placement[:3], placement[3:]
+    return np.concatenate([-rotation_matrix(rotation).T @ shift, -rotation])

@@ -20,6 +20,7 @@ class MovingBodies(Protocol):
     """Bodies of one run; the network holds their modes whenever a record ends."""
 
     path: SpatialPath
+    paths: list[SpatialPath]
 
     def start(self, balance: Callable[[Vector], StaticStart] | None) -> StaticStart | None:
         """Place them, at rest under the forces of the network, which ``balance`` finds anew.

@@ -270,6 +270,8 @@ class NetworkResult:
         None for a continued or free start.
     path
         Of a needle in three dimensions; not stored with a result.
+    paths
+        Of all bodies that move there, likewise.
     faces
         By component, where faces yield.
     spatial_impacts
@@ -289,6 +291,7 @@ class NetworkResult:
     failure: str = ""
     start: StaticStart | None = None
     path: SpatialPath | None = None
+    paths: tuple[SpatialPath, ...] = ()
     faces: Mapping[str, PressedFaces] = field(default_factory=dict)
     spatial_impacts: tuple[SpatialImpact, ...] | None = None
 

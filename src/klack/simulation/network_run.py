@@ -256,6 +256,7 @@ def simulate_network(
         channels |= network.moving.channels(time.astype(float))
     result = NetworkResult(
         path=None if network.moving is None else network.moving.path,
+        paths=() if network.moving is None else tuple(network.moving.paths),
         time=time.astype(float),
         channels=channels,
         interfaces=recorder.interfaces(),

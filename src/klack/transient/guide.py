@@ -144,22 +144,22 @@ def guide_at_sections(
     friction: float,
     viscous: float,
 ) -> Guide:
-    """Guide of sections that are known on the modes of the moving body, the first of the model.
+    """Guide of sections that are known on the modes of the body ``name``.
 
-    ``name``, that of the body, is for messages; the others are as in :func:`guide_of_shaft`.
+    Others are as in :func:`guide_of_shaft`.
     """
     require_positive("guide: clearance", clearance, "m")
     require_nonnegative("guide: friction", friction, "-")
     require_nonnegative("guide: viscous", viscous, "N s/m")
-    count, modes = len(sections), sections[0].motion.shape[1]
+    count, own = len(sections), np.flatnonzero(model.owner == model.bodies.index(name))
     motion = np.zeros((count, 6, model.mode_count))
     compliance = np.zeros((count, 2, 2))
     for k, section in enumerate(sections):
-        motion[k, :, :modes] = section.motion
+        motion[k][:, own] = section.motion
         if stiffness is not None:
             compliance[k] = np.eye(2) / stiffness
         if section.compliance is not None:
-            compliance[k] += _missing(model, section.motion[:2], section.compliance)
+            compliance[k] += _missing(model.omega[own], section.motion[:2], section.compliance)
         if not np.linalg.eigvalsh(compliance[k])[0] > 0:
             raise InputError(
                 f"guide of body '{name}' at z = {section.centre[2] * 1e3:.4g} mm",
@@ -282,10 +282,9 @@ def _supports(places: NDArray[np.float64], size: float) -> bool:
 
 
 def _missing(
-    model: InterfaceModel, own: NDArray[np.float64], whole: NDArray[np.float64]
+    omega: NDArray[np.float64], own: NDArray[np.float64], whole: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Static compliance of a section less that of the kept modes, shape (2, 2) [m/N]."""
-    omega = model.omega[: own.shape[1]]
     elastic = omega > 0
     modal = (own[:, elastic] / omega[elastic]) @ (own[:, elastic] / omega[elastic]).T
     rest = whole - modal

@@ -622,7 +622,7 @@ class StopRecord:
     Attributes
     ----------
     side (contacts,)
-        1 where the force on the needle is upwards, -1 where downwards.
+        1 where the force on the needle is upwards, -1 where it is downwards, or elsewhere.
     closed (contacts,)
         Fine step since which a stop is closed; nan while open.
     force (contacts,) [N]

@@ -5,7 +5,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.arrays import Cube, Matrix, Vector
+from klack.arrays import Cube, Index, Matrix, Vector
 from klack.errors import require_nonnegative
 from klack.hydraulics.tilted_film import FilmRoom
 
@@ -135,6 +135,7 @@ class ContactPoints(NamedTuple):
     traces: Matrix  # (n, M)
     gap: Vector  # (n,) [m] at q = 0, of the faces as they are: with their set
     axial: Vector  # (n,)
+    stop: Index  # (n,) number of the contact that each belongs to
     grip: Grip | None = None  # of points that rub
     limit: Limit | None = None  # of points that yield; then A is changed in place
     layer: Layer | None = None  # of rough points
@@ -426,6 +427,7 @@ class Record(NamedTuple):
     film: Matrix  # (steps, f) [N] mean axial force of each film
     lands: Cube  # (steps, f, 6) lift and tilts that each film had at the start and at the end
     places: Matrix  # (steps, M) modal coordinates at the end of the step, or (0, M)
+    stops: Cube  # (steps, c, 2) [N] ``force`` and ``pressed`` of every contact, or (0, 0, 2)
 
     @classmethod
     def empty(
@@ -438,6 +440,7 @@ class Record(NamedTuple):
         keep_points: bool,
         films: int = 0,
         modes: int = 0,
+        stops: int = 0,
     ) -> Self:
         """Room for so many steps, and for ``modes`` modal coordinates in each."""
         force, gap, outside = np.zeros((3, steps))
@@ -454,4 +457,5 @@ class Record(NamedTuple):
             np.zeros((steps, films)),
             np.zeros((steps, films, 6)),
             np.zeros((steps if modes else 0, modes)),
+            np.zeros((kept, stops if kept else 0, 2)),
         )

@@ -33,7 +33,7 @@ At rest the faces start without tangential forces.
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.arrays import Vector
+from klack.arrays import Index, Vector
 from klack.machine.compiling.jit import inner
 from klack.simulation.phase import phase
 from klack.transient.interface_arrays import (
@@ -217,7 +217,12 @@ def _friction_work(rubbing: Rubbing, bent: Vector, moved: Vector) -> tuple[float
 
 @phase
 def tell_friction(
-    grip: Grip | None, rubbing: Rubbing, record: Record, taken: int, pressed: float
+    grip: Grip | None,
+    stop: Index,
+    rubbing: Rubbing,
+    record: Record,
+    taken: int,
+    pressed: float,
 ) -> float:
     """Record the mean friction of every point; returns its axial resultant [N]."""
     force = 0.0
@@ -226,6 +231,8 @@ def tell_friction(
         for i in range(len(rubbing.across)):
             mean = 0.5 * (rubbing.across[i] + rubbing.forces[n + i])
             force += grip.axial[i] * mean
+            if record.stops.shape[1]:
+                record.stops[taken, stop[i % n], 0] += grip.axial[i] * mean
             if len(record.across):
                 record.across[taken, i] = mean
         record.pressed[taken] = pressed

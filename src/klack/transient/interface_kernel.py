@@ -648,12 +648,18 @@ def _tell_forces(
     points: ContactPoints, state: State, step: Step, pay: float, record: Record, taken: int
 ) -> None:
     force = 0.0
+    for c in range(record.stops.shape[1]):
+        record.stops[taken, c, 0] = 0.0
     for k in range(len(points.gap)):
         mean = 0.5 * (1.0 + pay) * step.both[k]
         force += points.axial[k] * mean
+        if record.stops.shape[1]:
+            record.stops[taken, points.stop[k], 0] += points.axial[k] * mean
         if len(record.points):
             record.points[taken, k] = mean
-    force += tell_friction(points.grip, state.rubbing, record, taken, force)
+    for c in range(record.stops.shape[1]):
+        record.stops[taken, c, 1] = record.stops[taken, c, 0]
+    force += tell_friction(points.grip, points.stop, state.rubbing, record, taken, force)
     record.force[taken] = force
     if state.contact.counts[0] > 0:
         state.books[OPEN_STEPS] = 0.0
@@ -1022,6 +1028,7 @@ def march_near(
         near.rows[: m * M].reshape((m, M)),
         points.gap[index],
         points.axial[index],
+        points.stop[index],
         None,
         None,
         None,
@@ -1061,6 +1068,7 @@ def march_near(
         record.film,
         record.lands,
         record.places,
+        record.stops,
     )
     squeezed = _films_at(films, index)
     step, guide = _start(modes, outside, bore, films, m, 0)

@@ -46,6 +46,7 @@ __all__ = [
     "InterfaceBody",
     "InterfaceContact",
     "InterfaceModel",
+    "MovingBody",
     "PointBody",
     "PointContact",
     "StaticChecks",
@@ -140,6 +141,25 @@ class StaticChecks:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MovingBody:
+    """A body that nothing holds.
+
+    Parameters
+    ----------
+    number
+        Among the bodies of its model.
+    rigid (6, M) [1/sqrt(kg)]
+        Translation of its centre of mass and rotation vector per modal coordinate.
+    centre (3,) [m]
+        Of mass.
+    """
+
+    number: int
+    rigid: NDArray[np.float64]
+    centre: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class InterfaceModel:
     """Modal coordinates of all bodies and the contact points between them.
 
@@ -188,6 +208,8 @@ class InterfaceModel:
         Of the points of the first contact, without friction; None: elastic.
     layer
         On the points of the only contact, without friction or yield; None: smooth.
+    others
+        Further bodies that move.
     """
 
     bodies: tuple[str, ...]
@@ -216,6 +238,16 @@ class InterfaceModel:
     observed_residual: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
     limit: PressureLimit | None = None
     layer: AsperityLayer | None = None
+    others: tuple[MovingBody, ...] = ()
+
+    @property
+    def moving(self) -> tuple[MovingBody, ...]:
+        """All bodies that move, the first one first."""
+        return MovingBody(number=0, rigid=self.rigid, centre=self.centre), *self.others
+
+    def rigid_of(self, number: int) -> NDArray[np.int64]:
+        """Rigid coordinates of a body."""
+        return np.flatnonzero((self.owner == number) & (self.omega == 0))
 
     @property
     def ways(self) -> int:
@@ -437,8 +469,9 @@ def model_at_points(
     observed = scipy.linalg.block_diag(*(body.observed for body in bodies))
     flexible = observed[:, elastic] / omega[elastic] ** 2
     static = np.vstack([body.observed_static for body in bodies])
-    rigid = np.zeros((6, sum(counts)))
-    rigid[:, : moving.rigid.shape[1]] = moving.rigid
+    motions = [np.zeros((6, sum(counts))) for _ in bodies]
+    for body, motion, start in zip(bodies, motions, np.cumsum([0, *counts]), strict=False):
+        motion[:, start : start + body.rigid.shape[1]] = body.rigid
     return InterfaceModel(
         bodies=tuple(body.name for body in bodies),
         masses=tuple(body.mass for body in bodies),
@@ -462,8 +495,8 @@ def model_at_points(
         ),
         rim=np.concatenate([contact.rim for contact in contacts]),
         beyond=np.repeat([contact.beyond for contact in contacts], rows),
-        rigid=rigid,
-        drift=_drift(bodies, counts),
+        rigid=motions[0],
+        drift=np.array([motion[2] for motion in motions]),
         centre=moving.centre,
         longest_period=float(np.max(2.0 * np.pi / own, initial=0.0)),
         checks=checks,
@@ -472,6 +505,11 @@ def model_at_points(
         friction=tuple(contact.law for contact in contacts if contact.law is not None),
         observed=observed,
         observed_residual=static - flexible @ traces[:, elastic].T,
+        others=tuple(
+            MovingBody(number=number, rigid=motion, centre=body.centre)
+            for number, (body, motion) in enumerate(zip(bodies, motions, strict=True))
+            if number and body.mass < inf
+        ),
     )
 
 
@@ -594,15 +632,6 @@ def _traces(
         rows = contact.rows(item.body.name)
         if rows is not None:
             out[place] += rows @ shapes
-    return out
-
-
-def _drift(bodies: Sequence[PointBody], counts: Sequence[int]) -> NDArray[np.float64]:
-    out = np.zeros((len(bodies), sum(counts)))
-    start = 0
-    for number, (body, count) in enumerate(zip(bodies, counts, strict=True)):
-        out[number, start : start + body.rigid.shape[1]] = body.rigid[2]
-        start += count
     return out
 
 

@@ -195,12 +195,13 @@ def contact_points(
     """
     _require_layer_alone(model)
     push = np.ascontiguousarray(model.rigid[2])
+    counts = [last - first for _, first, last in model.contacts]
+    stop = np.repeat(np.arange(len(counts)), counts)
     if not model.ways:
         A = contact_compliance(model.compliance, model.traces, B1, push, spring)
         laws = None, _limit(model), _layer(model)
-        return ContactPoints(A, model.traces, model.gap, model.axial, *laws)
+        return ContactPoints(A, model.traces, model.gap, model.axial, stop, *laws)
     rows = np.vstack([model.traces, model.tangents])
-    counts = [last - first for _, first, last in model.contacts]
     static, kinetic, fade = np.repeat(
         [(f.static, f.kinetic, f.speed * step) for f in model.friction], counts, axis=0
     ).T
@@ -209,6 +210,7 @@ def contact_points(
         model.traces,
         model.gap,
         model.axial,
+        stop,
         Grip(
             model.tangents,
             model.axial_across,

@@ -1,4 +1,4 @@
-r"""Gaps of the contact points of a moving needle: taken from the geometry, then followed.
+r"""Gaps of the contact points of moving bodies: taken from the geometry, then followed.
 
 The exact gap of a point is the length of its normal up to the other face
 (:mod:`klack.contact.gap_update`).  Its slope with the placement is that of the contact force only
@@ -8,12 +8,13 @@ slopes :math:`G` at one placement, the gaps of another one are
 .. math:: g = g_0 + G\,(x - x_0) + O(c\,|x - x_0|^2), \qquad c \approx 1/R .
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from klack.arrays import Matrix, Vector
+from klack.contact.gap_update import Pairing
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.interface_run import Gaps
 
@@ -33,18 +34,12 @@ class GapCourse:
     slopes (n, 6)
         Per translation [-] and rotation vector [m].
     bends (n, 6) [1/m], [m]
-        Magnitudes of the second derivatives along these motions.
+        Magnitudes of the second derivatives along these motions; times their squares, twice the
+        error of the slopes: the other half is for slopes of another placement.
     """
 
     slopes: Matrix
     bends: Matrix
-
-    def left(self, moved: Vector) -> Vector:
-        """Error of the slopes after a motion [m], shape (n,); twice the second order.
-
-        The other half is for slopes of another placement.
-        """
-        return np.asarray(self.bends @ moved**2)
 
 
 def gap_course(gaps: Callable[[Vector], Vector], reach: float) -> GapCourse:
@@ -76,46 +71,51 @@ _NO_FACE = 0.2e-3  # [m] no gap changes by so much with the placement: nothing f
 class PlacedGaps:
     """Gaps beside the linear ones of the modes; without geometry they stay as they are.
 
-    Between two moments at which they are taken from the geometry, they follow the placement of the
-    needle along their slopes.
+    Between two moments at which they are taken from the geometry, they follow the placements of the
+    bodies along their slopes.
 
     Parameters
     ----------
-    rigid_count
-        Rigid modes of the needle, the first ones.
     gaps
-        Exact ones at a rigid placement of the needle.
+        Exact ones at rigid placements (6 bodies,) of the bodies that move.
+    pairings
+        Bodies of each contact.
     course
-        Of these gaps; computed by default.
-    reach [m]
-        Farthest contact point from the centre of the rotation.
+        Of these gaps with the placement of the mover of each contact, as the other body sees it.
     """
 
     def __init__(
         self,
         model: InterfaceModel,
-        rigid_count: int,
         gaps: Gaps | None,
+        pairings: Sequence[Pairing],
         course: GapCourse | None,
-        reach: float,
     ) -> None:
-        self._model, self._exact, self._rigid = model, gaps, rigid_count
+        self._model, self._exact, self._course = model, gaps, course
+        self._rigid = np.flatnonzero(model.omega == 0)
+        self._motion = np.vstack([body.rigid for body in model.moving])
         self.values = np.array(model.gap)
-        self.taken_at, self.followed_to = np.zeros(6), np.zeros(6)
-        self._course = None
-        if gaps is not None:
-            self._course = gap_course(gaps, reach) if course is None else course
+        self.taken_at, self.followed_to = np.zeros((2, len(self._motion)))
+        if course is None:
+            return
+        self._seen, turning = [], []
+        for pair, (_, a, b) in zip(pairings, model.contacts, strict=True):
+            mover = model.moving[pair.mover]
+            own = model.rigid_of(mover.number)
             # what slopes have beside the linear gaps of the modes
-            q = np.linalg.pinv(model.rigid[:, :rigid_count], rcond=1e-12)
-            self._turning = self._course.slopes - model.traces[:, :rigid_count] @ q
+            q = np.linalg.pinv(mover.rigid[:, own], rcond=1e-12)
+            seen = pair.slopes(len(model.moving))
+            turning.append((course.slopes[a:b] - model.traces[a:b, own] @ q) @ seen)
+            self._seen.append((course.bends[a:b], seen))
+        self._turning = np.vstack(turning)
 
     def take(self, q: Vector, *, careful: bool = False) -> bool:
         """Take them from the geometry; ``careful``: only where this closes no point."""
         if self._exact is None:
             return False
         model, r = self._model, self._rigid
-        at = model.rigid @ q
-        fresh = self._exact(at) - model.traces[:, :r] @ q[:r]
+        at = self._motion @ q
+        fresh = self._exact(at) - model.traces[:, r] @ q[r]
         if careful and np.min(fresh + model.traces @ q) <= 0.0:
             return False
         self.values[:], self.taken_at[:], self.followed_to[:] = fresh, at, at
@@ -125,7 +125,7 @@ class PlacedGaps:
         """Let them follow the placement, unless this closes a point."""
         if self._course is None:
             return False
-        at = self._model.rigid @ q
+        at = self._motion @ q
         change = self._turning @ (at - self.followed_to)
         if np.min(self.values + change + self._model.traces @ q) <= 0.0:
             return False
@@ -137,7 +137,9 @@ class PlacedGaps:
         """What each gap may be wrong by [m]."""
         if self._course is None:
             return np.zeros(len(self.values))
-        return self._course.left(self._model.rigid @ q - self.taken_at) + 0.5 * FRESH
+        moved = self._motion @ q - self.taken_at
+        left = [bends @ (seen @ moved) ** 2 for bends, seen in self._seen]
+        return np.concatenate(left) + 0.5 * FRESH
 
     def faced(self) -> Vector:
         """Gaps; the linear one of a point that has slid over the edge of the other face."""

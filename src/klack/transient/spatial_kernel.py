@@ -146,7 +146,7 @@ class StopRows(NamedTuple):
     row: Index  # (c,) interface of the network
     span: Index  # (c, 2) first point, and the one behind the last
     film: Index  # (c,) place among the recorded films, -1 without
-    side: Vector  # (c,) 1 where the force on the needle is upwards, -1 where downwards
+    side: Vector  # (c,) sign of the axial force of a contact that is pressed
     slope: Vector  # (c,) gap per gap along the axis, of cones
     felt: Vector  # (c,) [N] from which on a film is felt
     upper: Index  # (c,) ports of the network
@@ -213,9 +213,8 @@ def tell_stops(
         for i in range(steps + 1):
             before, force, pressed = acted, 0.0, 0.0
             if i < steps:
-                pressing = record.pressed[i] if len(record.pressed) else record.force[i]
-                if side * pressing > 0.0:
-                    force = side * record.force[i]
+                if len(record.stops) and side * record.stops[i, c, 1] > 0.0:
+                    force = side * record.stops[i, c, 0]
                 if film >= 0:
                     pressed = record.film[i, film]
                 out.last[c] = force
@@ -231,7 +230,7 @@ def tell_stops(
                 into = out.fine[row, place + told]
                 if i == steps:
                     gap = _least_gap(stops, c, gap0, q)
-                elif points:
+                elif points and (acted or len(stops.row) <= 2):  # the least of all is its own
                     gap = record.gap[i]
                 else:
                     gap = _least_gap(stops, c, gap0, record.places[i])

@@ -1,6 +1,6 @@
 r"""Bodies at rest on each other, point by point, under constant forces.
 
-Unknown are the rigid coordinates :math:`z` of the needle; everything else follows from them. With
+Unknown are the rigid coordinates :math:`z` of the bodies; everything else follows from them. With
 the elastic modes at rest, :math:`q_e = \Omega^{-2} (f_e + \Phi_e^T \lambda)`, contact is
 
 .. math:: g = g_0 + \Phi_r z + \Phi_e \Omega^{-2} f_e + C \lambda, \qquad
@@ -10,7 +10,7 @@ and the guide is made of such points too: straight walls that touch its bore, on
 (J. E. Kelley, J. SIAM 8 (1960) 703).  The forces on the rigid coordinates are balanced by proximal
 steps (R. T. Rockafellar, SIAM J. Control Optim. 14 (1976) 877), :math:`z_{k+1} = z_k + \sigma (f_r
 + \Phi_r^T \lambda_{k+1})`, each of them one complementarity problem with :math:`C + \sigma \Phi_r
-\Phi_r^T`.  The rotation about the axis, which smooth faces of revolution do not hold, is left out.
+\Phi_r^T`.  Rotations about the axis, which smooth faces of revolution do not hold, are left out.
 Nor is the tilt of a ball in its seat held: there the facets of a mesh leave some 1e-5 of the force,
 and the needle creeps.
 """
@@ -79,8 +79,8 @@ def settle_at_rest(
     stiff = float(np.mean(np.diag(model.compliance)))
     sigma = _SOFTER * stiff / largest if largest > 0.0 else 0.0
     scale = float(np.linalg.norm(force)) or 1.0
-    spin = _spin(model, rigid)
-    force = force - spin * (spin @ force)
+    spin = _spins(model)
+    force = force - spin.T @ (spin @ force)
     left, before, stalled = np.inf, np.inf, 0
     walls = _Walls.none()
     lam = np.zeros(points)
@@ -90,8 +90,8 @@ def settle_at_rest(
         walls = walls.with_present(bore, state.q)
         rows, gap, local = _rows(model, bore, gaps(), walls)
         active = np.append(active, np.zeros(len(rows) - len(active), dtype=bool))
-        turned = rows @ (spin * (spin @ state.q))
-        rows -= np.outer(rows @ spin, spin)
+        turned = rows @ (spin.T @ (spin @ state.q))
+        rows -= (rows @ spin.T) @ spin
         given = soft * force + np.where(rigid, state.q + sigma * force, 0.0)
         seen = rows @ given + turned
         answer = soft + np.where(rigid, sigma, 0.0)
@@ -120,14 +120,15 @@ def settle_at_rest(
     shaft_pressed(bore, state)
 
 
-def _spin(model: InterfaceModel, rigid: NDArray[np.bool_]) -> Vector:
-    """Unit modal direction of the rotation about the axis; zero without one."""
+def _spins(model: InterfaceModel) -> NDArray[np.float64]:
+    """Unit modal directions of the rotation of each body about the axis; zero without one."""
     turn = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1e3])
-    mine = rigid & (model.owner == 0)
-    q = rigid_coordinates(model.rigid[:, mine], turn)
-    spin = np.zeros(model.mode_count)
-    spin[mine] = q / (float(np.linalg.norm(q)) or 1.0)
-    return spin
+    spins = np.zeros((len(model.moving), model.mode_count))
+    for spin, body in zip(spins, model.moving, strict=True):
+        own = model.rigid_of(body.number)
+        q = rigid_coordinates(body.rigid[:, own], turn)
+        spin[own] = q / (float(np.linalg.norm(q)) or 1.0)
+    return spins
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from klack.arrays import Index, Vector
+from klack.contact.gap_update import ABOVE, BELOW, Pairing
 from klack.contact.step_constants import NO_LAW
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.machine.compiling.jit import of_one_kind
@@ -81,7 +82,7 @@ from klack.transient.placed_bodies import (
     shaft_pressed,
     surely_unguided,
 )
-from klack.transient.placed_gaps import FRESH, GapCourse, PlacedGaps
+from klack.transient.placed_gaps import FRESH, GapCourse, PlacedGaps, gap_course
 from klack.transient.ring_arcs import ArcWatch, RingArcs
 from klack.transient.side_forces import SideForces
 from klack.transient.spatial_kernel import film_changes, repair
@@ -128,22 +129,28 @@ class SpatialValve:
     ----------
     model
         Of all bodies, the needle first, at the placement of the meshes (q = 0 is displacement 0 of
-        the network).  Faces stay elastic and have no layer of asperities.
+        the network).  Further bodies may move too.  Faces stay elastic and have no layer of
+        asperities.
     components
         Of each of ``model.bodies``.
     stops
-        Component at each of ``model.contacts``; at most one below and one above.
+        Component at each of ``model.contacts``.
     arms (contacts, 3) [m]
         Middle of each contact from the centre of mass of the needle; with ``gaps``.
+    guided
+        At each height of the guide the body whose shaft it holds, among those that move; by default
+        the needle everywhere.
     gaps
-        Exact ones at a rigid placement of the needle; by default they stay linear.
+        Exact ones at rigid placements of the bodies that move; by default they stay linear.
     course
-        Of these gaps; computed by default.
+        Of these gaps; computed by default, for one body that moves.
+    pairings
+        Bodies of each contact; by default the needle and one that is held.
     placement (6,) [m], [rad]
         Of the needle at the start: translation of its centre of mass and rotation vector, beside
-        the axial displacement in the network.
+        the axial displacement in the network; then perhaps those of the further bodies.
     velocity (6,) [m/s], [rad/s]
-        At the start, beside that in the network.
+        At the start, beside that in the network; likewise.
     films
         Lands of the squeeze films of stops.
     bearing
@@ -159,8 +166,10 @@ class SpatialValve:
     stops: tuple[str, ...]
     arms: Vector = field(default_factory=lambda: np.zeros((1, 3)))
     guide: Guide | None = None
+    guided: tuple[int, ...] = ()
     gaps: Gaps | None = None
     course: GapCourse | None = None
+    pairings: tuple[Pairing, ...] = ()
     placement: Vector = field(default_factory=lambda: np.zeros(6))
     velocity: Vector = field(default_factory=lambda: np.zeros(6))
     films: tuple[TiltingFilm, ...] = ()
@@ -215,7 +224,8 @@ class _Moving:
     def __init__(self, valve: SpatialValve, network: CompiledNetwork, sizes: StepSizes) -> None:
         self.valve, self.network, self.sizes = valve, network, sizes
         self.arrays = network.arrays
-        self.path = SpatialPath()
+        self.paths = [SpatialPath() for _ in valve.model.moving]
+        self.path = self.paths[0]
         self.arcs = None if valve.arcs is None else ArcWatch(valve.arcs)
         model = valve.model
         self.model, self.ports = model, len(network.ports)
@@ -262,9 +272,12 @@ class _Moving:
         self.apart = self.state._replace(
             lam=np.zeros(0), contact=ActiveSet.none(0), rubbing=Rubbing.none(0, 0)
         )
-        self.rigid_count = int(np.sum((model.owner == 0) & (model.omega == 0)))
-        reach = float(np.max(np.linalg.norm(valve.arms, axis=1)))
-        self.gaps = PlacedGaps(model, self.rigid_count, valve.gaps, valve.course, reach)
+        course = valve.course
+        if course is None and valve.gaps is not None:
+            course = gap_course(valve.gaps, float(np.max(np.linalg.norm(valve.arms, axis=1))))
+        sides = [np.sum(model.axial[a:b]) for _, a, b in model.contacts]
+        self.pairs = valve.pairings or tuple(ABOVE if side > 0.0 else BELOW for side in sides)
+        self.gaps = PlacedGaps(model, valve.gaps, self.pairs, course)
         self.gap0 = self.gaps.values
         self.flags = np.zeros(3)  # see the names above
         self.order = [
@@ -284,15 +297,16 @@ class _Moving:
         self.march = of_one_kind(march), of_one_kind(march)  # without points and with them
         self.march_near, self.margin = of_one_kind(march_near), _MARGIN
         if not model.ways:
-            self.near = near_points(model, self.rigid_count)
+            self.near = near_points(model, len(model.rigid_of(0)))
 
     # ------------------------------------------------------------------ start
 
     def start(self, balance: Callable[[Vector], StaticStart] | None) -> StaticStart | None:
         self.read()
-        shapes = self.model.rigid[:, : self.rigid_count]
-        self.q[: self.rigid_count] += rigid_coordinates(shapes, self.valve.placement)
-        self.v[: self.rigid_count] += rigid_coordinates(shapes, self.valve.velocity)
+        for what, given in (self.q, self.valve.placement), (self.v, self.valve.velocity):
+            for body, here in zip(self.model.moving, given.reshape(-1, 6), strict=False):
+                own = self.model.rigid_of(body.number)
+                what[own] += rigid_coordinates(body.rigid[:, own], here)
         self.take_gaps()
         self.sides.place(self.q)
         rests = balance is not None and not np.any(self.v)
@@ -310,7 +324,8 @@ class _Moving:
         here = slice(0, self.ports)
         for row in (Y0, Y1, SEEN):
             self.at[row:][here] = self.P.T @ self.q
-        self.path.clear()
+        for path in self.paths:
+            path.clear()
         return begun
 
     def _settle(self, balance: Callable[[Vector], StaticStart]) -> StaticStart | None:
@@ -364,7 +379,8 @@ class _Moving:
         self._silence_interfaces()
         self.read()
         self.sides.place(self.q)
-        self.path.clear()
+        for path in self.paths:
+            path.clear()
         self.impacts.resume()
 
     def _silence_interfaces(self) -> None:
@@ -380,7 +396,7 @@ class _Moving:
         for c, (_, a, b) in enumerate(self.model.contacts):
             self.stops.force[c] = abs(float(self.model.axial[a:b] @ self.state.lam[a:b]))
             self.stops.closed[c] = -np.inf if np.any(self.state.lam[a:b] > 0.0) else np.nan
-        self.flags[_AT_REST] = float(not bool(np.all(np.isnan(self.stops.closed))))
+        self.flags[_AT_REST] = float(self._all_on(~np.isnan(self.stops.closed)))
         if self.model.ways:
             lie_without_friction(self.model, self.state.rubbing, self.state.lam)
         self._take_carrying()
@@ -395,23 +411,33 @@ class _Moving:
 
     def channels(self, time: Vector) -> dict[str, ChannelData]:
         """Lateral displacement of the axis of the needle, and the forces of the guide."""
-        path, needle = self.path, self.valve.components[0]
-        at = path.position_at(time)
-        arm = float(self.valve.arms[np.argmax(self.stops.side), 2])  # of its lower end
-        slope = np.column_stack([at[:, 4], -at[:, 3]])
-        place = at[:, :2] + arm * slope
-        told = {}
-        for i, name in enumerate(("x", "y")):
-            told[f"{needle} {name}"] = ChannelData(unit="m", values=place[:, i])
-            told[f"{needle} tilt {name}"] = ChannelData(unit="rad", values=slope[:, i])
-        for k, height in enumerate(self.bore.heights):
-            force = np.interp(time, path.time, path.guide_force[:, k])
-            told[f"guide {k + 1} force"] = ChannelData(unit="N", values=force)
-            arm = float(height - self.model.centre[2])
-            here = self.bore.offset[k] + at[:, :2] + arm * slope
-            for i, name in enumerate(("x", "y")):
-                told[f"guide {k + 1} {name}"] = ChannelData(unit="m", values=here[:, i])
+        told: dict[str, ChannelData] = {}
+        guided = self.valve.guided or (0,) * len(self.bore.heights)
+        for number, (body, path) in enumerate(zip(self.model.moving, self.paths, strict=True)):
+            name = self.valve.components[body.number]
+            at = path.position_at(time)
+            arm = self._lower_end(number)
+            slope = np.column_stack([at[:, 4], -at[:, 3]])
+            place = at[:, :2] + arm * slope
+            for i, way in enumerate(("x", "y")):
+                told[f"{name} {way}"] = ChannelData(unit="m", values=place[:, i])
+                told[f"{name} tilt {way}"] = ChannelData(unit="rad", values=slope[:, i])
+            own = [k for k, holds in enumerate(guided) if holds == number]
+            for count, k in enumerate(own, 1):
+                guide = f"{name} guide {count}" if number else f"guide {count}"
+                force = np.interp(time, self.path.time, self.path.guide_force[:, k])
+                told[f"{guide} force"] = ChannelData(unit="N", values=force)
+                arm = float(self.bore.heights[k] - body.centre[2])
+                here = self.bore.offset[k] + at[:, :2] + arm * slope
+                for i, way in enumerate(("x", "y")):
+                    told[f"{guide} {way}"] = ChannelData(unit="m", values=here[:, i])
         return told | self._side_channels(time)
+
+    def _lower_end(self, number: int) -> float:
+        """Height of the first contact below a body, else of the first one, from its centre [m]."""
+        own = [c for c, pair in enumerate(self.pairs) if pair.mover == number]
+        below = [c for c in own if self.pairs[c].is_upper]
+        return float(self.valve.arms[(below or own)[0], 2]) if own else 0.0
 
     def _side_channels(self, time: Vector) -> dict[str, ChannelData]:
         told = {}
@@ -712,7 +738,7 @@ class _Moving:
         """
         longest = 1
         films = self.films
-        wet = films is not None and len(films.room) > 0
+        wet = films is not None and len(films.room) > 0 and bool(np.all(films.bearing > 0.0))
         clear = points or (
             self._off_the_wall(H) if wet else surely_unguided(self.model, self.bore, self.state, H)
         )
@@ -762,6 +788,7 @@ class _Moving:
                 keep_points=n > 0,
                 films=len(self.squeezed),
                 modes=self.model.mode_count,
+                stops=len(self.order),
             )
         record = self.records[count, points]
         touching = self.nothing
@@ -805,14 +832,24 @@ class _Moving:
     # ------------------------------------------------------------------ rest
 
     def _rests(self, clock: Index) -> bool:
-        """Whether the needle lies long and steadily enough on a stop."""
+        """Whether all bodies lie long and steadily enough on a stop."""
         if self.flags[_AT_REST]:
             return True
         long = float(clock[0]) - self.stops.closed >= self.rest
-        if self.sizes.coarse > 1 and np.any(long) and self.flags[_STEADILY]:
+        if self.sizes.coarse > 1 and self._all_on(long) and self.flags[_STEADILY]:
             self._rest_on(rest=True)
             return True
         return False
+
+    def _all_on(self, stops: NDArray[np.bool_]) -> bool:
+        """Whether each body that moves is on one of these stops at least."""
+        on = {
+            number
+            for pair, is_on in zip(self.pairs, stops, strict=True)
+            if is_on
+            for number in (pair.mover, pair.other)
+        }
+        return on.issuperset(range(len(self.model.moving)))
 
     def _steady(self, before: Vector) -> None:
         scale = np.maximum(np.abs(before), np.abs(self.stops.force))
@@ -821,9 +858,9 @@ class _Moving:
 
     def _still(self, record: Record) -> bool:
         """Whether a long step met nothing that it cannot resolve."""
-        total, before = abs(float(record.force[0])), float(np.sum(self.stops.force))
-        steady = abs(total - before) <= _STEADY * max(abs(total), abs(before))
-        return steady and bool(self.state.contact.counts[0] > 0)
+        now, before = np.abs(record.stops[0, :, 0]), self.stops.force
+        steady = np.abs(now - before) <= _STEADY * np.maximum(now, np.abs(before))
+        return bool(np.all(steady)) and bool(self.state.contact.counts[0] > 0)
 
     def _take_carrying(self) -> None:
         """Let the points with a force carry, as in a stored state."""
@@ -854,14 +891,10 @@ class _Moving:
     # ------------------------------------------------------------------ records
 
     def _tell_path(self, steps: int) -> None:
-        rigid = self.model.rigid
-        self.path.add(
-            steps * self.sizes.step,
-            rigid @ self.q,
-            rigid @ self.v,
-            self.state.guide_force,
-            self.sides.now(self.q, steps * self.sizes.step),
-        )
+        time = steps * self.sizes.step
+        across = self.state.guide_force, self.sides.now(self.q, time)
+        for body, path in zip(self.model.moving, self.paths, strict=True):
+            path.add(time, body.rigid @ self.q, body.rigid @ self.v, *across)
 
     # ------------------------------------------------------------------ state
 

@@ -86,18 +86,18 @@ class TiltingFilm:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BearingFilm:
-    """Film at each height of a guide, a short bearing.
+    """Film at each height of the guides, a short bearing; one number is that of all heights.
 
     Parameters
     ----------
     length [m]
-        Along the axis.
+        Along the axis; 0 without a film.
     cut_off [m]
         Height that the roughness leaves.
     """
 
-    length: float
-    cut_off: float
+    length: float | Floats
+    cut_off: float | Floats
 
     def arrays(self, guide: Guide, viscosity: float) -> tuple[Floats, Floats]:
         """``mu L^3 R / c^2`` [N s] and clearance with the cut-off [m] at each height."""

@@ -30,7 +30,7 @@ from klack.case.guide import CaseGuide, LinearGuideLaw
 from klack.case.schema import Case
 from klack.contact.face_friction import FaceFriction
 from klack.contact.friction import Friction
-from klack.contact.gap_update import PlacedGaps, RigidGaps
+from klack.contact.gap_update import ABOVE, BELOW, PlacedGaps, RigidGaps
 from klack.contact.mortar import ContactSpace, tangent_rows
 from klack.contact.pressure_limit import PressureLimit
 from klack.contact.restitution import ImpactMeasures, measure_impact
@@ -285,10 +285,10 @@ def exact_gaps(problem: ContactProblem) -> PlacedGaps:
     below = (pair.lower.mesh, pair.lower_surface)
     seat = RigidGaps.of(problem.space, *here, *below, centre=centre, form=pair.form)
     if above is None:
-        return PlacedGaps((seat,), (True,))
+        return PlacedGaps((seat,), (ABOVE,))
     there = (above.body.mesh, above.surface)
     stop = RigidGaps.of(above.space, *there, pair.upper.mesh, above.moving_surface, centre=centre)
-    return PlacedGaps((seat, stop), (True, False))
+    return PlacedGaps((seat, stop), (ABOVE, BELOW))
 
 
 def _kept(

@@ -1,7 +1,7 @@
 """One stroke of many."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from klack.analyses.stroke.run import VariantRun, one_variant, study_of_run
 from klack.analyses.stroke_shots.record import StopColumns, StrokeColumns
 from klack.analyses.unfinished import LogForm, UnfinishedLog, fingerprint
 from klack.assembling.body_summary import BodySummary
-from klack.assembling.spatial import placement_of, seat_height
+from klack.assembling.spatial import drawn_beside, placement_of, seat_height
 from klack.assembling.valve import Valve
 from klack.case.levels import Variant
 from klack.case.shots import StrokeShots
@@ -33,6 +33,7 @@ from klack.machine.stages import collected_warnings
 from klack.mesh.rigid import rigid_placement
 from klack.simulation.network_result import ImpactEvent, NetworkResult
 from klack.simulation.spatial_impact import SpatialPath
+from klack.transient.interface_arrays import Guide
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.spatial_run import SpatialValve
 
@@ -71,7 +72,7 @@ class StrokeStart:
         Slope of that axis, towards x and y.
     placement (6,) [m], [rad]
         The same as translation of the centre of mass and rotation vector, with the turn about the
-        axis that friction in guides leaves.
+        axis that friction in guides leaves; then those of the bodies that move beside the needle.
     friction [-]
         Coulomb's coefficient in the guide.
     contact_friction [-]
@@ -91,13 +92,14 @@ class Starts:
     """Draws the starts of the strokes of a case.
 
     ``height`` [m] is that of the seat in the drawing of the needle, ``centre`` (3,) [m] its centre
-    of mass there.
+    of mass there; ``beside`` names the bodies that move beside it, with theirs.
     """
 
     case: ValveCase
     seed: int
     height: float
     centre: Vector
+    beside: Mapping[str, Vector] = field(default_factory=dict)
 
     @classmethod
     def of(cls, valve: Valve, needle: str, seed: int) -> "Starts":
@@ -107,6 +109,11 @@ class Starts:
             seed=seed,
             height=seat_height(valve.contacts, needle),
             centre=valve.bodies[needle].centre_in_space,
+            beside={
+                name: body.centre_in_space
+                for name, body in valve.bodies.items()
+                if name != needle and not body.is_fixed
+            },
         )
 
     def drawn(self, index: int) -> StrokeStart:
@@ -153,14 +160,22 @@ class Starts:
         about = np.array([0.0, 0.0, self.height])
         placement = rigid_placement(aside, lean, about, self.centre)
         placement[5] = turn
+        seed = None if index == CENTRED else [self.seed, index]
+        others = [self._drawn_beside(name, seed) for name in self.beside]
         return StrokeStart(
             index=index,
             aside=aside,
             lean=lean,
-            placement=placement,
+            placement=np.concatenate([placement, *others]),
             friction=friction,
             contact_friction=self.contact_friction(index),
         )
+
+    def _drawn_beside(self, name: str, seed: Sequence[int] | None) -> Vector:
+        centre = self.beside[name]
+        at = float(centre[2])
+        placed = drawn_beside(self.case, name, at, seed)
+        return rigid_placement(*placed, np.array([0.0, 0.0, at]), centre)
 
 
 def shots_of_valve(case: ValveCase) -> StrokeShots:
@@ -245,8 +260,12 @@ class StrokeOutcome:
 def run_one_stroke(setup: StrokeSetup, task: StrokeTask) -> StrokeOutcome:
     """Compute and measure one stroke, on one thread."""
     start, spatial = task.start, setup.spatial
-    guide = None if spatial.guide is None else spatial.guide.with_friction(start.friction)
-    spatial = replace(spatial, placement=start.placement, guide=guide, model=_faces(spatial, start))
+    spatial = replace(
+        spatial,
+        placement=start.placement,
+        guide=_guide(spatial, start.friction),
+        model=_faces(spatial, start),
+    )
     valve = replace(setup.valve, spatial=spatial)
     with collected_warnings() as doubts, threadpool_limits(limits=1, user_api="blas"):
         try:
@@ -256,9 +275,12 @@ def run_one_stroke(setup: StrokeSetup, task: StrokeTask) -> StrokeOutcome:
         energies, notes = _energies(valve, setup, task.variant, run)
     result = run.variant.result
     path = result.path or SpatialPath()
+    paths = result.paths or (path,)
     stops = {
-        stop: _stop_numbers(run.variant, stop, path, float(arm[2]), above=stop != _lower(spatial))
-        for stop, arm in zip(spatial.stops, spatial.arms, strict=True)
+        stop: _stop_numbers(
+            run.variant, stop, paths[pair.mover], float(arm[2]), above=not pair.is_upper
+        )
+        for stop, arm, pair in zip(spatial.stops, spatial.arms, spatial.pairings, strict=True)
     }
     begun = result.start.notes if result.start is not None else ()
     rest = rest_note(task.variant, result, setup.roles.seat)
@@ -274,6 +296,15 @@ def run_one_stroke(setup: StrokeSetup, task: StrokeTask) -> StrokeOutcome:
         failure=" ".join(str(run.failure).split()) if run.failure is not None else "",
         doubts=tuple(dict.fromkeys([*doubts, *notes, *begun, *filter(None, (rest, unrest))])),
     )
+
+
+def _guide(spatial: SpatialValve, friction: float) -> Guide | None:
+    """Guides with this friction coefficient [-] at the heights of the needle."""
+    guide = spatial.guide
+    if guide is None:
+        return None
+    own = np.array(spatial.guided) == 0
+    return guide._replace(friction=np.where(own, friction, guide.friction))
 
 
 def _faces(spatial: SpatialValve, start: StrokeStart) -> InterfaceModel:
@@ -375,11 +406,6 @@ def _unrest(setup: StrokeSetup, result: NetworkResult, path: SpatialPath) -> str
 
 
 # --------------------------------------------------------------------------- first impact
-
-
-def _lower(spatial: SpatialValve) -> str:
-    side = [float(np.sum(spatial.model.axial[a:b])) for _, a, b in spatial.model.contacts]
-    return next((s for s, up in zip(spatial.stops, side, strict=True) if up > 0.0), "")
 
 
 def _stop_numbers(

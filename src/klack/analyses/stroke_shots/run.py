@@ -116,7 +116,7 @@ def run_stroke_shots(
         opening_stop=roles.opening_stop,
         guide=guide_in_words(case.guide),
         distributions=_distributions(case),
-        largest_eccentricity=_largest(case, setup.spatial, starts),
+        largest_eccentricity=_largest(case, setup.spatial),
         mass=next(body.mass for body in setup.bodies if body.name == _body(case, roles)),
         points={name: b - a for name, a, b in setup.spatial.model.contacts},
         variants=found,
@@ -280,14 +280,15 @@ def _require_some(found: Mapping[str, VariantShots]) -> None:
             )
 
 
-def _largest(case: ValveCase, spatial: SpatialValve, starts: Starts) -> dict[str, float]:
-    if case.guide is None:
-        return {}
-    heights = {
-        stop: float(starts.centre[2] + arm[2])
-        for stop, arm in zip(spatial.stops, spatial.arms, strict=True)
-    }
-    return {stop: case.guide.largest_eccentricity(z) for stop, z in heights.items()}
+def _largest(case: ValveCase, spatial: SpatialValve) -> dict[str, float]:
+    found = {}
+    for stop, arm, pair in zip(spatial.stops, spatial.arms, spatial.pairings, strict=True):
+        body = spatial.model.moving[pair.mover]
+        name = spatial.model.bodies[body.number]
+        guide = case.guides.get(name) if pair.mover else case.guide
+        if guide is not None:
+            found[stop] = guide.largest_eccentricity(float(body.centre[2] + arm[2]))
+    return found
 
 
 def _distributions(case: ValveCase) -> dict[str, str]:

@@ -1,0 +1,149 @@
+"""Two bodies that move in three dimensions, and stops between any two of them.
+
+Truth: momentum and its moment of both bodies; the loop along the axis where they are centred; an
+independent integrator of the rigid bodies on their springs; the energy balance.
+"""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from klack.mechanics.force import ForceOverTime
+from klack.mechanics.spring import Spring
+from tests.spatial_needle import move
+from tests.two_masses import (
+    APART,
+    COUNT,
+    INERTIAS,
+    MASSES,
+    STIFFNESS,
+    bores,
+    model,
+    rows,
+    valve,
+)
+
+DRIVEN = {
+    "needle.top": Spring(stiffness=10e3, preload=12.0),
+    "armature.pole": ForceOverTime(time=(0.0, 1e-6, 250e-6, 251e-6), force=(0.0, 45.0, 45.0, 0.0)),
+}
+
+
+def momenta(velocity):
+    """Momentum and its moment about the centre of mass of the needle, of each body."""
+    v, spin = velocity[:, :3], velocity[:, 3:]
+    p = MASSES[:, None] * v
+    places = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, APART]])
+    return p, INERTIAS * spin + np.cross(places, p)
+
+
+def test_a_hit_of_one_on_the_other_keeps_momentum_and_its_moment():
+    """A tilted needle strikes the armature with its collar; nothing else acts."""
+    placed = np.array([0.0, 0.0, 0.0, 2e-4, -4e-4, 0.0])
+    speeds = np.array([[0.01, -0.02, -0.5, 1.0, 2.0, 0.5], [0.0, 0.015, 0.1, -1.0, 0.5, 0.0]])
+    given = speeds.copy()
+    given[:, 2] = 0.0  # the network has it
+    run, moving = moved(
+        rows({}, speeds=(-0.5, 0.1), apart=1e-3),
+        valve(placement=placed, velocity=given.ravel()),
+        80e-6,
+    )
+    assert {event.stop for event in run.events} == {"driver"}
+    after = np.array([path.velocity[-1] for path in moving.paths])
+    change = [
+        after_ - before for after_, before in zip(momenta(after), momenta(speeds), strict=True)
+    ]
+    for part, before in zip(change, momenta(after), strict=True):
+        exchanged = np.abs(part).max()
+        assert exchanged > 1e-7
+        assert np.abs(part.sum(axis=0)).max() < 1e-10 * np.abs(before).max()
+
+
+def moved(network, spatial, duration, **more):
+    """The run, and its bodies."""
+    kept = []
+
+    class Told:
+        def of(self, *args):
+            kept.append(spatial.of(*args))
+            return kept[-1]
+
+    run = move(network, Told(), duration, **more)
+    return run, kept[0]
+
+
+@pytest.mark.slow
+def test_a_centred_stroke_is_the_axial_one():
+    """Equal springs under rings: the law along the axis is their sum."""
+    runs = [move(rows(DRIVEN), v, 900e-6, step=5e-9) for v in (None, valve(guide=bores(model())))]
+
+    axial, spatial = (run.events for run in runs)
+    assert [event.stop for event in axial[:4]] == [event.stop for event in spatial[:4]]
+    assert {event.stop for event in axial} == {"seat", "driver", "stop"}
+    for one, other in zip(axial[:3], spatial[:3], strict=True):
+        assert other.time == pytest.approx(one.time, abs=50e-9)
+        assert other.peak_force == pytest.approx(one.peak_force, rel=1e-3)
+        assert other.restitution == pytest.approx(one.restitution, abs=1e-3)
+    for name in ("needle x", "armature x", "needle tilt y", "armature tilt y"):
+        assert np.abs(runs[1].channels[name].values).max() < 1e-12, name
+
+
+def test_a_tilted_chain_is_that_of_another_integrator():
+    """Seat, driver and stop in turn, both bodies off their axes, by DOP853."""
+    made = model()
+    placed = np.array([[0, 0, 0, 1e-4, -2e-4, 0], [0, 0, 0, -2e-4, 1e-4, 0.0]])
+    run, moving = moved(
+        rows({}, speeds=(0.1, 0.6), apart=20e-6),
+        valve(placement=placed.ravel()),
+        110e-6,
+        step=5e-9,
+        start="free",
+    )
+    speeds = np.array([[0, 0, 0.1, 0, 0, 0], [0, 0, 0.6, 0, 0, 0]])
+    q0, v0 = (
+        np.concatenate(
+            [
+                np.linalg.solve(body.rigid[:, made.rigid_of(body.number)], here)
+                for body, here in zip(made.moving, given, strict=True)
+            ]
+        )
+        for given in (placed, speeds)
+    )
+    gap = made.gap + np.repeat([20e-6, 0.0, 0.0], COUNT)
+
+    def rates(_, y):
+        q, v = y[:12], y[12:]
+        force = STIFFNESS * np.maximum(-(gap + made.traces @ q), 0.0)
+        return np.concatenate([v, made.traces.T @ force])
+
+    truth = solve_ivp(
+        rates, (0, 110e-6), np.concatenate([q0, v0]), "DOP853", rtol=1e-11, atol=1e-16,
+        max_step=20e-9, dense_output=True,
+    )  # fmt: skip
+    at = truth.sol(np.linspace(0, 110e-6, 22001))
+    force = STIFFNESS * np.maximum(-(gap[:, None] + made.traces @ at[:12]), 0.0)
+    for k, stop in enumerate(("seat", "driver", "stop")):
+        peak = force[k * COUNT : (k + 1) * COUNT].sum(axis=0).max()
+        told = run.interfaces[stop].contact_force
+        assert (told.max() if len(told) else 0.0) == pytest.approx(peak, rel=2e-4, abs=1e-9), stop
+    for body, path in zip(made.moving, moving.paths, strict=True):
+        after = body.rigid @ truth.y[:12, -1]
+        scale = np.array([1e-6, 1e-6, 1e-5, 1e-4, 1e-4, 1e-4])
+        np.testing.assert_allclose(path.position[-1] / scale, after / scale, atol=3e-4)
+    assert abs(run.books.residual) < 1e-11 * run.books.scale
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("coarse", [1, None])
+def test_energy_of_a_leaning_stroke_closes(coarse):
+    made = model()
+    placed = np.array([[1e-7, -5e-8, 0, 2e-5, 3e-5, 0], [1e-7, 1e-7, 0, -1e-4, 1e-4, 0.0]])
+    run = move(
+        rows(DRIVEN, arms=(1e-4, 2e-4)),
+        valve(placement=placed.ravel(), guide=bores(made, friction=0.1), guided=(0, 0, 1, 1)),
+        1200e-6,
+        coarse=coarse,
+    )
+    assert {event.stop for event in run.events} == {"seat", "driver", "stop"}
+    assert run.channels["armature guide 1 force"].values.max() > 0.1
+    assert abs(run.books.residual) < 1e-10 * run.books.scale
