@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+from spatial_needle import ring
 
 from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.contact.gap_update import Pairing
@@ -20,7 +21,6 @@ from klack.transient.interface_arrays import Guide
 from klack.transient.interface_model import InterfaceModel, MovingBody
 from klack.transient.spatial_run import SpatialValve
 from klack.verification.interface_bodies import lateral_guide, modal_model
-from tests.spatial_needle import ring
 
 MASSES = np.array([3e-3, 2e-3])
 INERTIAS = np.array([[2.4e-7, 2.3e-7, 6e-9], [3e-8, 3.2e-8, 5e-8]])
@@ -52,8 +52,8 @@ def along(number: int, arms: np.ndarray) -> np.ndarray:
     return R[2] + np.outer(arms[:, 1], R[3]) - np.outer(arms[:, 0], R[4])
 
 
-def model(turn: float = 0.1) -> InterfaceModel:
-    """Contact points of the three stops."""
+def model(apart: float = 0.0, turn: float = 0.1) -> InterfaceModel:
+    """Contact points of the three stops, the needle ``apart`` [m] from its seat."""
     seat = ring(COUNT, 0.9e-3, SEAT, turn)
     driver = ring(COUNT, 2e-3, COLLAR, 2 * turn)
     stop = ring(COUNT, 3e-3, APART + TOP, 3 * turn)
@@ -66,7 +66,7 @@ def model(turn: float = 0.1) -> InterfaceModel:
         omega=np.zeros(12),
         traces=traces,
         compliance=np.eye(3 * COUNT) / STIFFNESS,
-        gap=np.repeat([0.0, FREE, LIFT], COUNT),
+        gap=np.repeat([apart, FREE, LIFT], COUNT),
         axial=np.repeat([1.0, 1.0, -1.0], COUNT),
         contacts=tuple(
             (name, k * COUNT, (k + 1) * COUNT) for k, name in enumerate(("seat", "driver", "stop"))
@@ -155,9 +155,9 @@ def bores(of: InterfaceModel, **more: object) -> Guide:
     return Guide(*(np.concatenate(part) for part in zip(*found, strict=True)))
 
 
-def valve(**more: object) -> SpatialValve:
+def valve(*, apart: float = 0.0, **more: object) -> SpatialValve:
     """In three dimensions, without guides."""
-    made = model()
+    made = model(apart)
     arms = np.array([[0.0, 0.0, SEAT], [0.0, 0.0, COLLAR], [0.0, 0.0, TOP]])
     given = {
         "model": made,
@@ -167,3 +167,22 @@ def valve(**more: object) -> SpatialValve:
         "pairings": PAIRS,
     }
     return SpatialValve(**(given | more))
+
+
+def sleeve(of: InterfaceModel, **more: object) -> Guide:
+    """Two heights at which the armature slides on the needle, with 5 um of clearance."""
+    given = {"clearance": 5e-6, "stiffness": 3e7, "radius": -1.5e-3} | more
+    heights, offset = np.array([2e-3, 6.5e-3]), [(0.0, 0.0)] * 2
+    needle, armature = (
+        lateral_guide(
+            replace(of, rigid=body.rigid),
+            **(given | {"heights": heights - body.centre[2], "offset": offset}),
+        )
+        for body in of.moving
+    )
+    return armature._replace(
+        heights=heights,
+        traces=armature.traces - needle.traces,
+        slide=armature.slide - needle.slide,
+        turn=armature.turn - needle.turn,
+    )

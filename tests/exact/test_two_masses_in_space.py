@@ -7,11 +7,8 @@ independent integrator of the rigid bodies on their springs; the energy balance.
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-
-from klack.mechanics.force import ForceOverTime
-from klack.mechanics.spring import Spring
-from tests.spatial_needle import move
-from tests.two_masses import (
+from spatial_needle import move
+from two_masses import (
     APART,
     COUNT,
     INERTIAS,
@@ -20,8 +17,12 @@ from tests.two_masses import (
     bores,
     model,
     rows,
+    sleeve,
     valve,
 )
+
+from klack.mechanics.force import ForceOverTime
+from klack.mechanics.spring import Spring
 
 DRIVEN = {
     "needle.top": Spring(stiffness=10e3, preload=12.0),
@@ -45,7 +46,7 @@ def test_a_hit_of_one_on_the_other_keeps_momentum_and_its_moment():
     given[:, 2] = 0.0  # the network has it
     run, moving = moved(
         rows({}, speeds=(-0.5, 0.1), apart=1e-3),
-        valve(placement=placed, velocity=given.ravel()),
+        valve(apart=1e-3, placement=placed, velocity=given.ravel()),
         80e-6,
     )
     assert {event.stop for event in run.events} == {"driver"}
@@ -57,6 +58,38 @@ def test_a_hit_of_one_on_the_other_keeps_momentum_and_its_moment():
         exchanged = np.abs(part).max()
         assert exchanged > 1e-7
         assert np.abs(part.sum(axis=0)).max() < 1e-10 * np.abs(before).max()
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_a_body_that_slides_on_another_gives_it_what_it_takes(friction):
+    """Nothing else touches: the armature rattles on its needle, turns it and brakes it."""
+    made = model()
+    speeds = np.array([[0.0, 0.0, 0.2, 0.0, 0.0, 0.0], [0.15, -0.1, 0.0, 8.0, 4.0, 2.0]])
+    given = speeds.copy()
+    given[:, 2] = 0.0
+    run, moving = moved(
+        rows({}, speeds=(0.2, 0.0), apart=1e-3),
+        valve(
+            apart=1e-3,
+            guide=sleeve(made, friction=friction),
+            guided=(1, 1),
+            carried=(-1, 0),
+            velocity=given.ravel(),
+        ),
+        100e-6,
+        start="free",
+    )
+    assert not run.events
+    assert run.channels["armature guide 1 force"].values.max() > 1.0
+    after = np.array([path.velocity[-1] for path in moving.paths])
+    for now, before in zip(momenta(after), momenta(speeds), strict=True):
+        assert np.abs(now - before).max() > 1e-8
+        assert np.abs((now - before).sum(axis=0)).max() < 1e-10 * np.abs(before).max()
+    if friction:
+        assert after[0, 2] < 0.2  # the armature is dragged along
+        assert after[1, 2] > 0.0
+        assert run.books.losses["guide friction"] > 1e-3 * run.books.scale
+    assert abs(run.books.residual) < 1e-11 * run.books.scale
 
 
 def moved(network, spatial, duration, **more):
@@ -85,21 +118,24 @@ def test_a_centred_stroke_is_the_axial_one():
         assert other.peak_force == pytest.approx(one.peak_force, rel=1e-3)
         assert other.restitution == pytest.approx(one.restitution, abs=1e-3)
     for name in ("needle x", "armature x", "needle tilt y", "armature tilt y"):
-        assert np.abs(runs[1].channels[name].values).max() < 1e-12, name
+        assert np.abs(runs[1].channels[name].values).max() < 1e-11, name
 
 
 def test_a_tilted_chain_is_that_of_another_integrator():
-    """Seat, driver and stop in turn, both bodies off their axes, by DOP853."""
-    made = model()
+    """Driver and stop carry at the same time, both bodies off their axes, by DOP853.
+
+    Second order in the step: 20 times less at 2.5 than at 10 ns.
+    """
+    made = model(apart=20e-6)
     placed = np.array([[0, 0, 0, 1e-4, -2e-4, 0], [0, 0, 0, -2e-4, 1e-4, 0.0]])
+    speeds = np.array([[0, 0, 0.3, 0, 0, 0], [0, 0, 0.9, 0, 0, 0]])
     run, moving = moved(
-        rows({}, speeds=(0.1, 0.6), apart=20e-6),
-        valve(placement=placed.ravel()),
-        110e-6,
+        rows({}, speeds=(0.3, 0.9), apart=20e-6),
+        valve(apart=20e-6, placement=placed.ravel()),
+        150e-6,
         step=5e-9,
         start="free",
     )
-    speeds = np.array([[0, 0, 0.1, 0, 0, 0], [0, 0, 0.6, 0, 0, 0]])
     q0, v0 = (
         np.concatenate(
             [
@@ -109,27 +145,26 @@ def test_a_tilted_chain_is_that_of_another_integrator():
         )
         for given in (placed, speeds)
     )
-    gap = made.gap + np.repeat([20e-6, 0.0, 0.0], COUNT)
 
     def rates(_, y):
-        q, v = y[:12], y[12:]
-        force = STIFFNESS * np.maximum(-(gap + made.traces @ q), 0.0)
-        return np.concatenate([v, made.traces.T @ force])
+        force = STIFFNESS * np.maximum(-(made.gap + made.traces @ y[:12]), 0.0)
+        return np.concatenate([y[12:], made.traces.T @ force])
 
+    end = moving.path.time[-1]
     truth = solve_ivp(
-        rates, (0, 110e-6), np.concatenate([q0, v0]), "DOP853", rtol=1e-11, atol=1e-16,
+        rates, (0, end), np.concatenate([q0, v0]), "DOP853", rtol=1e-11, atol=1e-16,
         max_step=20e-9, dense_output=True,
     )  # fmt: skip
-    at = truth.sol(np.linspace(0, 110e-6, 22001))
-    force = STIFFNESS * np.maximum(-(gap[:, None] + made.traces @ at[:12]), 0.0)
-    for k, stop in enumerate(("seat", "driver", "stop")):
-        peak = force[k * COUNT : (k + 1) * COUNT].sum(axis=0).max()
-        told = run.interfaces[stop].contact_force
-        assert (told.max() if len(told) else 0.0) == pytest.approx(peak, rel=2e-4, abs=1e-9), stop
+    at = truth.sol(np.linspace(0, end, 30001))
+    force = STIFFNESS * np.maximum(-(made.gap[:, None] + made.traces @ at[:12]), 0.0)
+    assert [event.stop for event in run.events] == ["driver", "stop"]
+    for k, stop in enumerate(("driver", "stop")):
+        peak = force[(k + 1) * COUNT : (k + 2) * COUNT].sum(axis=0).max()
+        assert run.interfaces[stop].contact_force.max() == pytest.approx(peak, rel=1e-5), stop
     for body, path in zip(made.moving, moving.paths, strict=True):
-        after = body.rigid @ truth.y[:12, -1]
-        scale = np.array([1e-6, 1e-6, 1e-5, 1e-4, 1e-4, 1e-4])
-        np.testing.assert_allclose(path.position[-1] / scale, after / scale, atol=3e-4)
+        off = path.position[-1] - body.rigid @ truth.y[:12, -1]
+        assert np.abs(off[:3]).max() < 2e-11
+        assert np.abs(off[3:]).max() < 1e-9
     assert abs(run.books.residual) < 1e-11 * run.books.scale
 
 

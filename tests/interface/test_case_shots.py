@@ -232,7 +232,9 @@ SHOTS_STROKE = "shots: {count: 3}"
 
 
 def starts(shots: str = SHOTS_STROKE, seed: int = 1, guide: str = GUIDE) -> Starts:
-    return Starts(case=valve_case(shots, guide=guide), seed=seed, height=HEIGHT, centre=CENTRE)
+    return Starts(
+        case=valve_case(shots, guide=guide), seed=seed, height=HEIGHT, centres={"needle": CENTRE}
+    )
 
 
 def axis_at(start, z: float) -> np.ndarray:
@@ -502,10 +504,6 @@ def read_half(text):
             "an axisymmetric 'housing' and a three-dimensional 'needle'",
         ),
         (HALF.replace("angles: 24", "angles: 5"), "angles: got 5"),
-        (
-            HALF.replace("seat: {between", "seat: {friction: 0.1, between"),
-            "friction between the faces of axisymmetric bodies",
-        ),
     ],
 )
 def test_what_contradicts_itself_is_told_with_its_bodies(text, expected):
@@ -608,3 +606,25 @@ def test_a_forgotten_support_of_a_valve_is_asked_for() -> None:
     assert named != loose
     with pytest.raises(InputError, match=r"bodies.housing: got no key 'fixed'.*"):
         read_any_case(named, Path("case.yaml"))
+
+
+TWO = (CASE.parent / "armature_off_axis.yaml").read_text(encoding="utf-8")
+BORE = "armature: {surface: rim, heights"
+LEDGE = "    fixed: [{surface: bottom}]\n"
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ((BORE, "pole: {surface: rim, heights"), r"guides\.pole: got a guide of 'pole'"),
+        ((BORE, "needle: {surface: rim, heights"), r"guides\.needle.*'guide'"),
+        ((BORE, "armature: {on: pole.bore, surface: rim, heights"), r"guides\.armature\.on"),
+        ((BORE, "armature: {on: armature.rim, surface: rim, heights"), r"guides\.armature\.on"),
+        (("placement: {seed: 3}", "shots: {count: 3, carry: true}"), r"shots\.carry: .*2 bodies"),
+    ],
+)
+def test_what_two_bodies_cannot_have_is_told_before_meshing(change, expected):
+    assert TWO.count(change[0]) == 1, change
+    with pytest.raises(InputError, match=f"(?s){expected}") as caught:
+        read_valve_case(TWO.replace(*change), CASE.parent / "armature_off_axis.yaml")
+    assert "Try:" in str(caught.value)

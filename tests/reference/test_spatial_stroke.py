@@ -412,3 +412,66 @@ def test_a_contact_on_a_few_angles_is_doubted_once():
     watch.see(1, 20.0, many)  # past the peak
     with pytest.warns(AccuracyWarning, match=r"'opening' is so short that 5 of 24 angles .* 39"):
         watch.see(1, 0.0, 0.0 * few)
+
+
+@pytest.mark.slow
+def test_centred_half_sections_rub_as_the_law_along_the_axis_does():
+    """Static loops with friction give that law, of one pressure pattern: so only nearly."""
+    rubs = HALF.replace("placement: {seed: 3}\n", "").replace("400 us,", "185 us,")
+    rubs = rubs.replace("angles: 24", "angles: 8")
+    for force in ("20 N", "40 N"):
+        assert rubs.count(f"force: {force}}}") == 1
+        rubs = rubs.replace(f"force: {force}}}", f"force: {force}, friction: 0.1}}")
+    axial = rubs.replace("motion: three-dimensional\nangles: 8\n", "").replace(GUIDE_HALF, "")
+
+    ours, theirs = (stroke_half(text).reference.result for text in (rubs, axial))
+
+    one, other = ours.events[0], theirs.events[0]
+    assert one.stop == other.stop == "opening"
+    assert one.peak_force == pytest.approx(other.peak_force, rel=1e-2)
+    assert one.restitution == pytest.approx(other.restitution, abs=2e-3)
+    assert ours.books.losses["opening friction"] > 1e-7
+    assert abs(ours.books.relative_residual) < 1e-11
+
+
+CASE_TWO = CASE_HALF.with_name("armature_off_axis.yaml")
+TWO = CASE_TWO.read_text(encoding="utf-8")
+PLACED_TWO = "placement: {seed: 3}\n"
+
+
+def stroke_two(text):
+    return run_stroke(read_valve_case(text, CASE_TWO))
+
+
+@pytest.mark.slow
+def test_two_centred_bodies_make_the_axial_stroke():
+    """The armature strikes the collar, both the stop, off the collar again."""
+    centred = TWO.replace(PLACED_TWO, "").replace("400 us,", "120 us,")
+    guides = centred[centred.index("guide: ") : centred.index("run: ")]
+    axial = centred.replace("motion: three-dimensional\nangles: 16\n", "").replace(guides, "")
+
+    ours, theirs = (stroke_two(text).reference.result for text in (centred, axial))
+
+    assert [e.stop for e in ours.events[:2]] == [e.stop for e in theirs.events[:2]]
+    assert {event.stop for event in theirs.events} == {"driver", "opening"}
+    for one, other in zip(ours.events[:2], theirs.events[:2], strict=True):
+        assert one.time == pytest.approx(other.time, abs=0.05e-6)
+        # laws along the axis have one pressure pattern, and steps are 20 ns here
+        assert one.peak_force == pytest.approx(other.peak_force, rel=4e-3)
+        assert one.restitution == pytest.approx(other.restitution, abs=2e-3)
+    assert abs(ours.books.relative_residual) < 1e-11
+
+
+@pytest.mark.slow
+def test_an_armature_slides_on_its_needle():
+    """Seen from the needle it stays within its clearance; the energy balance closes."""
+    sleeve = "armature: {on: needle.shaft, surface: bore, heights"
+    result = stroke_two(TWO.replace("armature: {surface: rim, heights", sleeve)).reference.result
+    aside = [
+        np.hypot(*(result.channels[f"armature guide {k} {way}"].values for way in "xy"))
+        for k in (1, 2)
+    ]
+    assert 5e-6 < np.max(aside) < 13e-6  # 12 um, and what shaft and bore give
+    assert np.hypot(*(result.channels[f"armature {way}"].values for way in "xy")).max() > 5e-6
+    assert {event.stop for event in result.events[:3]} == {"driver", "opening"}
+    assert abs(result.books.relative_residual) < 1e-11

@@ -1,6 +1,6 @@
 """From a valve case to bodies that meet point by point, with a guide."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import cos, hypot, pi, sin
 from typing import Self
@@ -18,6 +18,7 @@ from klack.bodies.elasticity.eigen import Modes
 from klack.bodies.elasticity.statics import Flexibility
 from klack.bodies.reduction.ports import Port
 from klack.bodies.reduction.reduce import kept_modes
+from klack.case.bodies import BodySurface
 from klack.case.guide import LinearGuideLaw, ValveGuide
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles
@@ -30,8 +31,8 @@ from klack.contact.statics import contact_compliance, extended_compliance
 from klack.errors import InputError
 from klack.hydraulics.film import ConeFilm, DiscFilm, FilmShape, RingFilm
 from klack.hydraulics.tilted_film import SectorFilm, sector_film
-from klack.mesh.rigid import rigid_placement
-from klack.transient.guide import guide_of_shaft
+from klack.mesh.rigid import rigid_placement, rotation_matrix
+from klack.transient.guide import ShaftSection, guide_at_sections, solid_sections
 from klack.transient.interface_arrays import Guide
 from klack.transient.interface_model import (
     InterfaceBody,
@@ -47,10 +48,11 @@ from klack.units import format_si
 __all__ = [
     "Meeting",
     "Movers",
+    "body_guide",
     "build_spatial",
     "check_heights",
-    "drawn_beside",
     "modes_in_network",
+    "placed_bodies",
     "placement_of",
     "seat_height",
     "valve_of_meetings",
@@ -144,15 +146,21 @@ class Movers:
         Of the bodies.
     guides
         Of those that have one.
+    carriers
+        Of each: the body on which it slides, -1 for a fixed bore or none.
+    levers (n, 3) [m]
+        Centre of mass of each from that of its carrier.
     placements (n, 6) [m], [rad]
         At the start.
     farthest
-        Of each: placements that contact points must suffice for, and how far off-axis these are
-        [m].  The first two are along x, the others turned.
+        Of each: placements that contact points must suffice for, as its carrier sees them, and how
+        far off-axis these are [m].  The first two are along x, the others turned.
     """
 
     names: tuple[str, ...]
     guides: Mapping[str, ValveGuide]
+    carriers: tuple[int, ...]
+    levers: Vector
     placements: Vector
     farthest: tuple[tuple[list[Vector], float], ...]
 
@@ -161,28 +169,30 @@ class Movers:
         cls, case: ValveCase, needle: str, bodies: Mapping[str, ElasticBody], height: float
     ) -> Self:
         """Those of a case; ``height`` [m] is that of the seat in the drawing of the needle."""
-        names = [needle, *(n for n in bodies if n != needle and not bodies[n].is_fixed)]
+        centres = {needle: bodies[needle].centre_in_space}
+        centres |= {n: body.centre_in_space for n, body in bodies.items() if not body.is_fixed}
+        names = list(centres)
         guides = dict(case.guides) if case.guide is None else {needle: case.guide, **case.guides}
-        placements, farthest = [], []
-        for name in names:
-            body, guide = bodies[name], guides.get(name)
-            centre = body.centre_in_space
-            at = height if name == needle else float(centre[2])
-            about = np.array([0.0, 0.0, at]), centre
+        farthest = []
+        for name, centre in centres.items():
+            about = np.array([0.0, 0.0, height if name == needle else float(centre[2])]), centre
+            placed = np.zeros(2), np.zeros(2)
             if name == needle:
-                placed = placement_of(case, at)
-            else:
-                seed = None if case.placement is None else case.placement.seed
-                placed = drawn_beside(case, name, at, None if seed is None else [seed])
-            placements.append(rigid_placement(*placed, *about))
-            far = farthest_positions(guide, placed, at)
+                placed = placement_of(case, height)
+                first = rigid_placement(*placed, *about)
+            far = farthest_positions(guides.get(name), placed, float(about[0][2]))
             farthest.append(
                 ([rigid_placement(*each, *about) for each in far], max(hypot(*a) for a, _ in far))
             )
+        seed = None if case.placement is None else case.placement.seed
+        carriers = _carriers(case, names)
+        levers = [centres[n] - centres[names[c]] for n, c in zip(names, carriers, strict=True)]
         return cls(
             names=tuple(names),
             guides={name: guides[name] for name in names if name in guides},
-            placements=np.array(placements),
+            carriers=carriers,
+            levers=np.array(levers),
+            placements=placed_bodies(case, first, centres, None if seed is None else [seed]),
             farthest=tuple(farthest),
         )
 
@@ -205,19 +215,41 @@ class Movers:
         turns
             Directions round the axis.
         """
-        far, aside = self.farthest[pairing.mover]
-        if pairing.other < 0:
+        mover, other = pairing.mover, pairing.other
+        far, aside = self.farthest[mover]
+        if self.carriers[mover] == other:
             return far[: 2 * turns], aside
-        beside, more = self.farthest[pairing.other]
-        there = {pairing.mover: _by_direction(far), pairing.other: _by_direction(beside)}
         found = []
         for k in range(turns):
-            for ours in there[pairing.mover][k]:
-                for theirs in there[pairing.other][(k + _DIRECTIONS // 2) % _DIRECTIONS]:
+            opposite = (k + _DIRECTIONS // 2) % _DIRECTIONS
+            ours, theirs = self._towards(mover, k), [np.zeros(6)]
+            if self.carriers[other] == mover and other >= 0:
+                ours, theirs = theirs, _by_direction(self.farthest[other][0])[opposite]
+            elif other >= 0:
+                theirs = self._towards(other, opposite)
+            for one in ours:
+                for beside in theirs:
                     placed = np.zeros((len(self.names), 6))
-                    placed[pairing.mover], placed[pairing.other] = ours, theirs
+                    placed[mover] = one
+                    if other >= 0:
+                        placed[other] = beside
                     found.append(pairing.relative(placed))
-        return found, aside + more
+        return found, sum(width for _, width in self.farthest)
+
+    def _towards(self, number: int, k: int) -> list[Vector]:
+        """Farthest placements of a body in a direction, with those of its carrier."""
+        own, carrier = _by_direction(self.farthest[number][0])[k], self.carriers[number]
+        if carrier < 0:
+            return own
+        lever = self.levers[number]
+        return [
+            _carried(below, lever) + here for below in self._towards(carrier, k) for here in own
+        ]
+
+    def guided(self) -> Iterator[tuple[str, ValveGuide, BodySurface | None]]:
+        """Each guided body, its guide, and on what it slides."""
+        for name, guide in self.guides.items():
+            yield name, guide, getattr(guide, "on", None)
 
     def joined(self, guides: Mapping[str, Guide]) -> tuple[Guide | None, tuple[int, ...]]:
         """Guides of all bodies in one, and the body at each height."""
@@ -239,12 +271,50 @@ class Movers:
         )
 
 
+def _carriers(case: ValveCase, names: Sequence[str]) -> tuple[int, ...]:
+    """The body on which each slides, -1 for none."""
+    on = [None if name not in case.guides else case.guides[name].on for name in names]
+    return tuple(-1 if place is None else names.index(place.body) for place in on)
+
+
+def _carried(below: Vector, lever: Vector) -> Vector:
+    """Placement of a body that moves with its carrier, ``lever`` [m] from its centre of mass."""
+    return below + np.append(rotation_matrix(below[3:]) @ lever - lever, np.zeros(3))
+
+
+def placed_bodies(
+    case: ValveCase, first: Vector, centres: Mapping[str, Vector], seed: Sequence[int] | None
+) -> Vector:
+    """Placements (6 bodies,) [m], [rad] of all bodies that move, beside that of the needle.
+
+    Parameters
+    ----------
+    first (6,) [m], [rad]
+        Of the needle.
+    centres
+        Of mass of all these bodies, as drawn, the needle first.
+    seed
+        Others are drawn within their guides; None: centred in them.
+    """
+    names, placed = list(centres), {0: first}
+    carriers = _carriers(case, names)
+    for number in sorted(range(1, len(names)), key=lambda k: carriers[k] >= 0):
+        name, carrier = names[number], carriers[number]
+        centre = centres[name]
+        about = np.array([0.0, 0.0, float(centre[2])])
+        own = rigid_placement(*drawn_beside(case, name, float(centre[2]), seed), about, centre)
+        if carrier >= 0:
+            own = own + _carried(placed[carrier], centre - centres[names[carrier]])
+        placed[number] = own
+    return np.concatenate([placed[k] for k in range(len(names))])
+
+
 def drawn_beside(
     case: ValveCase, name: str, height: float, seed: Sequence[int] | None
 ) -> tuple[Vector, Vector]:
-    """Position at a height, and slope, of the axis of a body beside the needle.
+    """Position in its guide at a height, and slope, of the axis of a body beside the needle.
 
-    It is drawn within its own guide; centred without a seed or guide.
+    Centred without a seed or a guide.
     """
     guide = case.guides.get(name)
     if seed is None or guide is None:
@@ -317,27 +387,46 @@ def build_spatial(
             )
         ],
     )
+
+    def sections(name: str, surface: str, guide: ValveGuide) -> list[ShaftSection]:
+        shapes = np.hstack([bodies[name].rigid_modes, kept[name].shapes])
+        whole = None if isinstance(guide.law, LinearGuideLaw) else flexibilities[name]
+        return solid_sections(bodies[name], shapes, whole, surface, guide.heights)
+
     guides = {
-        name: guide_of_shaft(
+        name: body_guide(
             model,
-            bodies[name],
-            np.hstack([bodies[name].rigid_modes, kept[name].shapes]),
-            flexibilities[name],
-            surface=guide.surface,
-            heights=guide.heights,
-            clearance=guide.clearance,
-            stiffness=guide.law.stiffness
-            if isinstance(guide.law, LinearGuideLaw)
-            else guide.law.bore,
-            consistent=not isinstance(guide.law, LinearGuideLaw),
-            friction=guide.friction,
-            viscous=guide.viscous,
+            name,
+            guide,
+            sections(name, guide.surface, guide),
+            None if on is None else sections(on.body, on.surface, guide),
         )
-        for name, guide in movers.guides.items()
+        for name, guide, on in movers.guided()
     }
     spatial = valve_of_meetings(case, model, [meeting for meeting, *_ in found], guides, movers)
     shapes = [np.hstack([bodies[name].rigid_modes, kept[name].shapes]) for name in model.bodies]
     return replace(spatial, shape_marks=np.concatenate([shape_marks(each) for each in shapes]))
+
+
+def body_guide(
+    model: InterfaceModel,
+    name: str,
+    guide: ValveGuide,
+    sections: Sequence[ShaftSection],
+    inside: Sequence[ShaftSection] | None,
+) -> Guide:
+    """Guide of a body at its sections; ``inside``: those of the body on which it slides."""
+    law, on = guide.law, getattr(guide, "on", None)
+    return guide_at_sections(
+        model,
+        name,
+        sections,
+        on=None if on is None or inside is None else (on.body, inside),
+        clearance=guide.clearance,
+        stiffness=law.stiffness if isinstance(law, LinearGuideLaw) else law.bore,
+        friction=guide.friction,
+        viscous=guide.viscous,
+    )
 
 
 def valve_of_meetings(
@@ -375,7 +464,8 @@ def valve_of_meetings(
         gaps=gaps,
         course=gap_course(lambda at: gaps.between([at] * len(meetings)), reach),
         pairings=gaps.pairings,
-        placement=movers.placements.ravel(),
+        carried=movers.carriers,
+        placement=movers.placements,
         bearing=movers.bearing(),
         films=tuple(
             tilting_film(meeting.name, film, meeting.space, meeting.reach)

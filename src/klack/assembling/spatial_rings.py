@@ -11,12 +11,14 @@ from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array, vstack
 
 from klack.assembling.modes import selection_of
 from klack.assembling.off_axis import ANGLES, off_axis_space, turned
 from klack.assembling.spatial import (
     Meeting,
     Movers,
+    body_guide,
     seat_height,
     valve_of_meetings,
 )
@@ -35,9 +37,7 @@ from klack.contact.gap_update import RingGaps
 from klack.contact.rings import RingFriction, RingSpace
 from klack.errors import AccuracyWarning
 from klack.machine.cache.result_cache import result_cache
-from klack.transient.guide import guide_at_sections, shaft_sections, turned_sections
-from klack.transient.interface_arrays import Guide
-from klack.transient.interface_model import InterfaceModel
+from klack.transient.guide import ShaftSection, shaft_sections, turned_sections
 from klack.transient.revolved_model import (
     RevolvedBody,
     RevolvedPoints,
@@ -101,13 +101,14 @@ def build_spatial_rings(
         )
         for name, contact in contacts.items()
     ]
-    sections = {
-        name: turned_sections(name, bodies[name].mesh, guide.surface, guide.heights)
-        for name, guide in movers.guides.items()
-    }
+    sections: dict[str, dict[str, RingSections]] = {name: {} for name in names}
+    for name, guide, on in movers.guided():
+        for body, surface in (name, guide.surface), *([(on.body, on.surface)] if on else []):
+            found_there = turned_sections(body, bodies[body].mesh, surface, guide.heights)
+            sections[body][name] = found_there
     points, loads = reduced_bodies(
         [
-            _revolved(case, bodies[name], pools[name], ports[name], sections.get(name))
+            _revolved(case, bodies[name], pools[name], ports[name], _joined(sections[name]))
             for name in names
         ],
         [contact for _, contact in found],
@@ -116,13 +117,31 @@ def build_spatial_rings(
     for item in points:
         _tell_stiff(item)
     model = model_of_reduced(points, loads, [contact for _, contact in found])
+
+    def at_sections(body: str, guided: str, guide: ValveGuide) -> list[ShaftSection]:
+        """Sections of a body in the guide of a body, of all its own."""
+        own = sections[body]
+        first = sum(own[each].count for each in list(own)[: list(own).index(guided)])
+        joined = _joined(own)
+        assert joined is not None
+        found = shaft_sections(joined, points[names.index(body)])
+        here = found[first : first + own[guided].count]
+        linear = isinstance(guide.law, LinearGuideLaw)
+        return [section._replace(compliance=None) for section in here] if linear else here
+
     spatial = valve_of_meetings(
         case,
         model,
         [meeting for meeting, _ in found],
         {
-            name: _guide(guide, model, sections[name], points[names.index(name)])
-            for name, guide in movers.guides.items()
+            name: body_guide(
+                model,
+                name,
+                guide,
+                at_sections(name, name, guide),
+                None if on is None else at_sections(on.body, name, guide),
+            )
+            for name, guide, on in movers.guided()
         },
         movers,
     )
@@ -215,19 +234,15 @@ def _revolved(
     return turned(case, body, kept_modes(choice, pool, patterns), sections)
 
 
-def _guide(
-    given: ValveGuide, model: InterfaceModel, sections: RingSections, shaft: RevolvedPoints
-) -> Guide:
-    law, found = given.law, shaft_sections(sections, shaft)
-    linear = isinstance(law, LinearGuideLaw)
-    return guide_at_sections(
-        model,
-        shaft.body.name,
-        [section._replace(compliance=None) for section in found] if linear else found,
-        clearance=given.clearance,
-        stiffness=law.stiffness if isinstance(law, LinearGuideLaw) else law.bore,
-        friction=given.friction,
-        viscous=given.viscous,
+def _joined(sections: Mapping[str, RingSections]) -> RingSections | None:
+    """Sections of one body in all guides; None without."""
+    parts = list(sections.values())
+    if not parts:
+        return None
+    return RingSections(
+        heights=np.concatenate([part.heights for part in parts]),
+        weights=csr_array(vstack([part.weights for part in parts])),
+        points=parts[0].points,
     )
 
 

@@ -5,11 +5,13 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from klack.case.bodies import BodySurface
 from klack.input.problem import CaseProblem
 from klack.input.section import Name, Section
 from klack.units import Angle, DampingCoefficient, Length, Ratio, Stiffness, format_si
 
 __all__ = [
+    "BodyGuide",
     "CaseGuide",
     "ConsistentGuideLaw",
     "GuideFilm",
@@ -131,6 +133,19 @@ class ValveGuide(CaseGuide):
 
     film: GuideFilm | None = Field(
         default=None, description="Film across the guide, in variants with fluid."
+    )
+
+
+class BodyGuide(ValveGuide):
+    """Guide of a body that moves beside the needle, in a fixed bore or on another moving body.
+
+    On another body both are drawn where they are: the heights are those of its shaft too.
+    """
+
+    on: BodySurface | None = Field(
+        default=None,
+        description="Cylindrical surface of a moving body on which it slides, such as "
+        "needle.shaft; default in a fixed bore.",
     )
 
 

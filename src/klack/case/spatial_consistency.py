@@ -3,6 +3,8 @@
 from collections.abc import Iterator, Mapping
 from math import isfinite
 
+from klack.case.bodies import SurfaceName
+from klack.case.consistency import check_surface
 from klack.case.valve_roles import END_STOP, FLEXIBLE_BODY, Meeting, ValveRoles
 from klack.case.valve_sections import ValveSections
 from klack.errors import InputError
@@ -217,7 +219,7 @@ def _check_ends(case: ValveSections, meetings: Mapping[str, Meeting], roles: Val
             hint="remove it: every stroke then starts from positions of its own.",
             on_key=True,
         )
-    _check_guides(case, [_drawn(case)[name] for name in free if name != roles.needle])
+    _check_guides(case, _drawn(case)[roles.needle], [_drawn(case)[name] for name in free])
 
 
 def _drawn(case: ValveSections) -> dict[str, str]:
@@ -228,9 +230,16 @@ def _drawn(case: ValveSections) -> dict[str, str]:
     }
 
 
-def _check_guides(case: ValveSections, others: list[str]) -> None:
-    """Guides belong to bodies that move beside the needle."""
-    for name in case.guides:
+def _surface(body: str, surface: str) -> SurfaceName:
+    return SurfaceName(body=body, surface=surface)
+
+
+def _check_guides(case: ValveSections, needle: str, free: list[str]) -> None:
+    """Guides belong to bodies that move beside the needle; those on others to no chain."""
+    others = [name for name in free if name != needle]
+    if case.guide is not None:
+        check_surface(case, ("guide", "surface"), _surface(needle, case.guide.surface))
+    for name, guide in case.guides.items():
         if name not in others:
             raise CaseProblem(
                 ("guides", name),
@@ -241,6 +250,19 @@ def _check_guides(case: ValveSections, others: list[str]) -> None:
                 hint="that of the needle is the section 'guide'; a body with 'fixed' has none.",
                 on_key=True,
             )
+        check_surface(case, ("guides", name, "surface"), _surface(name, guide.surface))
+        if guide.on is None:
+            continue
+        below = case.guides.get(guide.on.body)
+        if guide.on.body not in free or guide.on.body == name or (below and below.on):
+            raise CaseProblem(
+                ("guides", name, "on"),
+                got=f"'{guide.on}', a body that is held, slides itself on another, or is '{name}'",
+                expected="a surface of a body that moves in a fixed bore, such as the needle",
+                hint="leave 'on' out for a bore of a body that is held.",
+                on_key=True,
+            )
+        check_surface(case, ("guides", name, "on"), guide.on)
 
 
 def _check_placement(case: ValveSections) -> None:

@@ -10,7 +10,7 @@ from typing import Literal, Self
 from pydantic import Field, model_validator
 
 from klack.case.bodies import BodySurface, CaseBody, CaseFile, CaseMaterial, Reduction, SurfaceName
-from klack.case.guide import ValveGuide, ValveMotion, ValvePlacement
+from klack.case.guide import BodyGuide, ValveGuide, ValveMotion, ValvePlacement
 from klack.case.impact_sections import CaseWorn, Lumped
 from klack.case.levels import Variant
 from klack.case.measurement import CaseCalibration, CaseMeasurement
@@ -189,7 +189,7 @@ class ValveSections(CaseFile):
     guide: ValveGuide | None = Field(
         default=None, description="Guide of the needle in three dimensions; default none."
     )
-    guides: Mapping[Name, ValveGuide] = Field(
+    guides: Mapping[Name, BodyGuide] = Field(
         default_factory=dict,
         description="name of a further body that moves in three dimensions: its guide.",
     )

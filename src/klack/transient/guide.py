@@ -11,7 +11,11 @@ consistent law, of the shaft (static flexibility less that of the kept modes).  
 acts on the rim of the shaft, along the axis and around it (:mod:`klack.transient.guide_step`), so
 it also turns and tilts the shaft.  Viscous drag brakes it along the axis.
 
-Limits: the bore does not move; drag acts along the axis only; no fluid film in the guide.
+A body may also slide with its bore on the shaft of another one that moves: the same of the
+difference of both motions.  It touches on the side towards which it is pushed: its radius counts
+below zero.
+
+Limits: a fixed bore does not move; drag acts along the axis only; no fluid film in the guide.
 """
 
 from collections.abc import Sequence
@@ -30,7 +34,14 @@ from klack.transient.interface_arrays import Guide
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.revolved_model import RevolvedPoints
 
-__all__ = ["guide_at_sections", "guide_of_shaft", "shaft_sections", "turned_sections"]
+__all__ = [
+    "ShaftSection",
+    "guide_at_sections",
+    "guide_of_shaft",
+    "shaft_sections",
+    "solid_sections",
+    "turned_sections",
+]
 
 
 _ROUND = 1e-2
@@ -91,22 +102,10 @@ def guide_of_shaft(
             expected="a solid body",
             hint="model the bodies as swept or solid.",
         )
-    sections = []
-    for height in heights:
-        section = _section(body, surface, height)
-        across = section.load[:, :2]
-        sections.append(
-            ShaftSection(
-                motion=np.vstack([section.load.T @ shapes, section.moment.T @ shapes]),
-                centre=section.centre,
-                radius=section.radius,
-                compliance=across.T @ flexibility.deflections(across) if consistent else None,
-            )
-        )
     return guide_at_sections(
         model,
         body.name,
-        sections,
+        solid_sections(body, shapes, flexibility if consistent else None, surface, heights),
         clearance=clearance,
         stiffness=stiffness,
         friction=friction,
@@ -134,11 +133,37 @@ class ShaftSection(NamedTuple):
     compliance: NDArray[np.float64] | None
 
 
+def solid_sections(
+    body: ElasticBody,
+    shapes: NDArray[np.float64],
+    flexibility: Flexibility | None,
+    surface: str,
+    heights: Sequence[float],
+) -> list[ShaftSection]:
+    """Sections of a solid, with their whole compliance if its flexibility is given."""
+    found = []
+    for height in heights:
+        section = _section(body, surface, height)
+        across = section.load[:, :2]
+        found.append(
+            ShaftSection(
+                motion=np.vstack([section.load.T @ shapes, section.moment.T @ shapes]),
+                centre=section.centre,
+                radius=section.radius,
+                compliance=None
+                if flexibility is None
+                else across.T @ flexibility.deflections(across),
+            )
+        )
+    return found
+
+
 def guide_at_sections(
     model: InterfaceModel,
     name: str,
     sections: Sequence[ShaftSection],
     *,
+    on: tuple[str, Sequence[ShaftSection]] | None = None,
     clearance: float,
     stiffness: float | None,
     friction: float,
@@ -147,6 +172,12 @@ def guide_at_sections(
     """Guide of sections that are known on the modes of the body ``name``.
 
     Others are as in :func:`guide_of_shaft`.
+
+    Parameters
+    ----------
+    on
+        A body that moves, inside this one, and its sections at these heights.  What moves in the
+        clearance is then this body seen from there.
     """
     require_positive("guide: clearance", clearance, "m")
     require_nonnegative("guide: friction", friction, "-")
@@ -160,6 +191,20 @@ def guide_at_sections(
             compliance[k] = np.eye(2) / stiffness
         if section.compliance is not None:
             compliance[k] += _missing(model.omega[own], section.motion[:2], section.compliance)
+    centre = np.array([section.centre for section in sections])
+    radius = np.array([section.radius for section in sections])
+    offset = centre[:, :2].copy()
+    if on is not None:
+        inside = np.flatnonzero(model.owner == model.bodies.index(on[0]))
+        for k, section in enumerate(on[1]):
+            motion[k][:, inside] -= section.motion
+            offset[k] -= section.centre[:2]
+            radius[k] = -section.radius  # it touches on the side towards which it is pushed
+            if section.compliance is not None:
+                compliance[k] += _missing(
+                    model.omega[inside], section.motion[:2], section.compliance
+                )
+    for k, section in enumerate(sections):
         if not np.linalg.eigvalsh(compliance[k])[0] > 0:
             raise InputError(
                 f"guide of body '{name}' at z = {section.centre[2] * 1e3:.4g} mm",
@@ -167,15 +212,14 @@ def guide_at_sections(
                 expected="a stiffness of the bore, or the consistent law",
                 hint="give law: {kind: linear, stiffness: 1e8 N/m}.",
             )
-    centre = np.array([section.centre for section in sections])
     return Guide(
         heights=np.ascontiguousarray(centre[:, 2]),
         clearance=np.full(count, clearance),
-        offset=np.ascontiguousarray(centre[:, :2]),
+        offset=offset,
         traces=np.ascontiguousarray(motion[:, :2]),
         slide=np.ascontiguousarray(motion[:, 2]),
         turn=np.ascontiguousarray(motion[:, 3:]),
-        radius=np.array([section.radius for section in sections]),
+        radius=radius,
         compliance=compliance,
         friction=np.full(count, friction),
         viscous=np.full(count, viscous / count),

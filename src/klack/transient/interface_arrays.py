@@ -155,7 +155,7 @@ class Guide(NamedTuple):
     traces: Cube  # (k, 2, M) [1/sqrt(kg)] displacement of the section across the axis
     slide: Matrix  # (k, M) [1/sqrt(kg)] the same along it
     turn: Cube  # (k, 3, M) [1/(m sqrt(kg))] rotation of the section about x, y, z
-    radius: Vector  # (k,) [m] of the shaft
+    radius: Vector  # (k,) [m] of the shaft; below zero where the bore is that of the guided body
     compliance: Cube  # (k, 2, 2) [m/N] of bore and shaft, without that of the kept modes
     friction: Vector  # (k,) [-]
     viscous: Vector  # (k,) [N s/m] drag at each height

@@ -140,6 +140,8 @@ class SpatialValve:
     guided
         At each height of the guide the body whose shaft it holds, among those that move; by default
         the needle everywhere.
+    carried
+        Of each body that moves: the one on whose shaft it slides, -1 for a fixed bore.
     gaps
         Exact ones at rigid placements of the bodies that move; by default they stay linear.
     course
@@ -167,6 +169,7 @@ class SpatialValve:
     arms: Vector = field(default_factory=lambda: np.zeros((1, 3)))
     guide: Guide | None = None
     guided: tuple[int, ...] = ()
+    carried: tuple[int, ...] = ()
     gaps: Gaps | None = None
     course: GapCourse | None = None
     pairings: tuple[Pairing, ...] = ()
@@ -427,11 +430,19 @@ class _Moving:
                 guide = f"{name} guide {count}" if number else f"guide {count}"
                 force = np.interp(time, self.path.time, self.path.guide_force[:, k])
                 told[f"{guide} force"] = ChannelData(unit="N", values=force)
-                arm = float(self.bore.heights[k] - body.centre[2])
-                here = self.bore.offset[k] + at[:, :2] + arm * slope
+                here = self.bore.offset[k] + self._axis_at(number, self.bore.heights[k], time)
+                below = self.valve.carried[number] if self.valve.carried else -1
+                if below >= 0:
+                    here = here - self._axis_at(below, self.bore.heights[k], time)
                 for i, way in enumerate(("x", "y")):
                     told[f"{guide} {way}"] = ChannelData(unit="m", values=here[:, i])
         return told | self._side_channels(time)
+
+    def _axis_at(self, number: int, height: float, time: Vector) -> Vector:
+        """Place (n, 2) [m] of the axis of a body at a height of its drawing."""
+        at = self.paths[number].position_at(time)
+        arm = float(height - self.model.moving[number].centre[2])
+        return np.asarray(at[:, :2] + arm * np.column_stack([at[:, 4], -at[:, 3]]))
 
     def _lower_end(self, number: int) -> float:
         """Height of the first contact below a body, else of the first one, from its centre [m]."""

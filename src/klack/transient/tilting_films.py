@@ -102,7 +102,7 @@ class BearingFilm:
     def arrays(self, guide: Guide, viscosity: float) -> tuple[Floats, Floats]:
         """``mu L^3 R / c^2`` [N s] and clearance with the cut-off [m] at each height."""
         room = guide.clearance + self.cut_off
-        return viscosity * self.length**3 * guide.radius / room**2, room
+        return viscosity * self.length**3 * np.abs(guide.radius) / room**2, room
 
 
 def film_arrays(

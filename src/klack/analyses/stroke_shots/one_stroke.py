@@ -1,7 +1,7 @@
 """One stroke of many."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from klack.analyses.stroke.run import VariantRun, one_variant, study_of_run
 from klack.analyses.stroke_shots.record import StopColumns, StrokeColumns
 from klack.analyses.unfinished import LogForm, UnfinishedLog, fingerprint
 from klack.assembling.body_summary import BodySummary
-from klack.assembling.spatial import drawn_beside, placement_of, seat_height
+from klack.assembling.spatial import placed_bodies, placement_of, seat_height
 from klack.assembling.valve import Valve
 from klack.case.levels import Variant
 from klack.case.shots import StrokeShots
@@ -91,15 +91,19 @@ class StrokeStart:
 class Starts:
     """Draws the starts of the strokes of a case.
 
-    ``height`` [m] is that of the seat in the drawing of the needle, ``centre`` (3,) [m] its centre
-    of mass there; ``beside`` names the bodies that move beside it, with theirs.
+    ``height`` [m] is that of the seat in the drawing of the needle, ``centres`` (3,) [m] the
+    centres of mass of the bodies that move, the needle first.
     """
 
     case: ValveCase
     seed: int
     height: float
-    centre: Vector
-    beside: Mapping[str, Vector] = field(default_factory=dict)
+    centres: Mapping[str, Vector]
+
+    @property
+    def centre(self) -> Vector:
+        """Centre of mass of the needle as drawn (3,) [m]."""
+        return next(iter(self.centres.values()))
 
     @classmethod
     def of(cls, valve: Valve, needle: str, seed: int) -> "Starts":
@@ -108,12 +112,8 @@ class Starts:
             case=valve.case,
             seed=seed,
             height=seat_height(valve.contacts, needle),
-            centre=valve.bodies[needle].centre_in_space,
-            beside={
-                name: body.centre_in_space
-                for name, body in valve.bodies.items()
-                if name != needle and not body.is_fixed
-            },
+            centres={needle: valve.bodies[needle].centre_in_space}
+            | {n: body.centre_in_space for n, body in valve.bodies.items() if not body.is_fixed},
         )
 
     def drawn(self, index: int) -> StrokeStart:
@@ -161,21 +161,14 @@ class Starts:
         placement = rigid_placement(aside, lean, about, self.centre)
         placement[5] = turn
         seed = None if index == CENTRED else [self.seed, index]
-        others = [self._drawn_beside(name, seed) for name in self.beside]
         return StrokeStart(
             index=index,
             aside=aside,
             lean=lean,
-            placement=np.concatenate([placement, *others]),
+            placement=placed_bodies(self.case, placement, self.centres, seed),
             friction=friction,
             contact_friction=self.contact_friction(index),
         )
-
-    def _drawn_beside(self, name: str, seed: Sequence[int] | None) -> Vector:
-        centre = self.beside[name]
-        at = float(centre[2])
-        placed = drawn_beside(self.case, name, at, seed)
-        return rigid_placement(*placed, np.array([0.0, 0.0, at]), centre)
 
 
 def shots_of_valve(case: ValveCase) -> StrokeShots:
