@@ -245,9 +245,10 @@ class InterfaceModel:
         """All bodies that move, the first one first."""
         return MovingBody(number=0, rigid=self.rigid, centre=self.centre), *self.others
 
-    def rigid_of(self, number: int) -> NDArray[np.int64]:
+    def rigid_of(self, number: int) -> slice:
         """Rigid coordinates of a body."""
-        return np.flatnonzero((self.owner == number) & (self.omega == 0))
+        own = np.flatnonzero((self.owner == number) & (self.omega == 0))
+        return slice(int(own[0]), int(own[-1]) + 1) if len(own) else slice(0, 0)
 
     @property
     def ways(self) -> int:

@@ -92,7 +92,7 @@ class PlacedGaps:
         course: GapCourse | None,
     ) -> None:
         self._model, self._exact, self._course = model, gaps, course
-        self._rigid = np.flatnonzero(model.omega == 0)
+        self._rigid = [model.rigid_of(body.number) for body in model.moving]
         self._motion = np.vstack([body.rigid for body in model.moving])
         self.values = np.array(model.gap)
         self.taken_at, self.followed_to = np.zeros((2, len(self._motion)))
@@ -113,9 +113,10 @@ class PlacedGaps:
         """Take them from the geometry; ``careful``: only where this closes no point."""
         if self._exact is None:
             return False
-        model, r = self._model, self._rigid
-        at = self._motion @ q
-        fresh = self._exact(at) - model.traces[:, r] @ q[r]
+        model, at = self._model, self._motion @ q
+        fresh = self._exact(at)
+        for own in self._rigid:
+            fresh = fresh - model.traces[:, own] @ q[own]
         if careful and np.min(fresh + model.traces @ q) <= 0.0:
             return False
         self.values[:], self.taken_at[:], self.followed_to[:] = fresh, at, at

@@ -79,8 +79,9 @@ def settle_at_rest(
     stiff = float(np.mean(np.diag(model.compliance)))
     sigma = _SOFTER * stiff / largest if largest > 0.0 else 0.0
     scale = float(np.linalg.norm(force)) or 1.0
-    spin = _spins(model)
-    force = force - spin.T @ (spin @ force)
+    spins = _spins(model)
+    for spin in spins:
+        force = force - spin * (spin @ force)
     left, before, stalled = np.inf, np.inf, 0
     walls = _Walls.none()
     lam = np.zeros(points)
@@ -90,8 +91,10 @@ def settle_at_rest(
         walls = walls.with_present(bore, state.q)
         rows, gap, local = _rows(model, bore, gaps(), walls)
         active = np.append(active, np.zeros(len(rows) - len(active), dtype=bool))
-        turned = rows @ (spin.T @ (spin @ state.q))
-        rows -= (rows @ spin.T) @ spin
+        turned = np.zeros(len(rows))
+        for spin in spins:
+            turned += rows @ (spin * (spin @ state.q))
+            rows -= np.outer(rows @ spin, spin)
         given = soft * force + np.where(rigid, state.q + sigma * force, 0.0)
         seen = rows @ given + turned
         answer = soft + np.where(rigid, sigma, 0.0)

@@ -300,7 +300,7 @@ class _Moving:
         self.march = of_one_kind(march), of_one_kind(march)  # without points and with them
         self.march_near, self.margin = of_one_kind(march_near), _MARGIN
         if not model.ways:
-            self.near = near_points(model, len(model.rigid_of(0)))
+            self.near = near_points(model, model.rigid_of(0).stop)
 
     # ------------------------------------------------------------------ start
 
