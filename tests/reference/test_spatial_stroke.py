@@ -475,3 +475,21 @@ def test_an_armature_slides_on_its_needle():
     assert np.hypot(*(result.channels[f"armature {way}"].values for way in "xy")).max() > 5e-6
     assert {event.stop for event in result.events[:3]} == {"driver", "opening"}
     assert abs(result.books.relative_residual) < 1e-11
+
+
+@pytest.mark.slow
+def test_strokes_of_two_bodies_scatter_at_both_stops(tmp_path):
+    """Positions of both are drawn within their guides; one stroke of many is that stroke alone."""
+    text = TWO.replace(PLACED_TWO, "shots: {count: 3, seed: 2}\n").replace("400 us,", "120 us,")
+    case = read_valve_case(text, CASE_TWO)
+
+    shots = run_stroke_shots(case, workers=1, folder=tmp_path)
+
+    stops = shots.variants["dry"].stops
+    for stop in ("driver", "opening"):
+        assert np.all(np.isfinite(stops[stop].peak_force))
+        assert np.ptp(stops[stop].peak_force) > 1.0
+        assert np.all(stops[stop].eccentricity <= 1.2 * shots.largest_eccentricity[stop])
+    # the armature has 12 um of clearance, the needle 4
+    assert shots.largest_eccentricity["opening"] > 1.5 * shots.largest_eccentricity["driver"]
+    assert np.ptp(stops["opening"].eccentricity) > 1e-6

@@ -223,7 +223,7 @@ class Movers:
         for k in range(turns):
             opposite = (k + _DIRECTIONS // 2) % _DIRECTIONS
             ours, theirs = self._towards(mover, k), [np.zeros(6)]
-            if self.carriers[other] == mover and other >= 0:
+            if other >= 0 and self.carriers[other] == mover:
                 ours, theirs = theirs, _by_direction(self.farthest[other][0])[opposite]
             elif other >= 0:
                 theirs = self._towards(other, opposite)

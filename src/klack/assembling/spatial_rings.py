@@ -104,13 +104,9 @@ def build_spatial_rings(
     sections: dict[str, dict[str, RingSections]] = {name: {} for name in names}
     for name, guide, on in movers.guided():
         for body, surface in (name, guide.surface), *([(on.body, on.surface)] if on else []):
-            found_there = turned_sections(body, bodies[body].mesh, surface, guide.heights)
-            sections[body][name] = found_there
+            sections[body][name] = turned_sections(body, bodies[body].mesh, surface, guide.heights)
     points, loads = reduced_bodies(
-        [
-            _revolved(case, bodies[name], pools[name], ports[name], _joined(sections[name]))
-            for name in names
-        ],
+        [_revolved(case, bodies[name], pools[name], ports[name], sections[name]) for name in names],
         [contact for _, contact in found],
         cache=result_cache(),
     )
@@ -122,10 +118,8 @@ def build_spatial_rings(
         """Sections of a body in the guide of a body, of all its own."""
         own = sections[body]
         first = sum(own[each].count for each in list(own)[: list(own).index(guided)])
-        joined = _joined(own)
-        assert joined is not None
-        found = shaft_sections(joined, points[names.index(body)])
-        here = found[first : first + own[guided].count]
+        told = shaft_sections(_joined(own), points[names.index(body)])
+        here = told[first : first + own[guided].count]
         linear = isinstance(guide.law, LinearGuideLaw)
         return [section._replace(compliance=None) for section in here] if linear else here
 
@@ -227,18 +221,17 @@ def _revolved(
     body: ElasticBody,
     pool: Modes,
     ports: Sequence[Port],
-    sections: RingSections | None,
+    sections: Mapping[str, RingSections],
 ) -> RevolvedBody:
     patterns = np.column_stack([port.pattern for port in ports])
     choice = selection_of(case.reduction.choice(body.name))
-    return turned(case, body, kept_modes(choice, pool, patterns), sections)
+    kept = kept_modes(choice, pool, patterns)
+    return turned(case, body, kept, _joined(sections) if sections else None)
 
 
-def _joined(sections: Mapping[str, RingSections]) -> RingSections | None:
-    """Sections of one body in all guides; None without."""
+def _joined(sections: Mapping[str, RingSections]) -> RingSections:
+    """Sections of one body in all guides."""
     parts = list(sections.values())
-    if not parts:
-        return None
     return RingSections(
         heights=np.concatenate([part.heights for part in parts]),
         weights=csr_array(vstack([part.weights for part in parts])),
