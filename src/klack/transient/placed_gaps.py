@@ -91,7 +91,8 @@ class PlacedGaps:
         pairings: Sequence[Pairing],
         course: GapCourse | None,
     ) -> None:
-        self._model, self._exact, self._course = model, gaps, course
+        self._model, self._exact = model, gaps
+        self._course = course = None if gaps is None else course
         self._rigid = [model.rigid_of(body.number) for body in model.moving]
         self._motion = np.vstack([body.rigid for body in model.moving])
         self.values = np.array(model.gap)
