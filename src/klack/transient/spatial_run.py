@@ -425,7 +425,7 @@ class _Moving:
             for i, way in enumerate(("x", "y")):
                 told[f"{name} {way}"] = ChannelData(unit="m", values=place[:, i])
                 told[f"{name} tilt {way}"] = ChannelData(unit="rad", values=slope[:, i])
-            own = [k for k, holds in enumerate(guided) if holds == number]
+            own = [k for k in range(len(self.bore.heights)) if guided[k] == number]
             for count, k in enumerate(own, 1):
                 guide = f"{name} guide {count}" if number else f"guide {count}"
                 force = np.interp(time, self.path.time, self.path.guide_force[:, k])
