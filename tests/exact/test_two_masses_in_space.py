@@ -21,8 +21,10 @@ from two_masses import (
     valve,
 )
 
+from klack.contact.gap_update import Pairing
 from klack.mechanics.force import ForceOverTime
 from klack.mechanics.spring import Spring
+from klack.mesh.rigid import rotation_matrix
 
 DRIVEN = {
     "needle.top": Spring(stiffness=10e3, preload=12.0),
@@ -103,6 +105,22 @@ def moved(network, spatial, duration, **more):
 
     run = move(network, Told(), duration, **more)
     return run, kept[0]
+
+
+def test_what_moves_as_one_does_not_move_against_each_other():
+    """One rigid motion of both bodies leaves none between them; small ones have these slopes."""
+    lever = np.array([1e-3, -2e-3, 4e-3])
+    pair = Pairing(1, 0, lever)
+    turn = np.array([1e-2, -2e-2, 5e-3])
+    shift = np.array([1e-4, 2e-4, -3e-4])
+    moved_on = shift + rotation_matrix(turn) @ lever - lever
+    both = np.array([[*shift, *turn], [*moved_on, *turn]])
+    np.testing.assert_allclose(pair.relative(both), 0.0, atol=1e-17)
+
+    slopes = pair.slopes(2)
+    for k, way in enumerate(1e-6 * np.eye(12)):
+        ends = [pair.relative(sign * way.reshape(2, 6)) for sign in (1.0, -1.0)]
+        np.testing.assert_allclose((ends[0] - ends[1]) / 2e-6, slopes[:, k], atol=1e-9)
 
 
 @pytest.mark.slow
