@@ -116,15 +116,26 @@ def test_a_mass_on_an_infinite_plate_over_time_and_in_energy() -> None:
 
 def test_a_sound_that_is_cut_off_says_so() -> None:
     """A mass on a spring without loss rings for ever; on a plate only forces can last as long."""
-    plate = on(receiver=INFINITE)
+    plate = on(receiver=INFINITE, ears=EAR)
+    spring = {"foot": {"stiffness": {"z": "1 N/um"}}}
+    thick = {"infinite_plate": {"thickness": "1 m", "material": "steel"}}
     for found, is_cut in (
         (plate, False),
         (replace(plate, span=1.0), True),
-        (on(receiver={"springs": {"z": "1 N/um"}}), True),
+        (replace(on(receiver=INFINITE), span=1.0), False),  # no ears
+        (on(receiver=thick, ears=EAR, elements=spring), True),
     ):
         signal, _ = found.signal()
         assert signal is not None
         assert any("ends 0.8 s after" in note for note in signal.notes) == is_cut
+
+
+def test_a_machine_without_loss_takes_no_energy() -> None:
+    """Truth: springs to the ground and a free body take none; all powers sum to round-off."""
+    for receiver in ({"springs": {"z": "1 N/um"}}, {"body": {"mass": "2 kg"}}):
+        record, _ = in_machine(on(receiver=receiver), 1.0)
+        assert record.energy == 0.0
+        assert record.balance < 1e-6
 
 
 def test_a_spring_with_a_loss_factor_has_no_time_beside_the_axis() -> None:

@@ -55,6 +55,7 @@ __all__ = [
 Missing = Literal["blocked", "free"]
 """What a receiver does in a direction in which it is not known."""
 
+_ACTIVE = 1e-6  # least active over apparent power
 _ALONG = 1e-6
 _WORST_CONDITION = 1e10
 
@@ -292,7 +293,8 @@ def power_balance(joint: Junction, found: Coupled) -> tuple[Vector, Vector]:
     """What elements lose, and what is left of the sum of all powers, each (k,), of amplitudes.
 
     Power of the forces inside the source = lost in the source + in elements + into the receiver,
-    each from its own matrix, not as a difference of the others; per line over the largest of them.
+    each from its own matrix, not as a difference of the others; per line over the largest of them,
+    or a millionth of the apparent power, of whose round-off a lossless machine has nothing else.
     """
     F, g, s = found.source_force, found.force, joint.s
     given = 0.5 * np.real(np.einsum("ki,ki->k", F.conj(), joint.free_velocity))
@@ -311,7 +313,8 @@ def power_balance(joint: Junction, found: Coupled) -> tuple[Vector, Vector]:
         above = (k.driving * one - k.transfer * two) / s
         below = (k.transfer * one - k.receiving * two) / s
         lost += 0.5 * np.real(above.conj() * one - below.conj() * two)
-    size = np.maximum.reduce([np.abs(given), kept, np.abs(lost), taken])
+    apparent = 0.5 * np.sum(np.abs(F * joint.free_velocity), axis=1)
+    size = np.maximum.reduce([np.abs(given), kept, np.abs(lost), taken, _ACTIVE * apparent])
     rest = np.abs(given - kept - lost - taken) / np.maximum(size, np.finfo(float).tiny)
     return lost, rest
 

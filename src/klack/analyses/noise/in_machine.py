@@ -43,6 +43,7 @@ _CUT = (
     "rings: peak, loudness and files are those of this part, exposures of all of it."
 )
 _FELT = 0.01  # velocity of the mounts over that of the needle
+_ROUND_OFF = 1e-9  # of what swings to and fro
 _LEFT_OUT = 0.01  # share of the blocked force outside of the measured band
 
 SourceAt = Callable[[Vector, float], SourceAtMounts]
@@ -96,7 +97,8 @@ class Installed:
             tail = float(energy[-energy.size // 10 :].sum())
             whole = self.span + _LEAD <= duration and tail <= _RUNG * float(energy.sum())
             if whole or duration >= _LONGEST:
-                return found if whole else replace(found, notes=(*found.notes, _CUT))
+                is_told = whole or not found.ears
+                return found if is_told else replace(found, notes=(*found.notes, _CUT))
             duration *= 2.0
 
     def _on_lines(self) -> CoupledSignal:
@@ -200,7 +202,7 @@ def in_machine(
                 force=coupled.force[:, i].copy(),
                 force_bands=exposure(f, coupled.force[:, i], low=low),
                 blocked_bands=exposure(f, source.blocked_force[:, kept[i]], low=low),
-                energy=float(np.trapezoid(density[:, i], f)),
+                energy=_energy(coupled, i),
                 energy_bands=_bands(f, density[:, i], low),
             )
             for i, freedom in enumerate(coupled.freedoms)
@@ -237,6 +239,14 @@ def _coupled(found: Installed) -> tuple[SourceAtMounts, Junction, Coupled]:
         if fine or known is not None or 2 * f.size > _MOST:
             return source, joint, coupled
         apart /= 2.0
+
+
+def _energy(coupled: Coupled, i: int) -> float:
+    """Into a freedom [J]; none where it is round-off of what swings to and fro."""
+    f, density = coupled.frequency, coupled.energy_density()[:, i]
+    size = 2.0 * np.abs(coupled.force[:, i] * coupled.velocity[:, i])
+    found = float(np.trapezoid(density, f))
+    return found if abs(found) > _ROUND_OFF * np.trapezoid(size, f) else 0.0
 
 
 def _bands(f: Vector, density: Vector, low: float) -> ThirdOctaves:
