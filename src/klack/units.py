@@ -170,8 +170,8 @@ ANGULAR_VELOCITY = Kind(
     "an angular velocity",
     "rad/s",
     "100 rad/s",
-    ("rad/s", "deg/s", "rpm"),
-    {"rad/s": 1.0, "deg/s": pi / 180, "°/s": pi / 180, "rpm": pi / 30},
+    ("rad/s",),
+    {"rad/s": 1.0},
     largest=1e9,
 )
 AREA = Kind("an area", "m^2", "12 mm^2", ("m^2", "cm^2", "mm^2", "um^2"), smallest=1e-24)

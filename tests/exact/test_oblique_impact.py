@@ -215,6 +215,29 @@ def test_what_starts_along_the_axis_is_refused(more, says):
         read_case(f"{text}{more}\n", Path("sphere.yaml"))
 
 
+@pytest.mark.parametrize(
+    ("spin", "about_y"),
+    [
+        ("30 rpm", None),
+        ("= v / (2 mm) * 1 rad", 100.0),
+        ("= 2 * pi * f * 1 rad", 6.0 * pi),
+        ("= 60 rad/s / 2", 30.0),
+        ("= 30 rpm", None),  # a rate, half a turn in a second
+        ("= v / (2 mm)", None),
+    ],
+)
+def test_a_spin_is_in_radians(spin, about_y):
+    """Half a turn in a second is never half a radian."""
+    text = TEXT.replace("sideways_speed: 0.2 m/s", f"spin: [0, {spin}, 0]")
+    text += "parameters: {v: 0.2 m/s, f: 3 Hz}\n"
+    if about_y is None:
+        with pytest.raises(InputError, match="angular velocity"):
+            read_case(text, Path("sphere.yaml"))
+    else:
+        read = read_case(text, Path("sphere.yaml"))
+        assert read.motion.spin[1] == pytest.approx(about_y, rel=1e-14)
+
+
 def test_full_order_takes_the_same_motion():
     """Every degree of freedom against modes, on one mesh: 0.01 of restitution, 2 % of the spin."""
     problem, _ = bodies()

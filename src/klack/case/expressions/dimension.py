@@ -145,6 +145,7 @@ def dimension_of(unit: str) -> Dimension:
     """Dimension of a coherent SI unit; ``"-"`` is a number."""
     turns = {
         "rad": ((_ONE, _NONE),),
+        "rad/s": ((_ONE, _NONE),),
         "Hz": ((_NONE, _ONE),),
         "s": ((_NONE, _NONE), (_NONE, -_ONE)),
     }.get(unit, ((_NONE, _NONE),))
