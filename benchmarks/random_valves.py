@@ -2,7 +2,8 @@
 
 ``uv run python benchmarks/random_valves.py --count 1000`` draws valves over the whole range that
 an engineer might ask for, runs each in all its variants, and prints what failed and the largest
-energy residual; ``--seed`` begins elsewhere, ``--only N`` runs one draw and prints its case.
+energy residual; ``--seed`` begins elsewhere, ``--only N`` runs one draw and prints its case,
+``--chains`` draws valves of two or three bodies.
 
 A draw is a case file: a body of 0.1 to 200 g on a spring of 0.1 to 200 N/mm with a negative, zero
 or positive preload, two stops of several laws with restitution or films, friction, a force or a
@@ -24,7 +25,7 @@ from klack.case.any_case import read_valve_case
 from klack.case.valve import ValveCase
 from klack.simulation.network_run import simulate_network
 
-__all__ = ["draw", "main", "residuals"]
+__all__ = ["draw", "draw_chain", "main", "residuals"]
 
 Rng = np.random.Generator
 Part = dict[str, Any]
@@ -78,6 +79,59 @@ def draw(seed: int) -> str:
         "lift": "needle.tip",
     }
     return json.dumps({"klack": 1, "title": f"Draw {seed}", "network": network, "run": run})
+
+
+def draw_chain(seed: int) -> str:
+    """Return the text of a drawn valve whose armature, and perhaps a piston, is a body of its own.
+
+    The armature has the drive and the stop, travels freely on the needle between ``carry`` and
+    ``rest``, and a coupling spring holds it down; a piston lies on the needle, below ``end``.
+    """
+    case = json.loads(draw(seed))
+    rng = np.random.default_rng([2, seed])
+    parts, joints = case["network"]["components"], case["network"]["connections"]
+    wet = "wet" in case["run"]["variants"]
+    mass, lift = _number(parts["needle"]["mass"]), _number(parts["stop"]["gap"])
+    free, own = lift * rng.uniform(0.1, 0.7), mass * _log(rng, 0.3, 3.0)
+    hold = abs(_number(parts["spring"]["preload"])) + _number(parts["spring"]["stiffness"]) * lift
+    parts["armature"] = {"type": "rigid-mass", "mass": f"{own} kg", "points": ["bottom", "top"]}
+    parts["needle"]["points"] = ["tip", "top", "ring"]
+    parts["carry"] = _stop(rng, free, min(own, mass), wet=wet)
+    parts["rest"] = _stop(rng, 0.0, min(own, mass), wet=wet)
+    parts["coupling"] = {
+        "type": "spring",
+        "stiffness": f"{hold * _log(rng, 0.02, 0.5) / lift} N/m",
+        "preload": f"{hold * _log(rng, 0.02, 0.5)} N",
+    }
+    (top,) = (joint for joint in joints if "needle.top" in joint)
+    driven = [port for port in top if port.split(".")[0] in ("stop", "magnet", "coil")]
+    kept = [port for port in top if port not in driven]
+    joints.remove(top)
+    joints += [
+        [*kept, "carry.upper", "coupling.base"],
+        ["armature.top", *driven, "carry.lower", "coupling.end"],
+        ["needle.ring", "rest.lower"],
+        ["armature.bottom", "rest.upper"],
+    ]
+    if rng.random() < 0.4:
+        parts["piston"] = {"type": "rigid-mass", "mass": f"{mass * _log(rng, 0.3, 3.0)} kg"}
+        parts["rod"] = _stop(rng, float(rng.choice([0.0, 0.2])) * lift, mass, wet=wet)
+        parts["end"] = _stop(rng, lift * rng.uniform(1.0, 2.0), mass, wet=wet)
+        parts["pusher"] = {
+            "type": "spring",
+            "stiffness": f"{hold * _log(rng, 0.02, 0.5) / lift} N/m",
+            "preload": f"{hold * _log(rng, 0.02, 0.5)} N",
+        }
+        joints[-4].append("rod.lower")
+        joints += [
+            ["piston.body", "rod.upper", "end.lower", "pusher.end"],
+            ["ground", "end.upper"],
+        ]
+    return json.dumps(case | {"title": f"Chain {seed}"})
+
+
+def _number(text: str) -> float:
+    return float(text.split()[0])
 
 
 def _log(rng: Rng, low: float, high: float) -> float:
@@ -262,17 +316,19 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--count", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", type=int)
+    parser.add_argument("--chains", action="store_true", help="two or three bodies")
     options = parser.parse_args(arguments)
+    drawn = draw_chain if options.chains else draw
     seeds = range(options.seed, options.seed + options.count)
     if options.only is not None:
         seeds = range(options.only, options.only + 1)
-        print(json.dumps(json.loads(draw(options.only)), indent=1))
+        print(json.dumps(json.loads(drawn(options.only)), indent=1))
     failed, runs, worst, told = 0, 0, (0.0, ""), 0
     for seed in seeds:
         with warnings.catch_warnings(record=True) as notes:
             warnings.simplefilter("always")
             try:
-                found = residuals(read_valve_case(draw(seed), Path(f"draw{seed}.yaml")))
+                found = residuals(read_valve_case(drawn(seed), Path(f"draw{seed}.yaml")))
             except Exception as error:
                 failed += 1
                 print(f"{seed}: {type(error).__name__}: {error}", flush=True)

@@ -338,9 +338,52 @@ def test_parameters_and_parts_of_a_case_are_shown(capsys, tmp_path):
         "connection 1 supply.b, rail.fluid, injector1_bore.a, injector2_bore.a",
     ):
         assert words in shown
-    assert list(json.loads(out.read_text(encoding="utf-8"))["parts"]) == [
+    assert list(json.loads(out.read_text(encoding="utf-8"))["parts"])[:4] == [
         "case: parameters",
         "case: values of expressions",
         "case: components",
         "case: connections",
     ]
+
+
+FREE_TRAVEL = """\
+klack: 1
+title: An armature that travels freely on its needle
+network:
+  components:
+    needle: {type: rigid-mass, mass: 1.25 g, points: [tip, collar, ring]}
+    armature: {type: rigid-mass, mass: 1.6 g, points: [top, bottom]}
+    seat: {type: end-stop, gap: 0 um, law: {kind: linear, stiffness: 2e8 N/m}}
+    carry: {type: end-stop, gap: 40 um, law: {kind: linear, stiffness: 2e8 N/m}}
+    rest: {type: end-stop, gap: 0 um, law: {kind: linear, stiffness: 2e8 N/m}}
+    pole: {type: end-stop, gap: 100 um, law: {kind: linear, stiffness: 2e8 N/m}}
+    spring: {type: spring, stiffness: 20 N/mm, preload: 25 N}
+    coupling: {type: spring, stiffness: 3 N/mm, preload: 4 N}
+  connections:
+    - [needle.tip, seat.upper]
+    - [seat.lower, ground]
+    - [needle.collar, carry.upper, spring.end, coupling.base]
+    - [needle.ring, rest.lower]
+    - [armature.top, carry.lower, pole.lower, coupling.end]
+    - [armature.bottom, rest.upper]
+    - [pole.upper, ground]
+run: {duration: 1 ms, variants: [dry], lift: needle.tip}
+"""
+
+
+def test_a_valve_shows_travels_pairs_and_a_first_speed(tmp_path: Path, capsys):
+    """By hand: 25 N and 20 N/mm over 60 um, less 4 N and 3 N/mm that the coupling takes back.
+
+    The coupling is compressed by up to 40 um, in proportion to both travels: 4 N and 1.5 N/mm 40 um
+    over 60 um.  (1.5 + 0.036 - 0.24 - 0.0036) mJ on 1.25 g are 1.438 m/s.
+    """
+    (tmp_path / "free.yaml").write_text(FREE_TRAVEL, encoding="utf-8")
+
+    assert main(["inspect", str(tmp_path / "free.yaml")]) == 0
+
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "needle 1.25 g, travels from 0 m (seat) to 60 um (pole)" in shown
+    assert "armature 1.6 g, travels from 0 m (seat and rest) to 100 um (pole)" in shown
+    assert "carry needle.collar on armature.top: gap 40 um, opens to 40 um" in shown
+    assert "rest armature.bottom on needle.ring: gap 0 m, opens to 40 um" in shown
+    assert "needle 1.44 m/s: springs 1.29 mJ, pressures 0 J on 1.25 g over 60 um" in shown

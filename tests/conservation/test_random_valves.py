@@ -39,10 +39,12 @@ import pytest
 from draws import program
 from rigid_valve import RELIEF_VALVE
 
+from klack.analyses.stroke.times import all_lift_times
 from klack.case.any_case import read_valve_case
 from klack.errors import AccuracyWarning, InputError
 from klack.network.catalogue import type_words
 from klack.simulation.network_result import IncompleteRunError
+from klack.simulation.network_run import simulate_network
 
 DRAWS = program("random_valves")
 
@@ -266,3 +268,23 @@ def test_a_random_impact_runs_and_keeps_its_energy(impacts, index):
 def test_draws_are_the_same_again(impacts):
     assert impacts.draw(SEED, 2) == impacts.draw(SEED, 2)
     assert impacts.draw(SEED, 2) != impacts.draw(SEED, 3)
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("seed", [0, 1, 3])
+def test_a_random_chain_keeps_its_energy_and_the_order_of_its_times(seed):
+    """Two or three bodies: shares of a lift are passed before it ends."""
+    case = read_valve_case(DRAWS["draw_chain"](seed), Path(f"chain{seed}.yaml"))
+    for dry in (True, False)[: len(case.run.variants)]:
+        network = case.network.network()
+        rows = (network.dry() if dry else network).rows()
+        result = simulate_network(
+            rows, duration=case.run.duration, step=case.run.step, record=case.run.record
+        )
+        assert abs(result.books.residual) <= 1e-9 * result.books.scale
+        for times in all_lift_times(result, rows, "needle", "tip"):
+            for _, passage in times.in_order:
+                passed = [passage.at_10, passage.at_50, passage.at_90]
+                known = [moment for moment in passed if moment is not None]
+                if passage.touch is not None:  # a straight line between records of 1 us
+                    assert max(known, default=0.0) <= passage.touch + 1e-6

@@ -36,6 +36,7 @@ def impact(time: float, speed: float = 1.0, lasts: float = 5e-6, **more: float) 
     """An impact on the seat of unit peak and impulse."""
     values = {field.name: 1.0 for field in fields(ImpactEvent)} | {
         "stop": "seat",
+        "besides": "",
         "time": time,
         "approach_speed": speed,
         "peak_time": time + 0.5 * lasts,
@@ -43,6 +44,13 @@ def impact(time: float, speed: float = 1.0, lasts: float = 5e-6, **more: float) 
         "separation_time": time + lasts,
     }
     return ImpactEvent(**values | more)
+
+
+def test_an_impact_that_another_stop_disturbs_is_over_all_the_same():
+    """Its restitution is blank for a reason; its impulse is complete."""
+    disturbed = impact(1e-3, restitution=nan, energy_loss=nan)
+    (change,) = impact_changes([impact(1e-3)], [replace(disturbed, besides="pole")])
+    assert (change.peak_force, change.impulse, change.reason) == (0.0, 0.0, "")
 
 
 def test_changes_are_those_of_the_longer_steps_to_the_shorter_ones():

@@ -356,3 +356,18 @@ def test_loose_parts_and_nodes_are_found():
 def test_faulty_sizes_are_explained(make, text):
     with pytest.raises(KlackError, match=text):
         make()
+
+
+@pytest.mark.parametrize("raised", [0.0, 7e-3])
+def test_centre_and_inertia_are_those_of_a_cylinder_and_a_ball(raised):
+    """``m r^2 / 2`` and ``m (3 r^2 + h^2) / 12``; ``2/5 m r^2``; and Steiner's term."""
+    r, h = 2e-3, 5e-3
+    corners = [(r, raised), (r, raised + h), (0.0, raised + h), (0.0, raised)]
+    cylinder = Profile((0.0, raised), tuple(Line(end, "edge") for end in corners))
+    for body, centre, polar, across in (
+        (cylinder, raised + 0.5 * h, 0.5 * r**2, (3 * r**2 + h**2) / 12),
+        (sphere(r, raised), raised, 0.4 * r**2, 0.4 * r**2),
+    ):
+        moments = np.array(body.second_moments) / body.volume
+        assert body.centre == pytest.approx(centre, rel=1e-12, abs=1e-15)
+        assert moments == pytest.approx([polar, across + centre**2], rel=1e-12)

@@ -68,6 +68,7 @@ def test_all_shipped_cases_are_tested():
         "demo-stroke",  # in test_workflow_shipped_cases.py
         "demo-valve",
         "demo-valve-axisymmetric",
+        "free-travel",  # in test_workflow_shipped_cases.py
         "from-other-tools",
         "measured",  # in test_measured_strokes.py
         "needle-from-inp",
@@ -540,3 +541,23 @@ def test_one_frame_makes_no_film(tmp_path: Path):
 
     with pytest.raises(InputError, match="at least 2"):
         write_impact_series(case, tmp_path, level="reduced", frames=1)
+
+
+def test_free_travel_lifts_the_needle_by_what_its_page_says():
+    """Geometry: 100 um less 40 um; order of a stroke; the energy balance; numbers of the page."""
+    case = load_valve_case(shipped_cases()["free-travel"])
+    study = run_stroke(case, variants=("wet",))
+    variant = study.reference
+    needle, armature = variant.times
+
+    assert (needle.lift, armature.lift) == pytest.approx((60e-6, 100e-6), rel=1e-9)
+    assert (needle.opening.stop, needle.closing.stop) == ("pole", "seat")
+    assert (armature.opening.stop, armature.closing.stop) == ("pole", "rest")
+    assert variant.result.books.relative_residual < 1e-9
+    first = {event.stop: event for event in reversed(variant.result.events)}
+    order = sorted(first, key=lambda stop: first[stop].time)
+    assert order == ["carry", "pole", "seat", "rest"]
+    assert needle.opening.touch == pytest.approx(250.1e-6, rel=5e-3)
+    assert first["carry"].approach_speed == pytest.approx(0.89, rel=0.02)
+    assert first["carry"].touch_speed == pytest.approx(0.33, rel=0.02)
+    assert first["rest"].time - first["seat"].time == pytest.approx(47e-6, rel=0.05)

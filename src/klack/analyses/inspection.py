@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from klack.analyses.valve_inspection import valve_rows
 from klack.assembling.assembled_bodies import assembled_body
 from klack.assembling.given_bodies import reduced_from_file
 from klack.bodies.model_files.matrices import MATRIX_FORMATS, read_matrix
@@ -26,6 +27,7 @@ from klack.mesh.files.catalogue import MESH_FORMATS, STEP_ENDINGS, format_of
 from klack.mesh.files.mesh_file import read_mesh_file
 from klack.mesh.files.mesh_model import MeshModel
 from klack.mesh.mesh import Mesh
+from klack.mesh.profile import Profile
 from klack.mesh.quality import corner_volume, mesh_summary
 from klack.mesh.step_content import StepContent, StepPart, step_content
 from klack.units import format_si, parse_quantity
@@ -131,7 +133,8 @@ def inspect_case(case: CaseFile) -> Iterator[tuple[str, tuple[Row, ...]]]:
     """Parameters, parts and bodies of a case, their files checked as in a run.
 
     Yields the rows of :func:`expanded_rows`, then the name of each body and its rows; after those
-    of all bodies it refuses a surface that the case names and its file does not have.
+    of all bodies it refuses a surface that the case names and its file does not have.  Of a valve,
+    then, what moves and what meets.
     """
     yield from expanded_rows(case)
     known: dict[str, tuple[str, ...]] = {}
@@ -156,6 +159,8 @@ def inspect_case(case: CaseFile) -> Iterator[tuple[str, tuple[Row, ...]]]:
         elif body.geometry.profile is not None:
             yield name, tuple(_drawn_rows(case, name, body.geometry.profile))
     require_surface_names(case, known)
+    if isinstance(case, ValveCase):
+        yield from valve_rows(case)
 
 
 def _drawn_rows(case: CaseFile, name: str, drawn: ProfileGeometry) -> Iterator[Row]:
@@ -169,6 +174,25 @@ def _drawn_rows(case: CaseFile, name: str, drawn: ProfileGeometry) -> Iterator[R
         points = np.concatenate([c.at(np.linspace(0.0, 1.0, 65)) for c in curves])
         yield "surface", edge, f"z {_range(points[:, 1])}, r {_range(points[:, 0])}"
     yield _mass(case, name, {solid: profile.volume for solid, profile in profiles.items()})
+    yield from _drawn_inertia(case, name, profiles)
+
+
+def _drawn_inertia(case: CaseFile, name: str, profiles: Mapping[str, Profile]) -> Iterator[Row]:
+    """Centre of gravity and moments of inertia about it; nothing without a material."""
+    try:
+        materials = case.materials_of(name, {solid: p.volume for solid, p in profiles.items()})
+    except InputError:
+        return
+    parts = [(materials[solid].density, profile) for solid, profile in profiles.items()]
+    mass = sum(density * profile.volume for density, profile in parts)
+    centre = sum(density * profile.volume * profile.centre for density, profile in parts) / mass
+    axial, across = (
+        sum(density * profile.second_moments[i] for density, profile in parts) for i in (0, 1)
+    )
+    yield "centre of gravity", "", f"z {1e3 * centre:.5g} mm"
+    across -= mass * centre**2
+    words = f"{1e9 * axial:.5g} g mm^2 about the axis, {1e9 * across:.5g} g mm^2 across"
+    yield "inertia", "", words
 
 
 def _mass(case: CaseFile, name: str, volumes: Mapping[str, float]) -> Row:

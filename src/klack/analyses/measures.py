@@ -128,7 +128,7 @@ class Measure(Generic[Of]):
     page
         Whether it is a key number of reports.
     absent
-        For tables without a value.
+        For tables without a value; ``why`` may say more, and stands instead.
     unit_of, digits_of
         Unit of the value of one thing, empty for a pure number; its significant digits.
     """
@@ -151,6 +151,7 @@ class Measure(Generic[Of]):
     deviation: Literal["", "relative", "difference", "factor", "amplitude", "energy"] = ""
     page: bool = False
     absent: str = "–"
+    why: Callable[[Of], str] = lambda _: ""
     title: str = ""
     note: str = ""
     json_name: str = ""
@@ -196,7 +197,7 @@ class Measure(Generic[Of]):
         if value is not None and isfinite(value) and self.unit_of is not None:
             return format_si(value, self.unit_of(of), self.settled(of).digits)
         if self.column is None or value is None or not isfinite(value):
-            return self.absent
+            return self.why(of) or self.absent
         # whole numbers stay whole
         scaled = value if self.kind == "whole" else self.column.factor * value
         return f"{scaled:{self.column.form}}{self._short_remark(of)}"
@@ -217,6 +218,8 @@ class Measure(Generic[Of]):
         value = self.read(of)
         if value is None or (self.unit_of is not None and not isfinite(value)):
             return self.absent
+        if not isfinite(value) and (reason := self.why(of)):
+            return reason
         return self.settled(of).printed(value) + self.remark(of)
 
     def settled(self, of: Of) -> "Measure[Of]":

@@ -9,7 +9,15 @@ from klack.network.network import Network
 from klack.network.port import Role
 from klack.network.ranges import StopBound, Travel
 
-__all__ = ["END_STOP", "FLEXIBLE_BODY", "Meeting", "ValveRoles", "find_meetings", "find_roles"]
+__all__ = [
+    "END_STOP",
+    "FLEXIBLE_BODY",
+    "Meeting",
+    "ValveRoles",
+    "find_meetings",
+    "find_roles",
+    "travel_of",
+]
 
 END_STOP, FLEXIBLE_BODY = "end-stop", "flexible-body"
 """Component types that a valve case refers to."""
@@ -76,7 +84,7 @@ def find_roles(case: ValveSections, network: Network | None = None) -> ValveRole
     met = meetings.get(nearest_below or nearest_above)
     side = met and (met.upper if nearest_below else met.lower)
     point = side[1] if side else points[needle][0]
-    travel = _travel(case, network, meetings)
+    travel = travel_of(case, network, meetings)
     seat = next(iter(travel.lowest({needle: 1.0})[1]), nearest_below)
     opening = next(iter(travel.highest({needle: 1.0})[1]), nearest_above)
     if case.run.lift is not None:
@@ -84,7 +92,7 @@ def find_roles(case: ValveSections, network: Network | None = None) -> ValveRole
     return ValveRoles(needle=needle, point=point, seat=seat, opening_stop=opening)
 
 
-def _travel(case: ValveSections, network: Network, meetings: Mapping[str, Meeting]) -> Travel:
+def travel_of(case: ValveSections, network: Network, meetings: Mapping[str, Meeting]) -> Travel:
     """Travel of the free bodies between end stops with a law."""
 
     def free(side: tuple[str, str] | None) -> str | None:

@@ -250,6 +250,17 @@ class Profile:
         """Volume of the body of revolution [m^3] (Pappus)."""
         return 2 * np.pi * self._integral(1, 0)
 
+    @cached_property
+    def centre(self) -> float:
+        """Height z of the centre of gravity of the body of revolution [m]."""
+        return self._integral(1, 1) / self._integral(1, 0)
+
+    @cached_property
+    def second_moments(self) -> tuple[float, float]:
+        """Moments of inertia over density, about the axis and across it at z = 0 [m^5]."""
+        polar = 2 * np.pi * self._integral(3, 0)
+        return polar, 0.5 * polar + 2 * np.pi * self._integral(1, 2)
+
     def surface_area(self, name: str) -> float:
         """Area swept by the edges called ``name`` [m^2]."""
         if name not in self.names:

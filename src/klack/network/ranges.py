@@ -123,6 +123,42 @@ class Travel:
         value, names = self.highest({body: -factor for body, factor in factors.items()})
         return 0.0 - value, names
 
+    def lift(
+        self, body: str, at: float = 0.0
+    ) -> tuple[tuple[float, float], tuple[tuple[str, ...], tuple[str, ...]]]:
+        """Lowest and highest place of what a body travels itself, and the stops that end it there.
+
+        It rests at the nearer end of its range from ``at`` [m].  The other end is that of its range
+        too, unless no stop of its own stands there and another body carries it: then it ends where
+        the carrier ends.  A needle whose armature travels freely before it carries the needle has
+        the travel of the armature less the free one; what the needle may fly further is no lift.
+        """
+        (low, below), (high, above) = self.lowest({body: 1.0}), self.highest({body: 1.0})
+        if at - low <= high - at:
+            high, above = self._carried(body, 1.0, high, above)
+        else:
+            low, below = self._carried(body, -1.0, -low, below)
+            low = -low
+        return (low, high), (below, above)
+
+    def _carried(
+        self, body: str, sign: float, far: float, stops: tuple[str, ...]
+    ) -> tuple[float, tuple[str, ...]]:
+        """Where a body ends along ``sign``, at most ``far`` [m] away."""
+        sides = [
+            (b.upper, b.lower, b) if sign > 0.0 else (b.lower, b.upper, b) for b in self.bounds
+        ]
+        if any(carrier == body and ahead is None for ahead, carrier, _ in sides):
+            return far, stops
+        pushed = [
+            (end - bound.gap, names)
+            for ahead, carrier, bound in sides
+            if ahead == body and carrier is not None
+            for end, names in [self.highest({carrier: sign})]
+        ]
+        end, names = max(pushed, default=(far, stops))
+        return (end, names) if end < far else (far, stops)
+
     @staticmethod
     def factors(rows: Rows, ports: Iterable[tuple[int, float]]) -> dict[str, float]:
         """Factors of bodies from those of ports (handles); fixed ports do not count."""

@@ -5,6 +5,8 @@ does not grow with time.  Where the run is cut into parts changes nothing, not e
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from math import isfinite, nan
 from typing import Any
 
 import numpy as np
@@ -13,15 +15,23 @@ from klack.arrays import Vector
 from klack.machine.compiling.jit import inner, njit
 from klack.network.rows import GROUND, BodyRow, Rows
 from klack.simulation.network_interfaces import FORCE_ROUND_OFF
-from klack.simulation.network_result import ChannelData, ImpactEvent
-from klack.simulation.rest import effective_mass, longest_period, mobility, rest_time
+from klack.simulation.network_result import ChannelData, ImpactEvent, InterfaceRecord
+from klack.simulation.rest import (
+    effective_mass,
+    longest_period,
+    mobility,
+    port_mobility,
+    rest_time,
+)
 
-__all__ = ["ImpactFinder"]
+__all__ = ["ImpactFinder", "judged"]
 
 
 _PAUSE_STEPS = 100  # a film is not recorded while its force passes through zero: so many fine steps
 _PAUSE_SHARE = 0.04  # or this share of the time to rest, whichever is longer
 _BEND = 0.25  # of what other forces do between two records: more from one to the next is a jump
+
+_BESIDES = 0.01  # of the change of speed by an impact: more by another stop, and it is not its own
 
 _PART = ("impulse", "peak", "peak_time")
 _STATE = np.dtype(
@@ -35,11 +45,21 @@ _STATE = np.dtype(
             # film that may lead into a contact
             *("lead", "lead_fastest", *(f"lead_{part}" for part in _PART)),
             # the contact that is closed now
-            *("closed", "begin", "until", "steps", "rests", "before", "from_start", "opened"),
+            *(
+                "closed",
+                "begin",
+                "until",
+                "steps",
+                "rests",
+                "before",
+                "touch",
+                "from_start",
+                "opened",
+            ),
             *("news", *(f"contact_{part}" for part in _PART)),
             # the impact that it may belong to: all contacts before it
-            *("impact", "first", "impact_before", "impact_from_start", "impact_steps"),
-            *("impact_rests", "stop", "last", "impact_news"),
+            *("impact", "first", "impact_before", "impact_touch", "impact_from_start"),
+            *("impact_steps", "impact_rests", "stop", "last", "impact_news"),
             *(f"impact_{part}" for part in _PART),
             # what followed the last contact of this impact
             *("tail", *(f"tail_{part}" for part in _PART), *(f"flight_{part}" for part in _PART)),
@@ -48,7 +68,7 @@ _STATE = np.dtype(
         )
     ]
 )
-_EVENT = ("time", "before", "after", "peak", "peak_time", "steps", "stop", "impulse")
+_EVENT = ("time", "before", "touch", "after", "peak", "peak_time", "steps", "stop", "impulse")
 
 
 class ImpactFinder:
@@ -172,6 +192,7 @@ class ImpactFinder:
             stop=self._stops[c],
             time=found["time"],
             approach_speed=-before,
+            touch_speed=max(-found["touch"], 0.0),
             peak_force=found["peak"],
             peak_time=found["peak_time"],
             contact_time=found["steps"],
@@ -180,6 +201,87 @@ class ImpactFinder:
             restitution=-after / before,
             energy_loss=0.5 * self._mass[c] * (before**2 - after**2),
         )
+
+
+def judged(
+    events: Sequence[ImpactEvent],
+    rows: Rows,
+    interfaces: Mapping[str, InterfaceRecord],
+    until: float,
+    before: Vector,
+) -> tuple[tuple[ImpactEvent, ...], Vector]:
+    r"""Impacts without restitution and energy loss where another stop acts on a body meanwhile.
+
+    Both compare the motion of two bodies before and after their impact, and mean something where
+    this impact alone changes it.  From first touch to the end of the last contact another stop
+    changes the relative speed by :math:`J' \mu'`, of its impulse and the mobility of the body that
+    both share; 1 % of what the impact itself changes, :math:`J \mu`, is too much.
+
+    Limits: other forces (springs, pressures, magnets) count as part of the impact; where the fine
+    record of a stop is full, what it does is not known, and nothing is blanked for it.
+
+    Parameters
+    ----------
+    until [s]
+        End of the run.
+    before (stops, 1 + stops)
+        What the run before found of its last impact on each stop: its time, and the impulse of each
+        stop since then; shape (0, 0) for none.
+
+    Returns
+    -------
+    events
+    after
+        The same for a run that continues this one.
+    """
+    owner = {handle: row for row in rows.bodies for handle in row.ports}
+    stops = {row.component: c for c, row in enumerate(rows.interfaces)}
+    share = np.zeros((len(stops), len(stops)))
+    for c, row in enumerate(rows.interfaces):
+        sides = [owner.get(handle) for handle in (row.upper, row.lower)]
+        own = mobility(row, sides)
+        for k, other in enumerate(rows.interfaces):
+            if k != c and own > 0.0:
+                shared = [
+                    abs(port_mobility(handle, owner[handle]))
+                    for handle in (other.upper, other.lower)
+                    if handle in owner and any(owner[handle] is side for side in sides)
+                ]
+                share[c, k] = sum(shared) / own
+    after = np.column_stack([np.full(len(stops), -np.inf), np.zeros(share.shape)])
+    found = []
+    for event in events:
+        c = stops[event.stop]
+        end = min(x for x in (event.separation_time, until) if x == x)
+        if event.restitution == 0.0:
+            end = min(end, event.time + event.contact_time)  # up to rest
+        impulses = np.array(
+            [
+                _impulse(interfaces[stop], event.time, end) if share[c, k] else 0.0
+                for stop, k in stops.items()
+            ]
+        )
+        if before.size and before[c, 0] == event.time:
+            impulses += before[c, 1:]
+        after[c] = (event.time, *impulses)
+        most = _BESIDES * abs(event.impulse)
+        besides = [stop for stop, k in stops.items() if share[c, k] * abs(impulses[k]) > most]
+        if besides and isfinite(event.restitution):
+            found.append(
+                replace(event, restitution=nan, energy_loss=nan, besides=", ".join(besides))
+            )
+        else:
+            found.append(event)
+    return tuple(found), after
+
+
+def _impulse(record: InterfaceRecord, begin: float, end: float) -> float:
+    """Of contact and film between two times [N s]; the force is even within a step."""
+    first = int(np.searchsorted(record.time, begin, side="right")) - 1
+    part = slice(max(first, 0), int(np.searchsorted(record.time, end)))
+    start, step = record.time[part], record.step[part]
+    inside = np.maximum(np.minimum(start + step, end) - np.maximum(start, begin), 0.0)
+    return float(np.sum((record.contact_force[part] + record.film_force[part]) * inside))
 
 
 @njit
@@ -294,6 +396,7 @@ def _closed_step(
         s.steps = s.rests = 0.0
         s.contact_impulse, s.contact_peak, s.contact_peak_time = 0.0, -np.inf, t
         s.from_start = 1.0 if t <= s.run_start + h else 0.0
+        s.touch = -closing
         if s.lead > 0.0:
             closing = max(closing, s.lead_fastest)
         s.before = -closing
@@ -350,7 +453,8 @@ def _merge(s: Any) -> None:
     """Add the present contact to the impact, or begin one with it and its film."""
     if s.impact == 0.0:
         s.impact, s.first = 1.0, s.begin
-        s.impact_before, s.impact_from_start = s.before, s.from_start
+        s.impact_before, s.impact_touch = s.before, s.touch
+        s.impact_from_start = s.from_start
         s.impact_rests = s.impact_steps = s.impact_impulse = 0.0
         s.impact_peak, s.impact_peak_time = -np.inf, s.begin
         if s.lead > 0.0:
@@ -430,7 +534,8 @@ def _emit(s: Any, out: Any, count: int) -> int:
                 slope = (s.leave_rate1 - s.leave_rate0) / (s.leave_time1 - s.leave_time0)
                 after += slope * (s.stop - s.leave_time0)
             after = max(after, s.fastest)
-    event = (s.first, s.impact_before, after, peak, peak_time, s.impact_steps, s.stop, impulse)
+    speeds = (s.impact_before, s.impact_touch, after)
+    event = (s.first, *speeds, peak, peak_time, s.impact_steps, s.stop, impulse)
     for j, value in enumerate(event):
         out[count, j] = value
     return 1

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import isfinite, nan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,6 +98,12 @@ class ImpactEvent:
         pulls.
     energy_loss [J]
         Kinetic energy of the centre of mass before less after; nan as above.
+    touch_speed [m/s]
+        Closing speed of the centres of mass at first touch, behind the film; nan in results of
+        former versions.
+    besides
+        Other stops that act on one of the bodies meanwhile, so much that this impact has no
+        restitution and no energy loss; see :func:`klack.simulation.impact_events.judged`.
     """
 
     stop: str
@@ -109,6 +116,13 @@ class ImpactEvent:
     impulse: float
     restitution: float
     energy_loss: float
+    touch_speed: float = nan
+    besides: str = ""
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the bodies have parted, or come to rest."""
+        return isfinite(self.restitution) or bool(self.besides)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

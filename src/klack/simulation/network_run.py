@@ -23,7 +23,7 @@ from klack.simulation.control_loop import ControlLoop
 from klack.simulation.delay_line import LINE_MEMORY
 from klack.simulation.displaced_liquid import liquid_doubts
 from klack.simulation.impact_doubts import impact_doubts, line_doubts
-from klack.simulation.impact_events import ImpactFinder
+from klack.simulation.impact_events import ImpactFinder, judged
 from klack.simulation.lasting_laws import pressed_state, slider_places
 from klack.simulation.limits import Limits
 from klack.simulation.moving_bodies import MovingBodies
@@ -213,9 +213,10 @@ def simulate_network(
         network.moving.resume()
     first_step, done_before = int(clock[0]), clock[2:].copy()
     finder = ImpactFinder(rows, step * first_step, step)
-    fresh = state is None or _IMPACTS not in state  # of an earlier version
-    if state is not None and not fresh:
-        finder.state = np.asarray(state[_IMPACTS], dtype=float)
+    known = None if state is None else state.get(_IMPACTS)
+    fresh = known is None or known.shape != finder.state.shape  # of an earlier version
+    if known is not None and not fresh:
+        finder.state = np.asarray(known, dtype=float)
     reset_accounts(network)
     _read_stores(network)
     before = energy_stores(network)
@@ -248,7 +249,14 @@ def simulate_network(
     time = step * (first_step + np.arange(records + 1) * (grid.looks * grid.look_steps))
     books = balance_since(network, before)
     channels = recorder.channels(records)
-    events = finder.events(channels)
+    interfaces = recorder.interfaces()
+    events, since = judged(
+        finder.events(channels),
+        rows,
+        interfaces,
+        float(time[-1]),
+        np.asarray((state or {}).get(_SINCE, ())),
+    )
     finder.told()
     if network.moving is not None:
         for row, added in zip(rows.interfaces, network.moving.gap(), strict=True):
@@ -259,14 +267,14 @@ def simulate_network(
         paths=() if network.moving is None else tuple(network.moving.paths),
         time=time.astype(float),
         channels=channels,
-        interfaces=recorder.interfaces(),
+        interfaces=interfaces,
         events=events,
         books=books,
         sizes=sizes,
         steps=StepCounts(*(int(count) for count in clock[2:] - done_before)),
         wall_time=wall_time,
         state=saved_state(network, clock)
-        | {_IMPACTS: finder.state, _LAST: recorder.last(records)}
+        | {_IMPACTS: finder.state, _SINCE: since, _LAST: recorder.last(records)}
         | ({} if control is None else control.memory()),
         failure="" if failure is None else str(failure),
         start=begun,
@@ -685,6 +693,7 @@ def _read_stores(network: CompiledNetwork) -> None:
 
 
 _IMPACTS = "impacts.under_way"
+_SINCE = "impacts.besides"
 _SLIDERS = "sliders."
 _LAST = "record.last"
 _RECORDS = "moving.impact_"

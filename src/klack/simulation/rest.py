@@ -15,6 +15,7 @@ __all__ = [
     "effective_mass",
     "longest_period",
     "mobility",
+    "port_mobility",
     "rest_time",
     "resting_dissipation",
 ]
@@ -91,16 +92,18 @@ def mobility(row: InterfaceRow, bodies: Sequence[BodyRow | None]) -> float:
 
     0 where neither body can fly, or a given motion drives it.
     """
-    found = 0.0
-    for handle, owner in zip((row.upper, row.lower), bodies, strict=True):
-        if owner is None or owner.course is not None:
-            continue
-        body, port = owner.body, owner.ports.index(handle)
-        if body.momentum is not None:
-            found += float(body.momentum @ body.port_shapes[:, port]) / body.mass
-            continue
-        found += float(body.rigid_axial @ body.port_shapes[: body.rigid_count, port]) / body.mass
-    return found
+    sides = zip((row.upper, row.lower), bodies, strict=True)
+    return sum(port_mobility(handle, owner) for handle, owner in sides)
+
+
+def port_mobility(handle: int, owner: BodyRow | None) -> float:
+    """Speed of the centre of mass per impulse at one of its ports [1/kg]; see :func:`mobility`."""
+    if owner is None or owner.course is not None:
+        return 0.0
+    body, port = owner.body, owner.ports.index(handle)
+    if body.momentum is not None:
+        return float(body.momentum @ body.port_shapes[:, port]) / body.mass
+    return float(body.rigid_axial @ body.port_shapes[: body.rigid_count, port]) / body.mass
 
 
 def _depth(law: InterfaceLaw, energy: float) -> float:

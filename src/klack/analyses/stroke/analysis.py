@@ -33,11 +33,14 @@ from klack.analyses.stroke.measures import (
     DELIVERY_MEASURES,
     EVENT_MEASURES,
     NOT_REACHED,
+    SPEEDS,
     VARIANT_MEASURES,
     real_time_factor,
+    shown_measures,
     steps_told,
 )
 from klack.analyses.stroke.missing import cut_records
+from klack.analyses.stroke.pairs import BY_PAIR, PAIR_MEASURES, impacts_by_pair
 from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
 from klack.analyses.stroke.stairs import STAIR_MEASURES
 from klack.analyses.stroke.step_check import CHANGE_MEASURES, NOTICED, ImpactChange
@@ -56,6 +59,7 @@ __all__ = [
     "TIME_COLUMNS",
     "change_name",
     "first_impact",
+    "has_films",
     "largest",
     "start_text",
     "stroke_answer",
@@ -124,10 +128,17 @@ _EVENT = JsonForm(
     "EventJson",
     "One impact of a stroke.",
     Key("stop", str, "Name of the end stop.", "event.stop"),
+    Key(
+        "besides",
+        str | None,
+        "Other stops that act meanwhile: restitution and energy_loss_J are null.",
+        lambda of: of.event.besides or None,
+    ),
     Key("axis", (_AXIS, None), "At first touch; null for a motion along the axis."),
     Key("doubled_steps", (_CHANGE, None), "Null where the steps were not checked.", "change"),
     *measured_keys(EVENT_MEASURES, "event"),
 )
+_PAIR = JsonForm("PairJson", "Impacts on one stop, or of one body.", *measured_keys(PAIR_MEASURES))
 _PASSAGE = JsonForm(
     "PassageJson",
     "One passage between two stops; null for what the run does not reach.",
@@ -227,6 +238,12 @@ _VARIANT = JsonForm(
         "By restriction, NAME, and its commands, NAME.1, NAME.2.",
         "variant.deliveries",
     ),
+    Key(
+        "pairs",
+        {str: _PAIR},
+        "By end stop, and all of each body; empty where one body moves.",
+        lambda of: {name.partition(":")[0]: of for name, of in impacts_by_pair(of.variant)},
+    ),
     *measured_keys(VARIANT_MEASURES, "variant"),
     *inherited(_TIMES, "variant.needle_times"),
     Key(
@@ -285,7 +302,12 @@ def stroke_told(study: StrokeStudy) -> Iterator[TextTable | str]:
         if total > _TOLD:
             title += f" (the first {_TOLD} of {total} impacts; all of them with --json)"
         events = variant.result.events[:_TOLD]
-        yield text_table(title, "stop", EVENT_MEASURES, ((event.stop, event) for event in events))
+        filmed = has_films(study, variant)
+        title = f"{title}\n{SPEEDS}" if filmed else title
+        shown = shown_measures(filmed=filmed)
+        yield text_table(title, "stop", shown, ((event.stop, event) for event in events))
+        if pairs := impacts_by_pair(variant):
+            yield text_table(f"{variant.name}: {BY_PAIR}", "impacts on", PAIR_MEASURES, pairs)
         yield from _changes_told(variant)
         yield from _axis_told(study, variant)
         yield from yield_told(variant)
@@ -345,6 +367,8 @@ def stroke_measured(study: StrokeStudy) -> Iterator[Measured]:
             counts[event.stop] += 1
             called.append(f"{name}, {event.stop} {counts[event.stop]}")
             yield called[-1], event, EVENT_MEASURES
+        for pair, impacts in impacts_by_pair(variant):
+            yield f"{name}, {pair}", impacts, PAIR_MEASURES
         for impact, change in zip(called, variant.changes, strict=False):
             yield f"{impact}, steps doubled", change, CHANGE_MEASURES
 
@@ -431,6 +455,11 @@ def first_impact(variant: StrokeVariant, stop: str) -> ImpactEvent | None:
     events = variant.impacts(stop)
     fastest = max((event.approach_speed for event in events), default=0.0)
     return next((event for event in events if event.approach_speed > NOTICED * fastest), None)
+
+
+def has_films(study: StrokeStudy, variant: StrokeVariant, stop: str | None = None) -> bool:
+    """Whether a stop, or any, has a squeeze film in a variant."""
+    return variant.wet and any(one.film for one in study.stops if stop in (None, one.name))
 
 
 def start_text(variant: StrokeVariant) -> str:
@@ -537,7 +566,7 @@ def _closing(study: StrokeStudy, variant: StrokeVariant) -> str:
 
 
 def _hit(study: StrokeStudy, variant: StrokeVariant, event: ImpactEvent) -> str:
-    filmed = variant.wet and any(stop.film for stop in study.stops if stop.name == event.stop)
+    filmed = has_films(study, variant, event.stop)
     since = " (the highest since its film force set in)" if filmed else ""
     text = (
         f"with {event.approach_speed:.3g} m/s{since} and a peak force of "
@@ -626,6 +655,7 @@ STROKE = StoredAnalysis(
         "impact of a stroke": EVENT_MEASURES,
         "delivery of a restriction": DELIVERY_MEASURES,
         "edge of the stairs of a stroke": STAIR_MEASURES,
+        "impacts of a stop or a body": PAIR_MEASURES,
         "impact of a stroke whose steps were doubled": CHANGE_MEASURES,
     },
     measured=stroke_measured,

@@ -15,6 +15,7 @@ from klack.analyses.stroke.analysis import (
     TIME_COLUMNS,
     change_name,
     first_impact,
+    has_films,
     largest,
     start_text,
     stroke_answer,
@@ -41,8 +42,15 @@ from klack.analyses.stroke.figures import (
     variants_chart,
 )
 from klack.analyses.stroke.film_frames import film_charts
-from klack.analyses.stroke.measures import DELIVERY_MEASURES, EVENT_MEASURES, VARIANT_MEASURES
+from klack.analyses.stroke.measures import (
+    DELIVERY_MEASURES,
+    EVENT_MEASURES,
+    SPEEDS,
+    VARIANT_MEASURES,
+    shown_measures,
+)
 from klack.analyses.stroke.missing import cut_records
+from klack.analyses.stroke.pairs import BY_PAIR, PAIR_MEASURES, impacts_by_pair
 from klack.analyses.stroke.record import FluidSummary, StopSummary, StrokeStudy, StrokeVariant
 from klack.analyses.stroke.stairs import STAIR_MEASURES
 from klack.analyses.stroke.step_check import CHANGE_MEASURES
@@ -227,28 +235,35 @@ def _impacts(study: StrokeStudy) -> Section:
                 f"Variant '{variant.name}' has {len(events)} impacts; the first {_MOST_IMPACTS} "
                 "are listed, the result and klack stroke --json have all of them."
             )
+        filmed = has_films(study, variant)
+        shown = [measure for measure in shown_measures(filmed=filmed) if measure.page]
+        if filmed:
+            paragraphs.append(f"{variant.name}: {SPEEDS}.")
         places = [axis_place(study, variant, event.time) for event in events[:_MOST_IMPACTS]]
         rows = [
             (
                 f"{i + 1}. {event.stop}",
-                *(measure.on_page(event) for measure in _SHOWN),
+                *(measure.on_page(event) for measure in shown),
                 *(() if place is None else (place.position, place.tilt)),
             )
             for i, (event, place) in enumerate(zip(events, places, strict=False))
         ]
-        columns = (variant.name, *(measure.title or measure.name for measure in _SHOWN))
+        columns = (variant.name, *page_heads(shown))
         columns += AXIS_COLUMNS if moves_in_space(study, variant) else ()
         tables.append(Table(columns=columns, rows=tuple(rows)))
         if variant.changes:
-            shown = zip(events[:_MOST_IMPACTS], variant.changes, strict=False)
-            changes = tuple((change_name(e, c), *page_cells(CHANGE_MEASURES, c)) for e, c in shown)
+            both = zip(events[:_MOST_IMPACTS], variant.changes, strict=False)
+            changes = tuple((change_name(e, c), *page_cells(CHANGE_MEASURES, c)) for e, c in both)
             columns = (f"{variant.name}: {CHANGES}", *page_heads(CHANGE_MEASURES))
             tables.append(Table(columns=columns, rows=changes))
+        if pairs := impacts_by_pair(variant):
+            of_pairs = tuple((name, *page_cells(PAIR_MEASURES, pair)) for name, pair in pairs)
+            columns = (f"{variant.name}: {BY_PAIR}", *page_heads(PAIR_MEASURES))
+            tables.append(Table(columns=columns, rows=of_pairs))
     return Section(title="All impacts", paragraphs=tuple(paragraphs), tables=tuple(tables))
 
 
-_SHOWN = tuple(measure for measure in EVENT_MEASURES if measure.page)
-_OF_FIRST = ("approach_speed", "peak_force", "contact_time", "restitution")
+_OF_FIRST = ("approach_speed", "touch_speed", "peak_force", "contact_time", "restitution")
 
 
 def _computed(study: StrokeStudy) -> Section:
@@ -350,12 +365,13 @@ def _number_table(study: StrokeStudy) -> Table:
             rows.append((title, *(quantity(value, unit) for value in values)))
     for stop in shown_stops(study):
         events = [first_impact(variant, stop) for variant in variants]
+        filmed = any(has_films(study, variant, stop) for variant in variants)
         rows += [
             (
                 f"first impact, {stop}: {measure.title or measure.name}",
                 *("–" if event is None else measure.on_page(event) for event in events),
             )
-            for measure in _SHOWN
+            for measure in shown_measures(filmed=filmed)
             if measure.key in _OF_FIRST
         ]
     rows += [

@@ -14,8 +14,10 @@ __all__ = [
     "DELIVERY_MEASURES",
     "EVENT_MEASURES",
     "NOT_REACHED",
+    "SPEEDS",
     "VARIANT_MEASURES",
     "real_time_factor",
+    "shown_measures",
     "steps_told",
 ]
 
@@ -45,6 +47,23 @@ def steps_told(variant: StrokeVariant) -> str:
     )
 
 
+def _besides(event: ImpactEvent) -> str:
+    """Why an impact has no restitution: the stops that act as well."""
+    return f"with {event.besides}" if event.besides else ""
+
+
+TOUCH_SPEED: Measure[ImpactEvent] = Measure(
+    key="touch_speed",
+    title="speed at touch",
+    symbol="v_t",
+    unit="m/s",
+    definition="Closing speed of the centres of mass when the faces meet, behind the film that "
+    "brakes them: wear and yield depend on it.",
+    form="fixed",
+    column=Column("m/s", 1.0, ".4f", "at touch"),
+    page=True,
+)
+
 EVENT_MEASURES: tuple[Measure[ImpactEvent], ...] = described_in(
     "theory/stroke",
     Measure(
@@ -67,6 +86,7 @@ EVENT_MEASURES: tuple[Measure[ImpactEvent], ...] = described_in(
         column=Column("m/s", 1.0, ".4f", "speed"),
         page=True,
     ),
+    TOUCH_SPEED,
     Measure(
         key="peak_force",
         symbol="F_max",
@@ -110,7 +130,8 @@ EVENT_MEASURES: tuple[Measure[ImpactEvent], ...] = described_in(
         key="restitution",
         symbol="e",
         definition="Opening speed over approach speed of the centres of mass; missing without "
-        "separation.",
+        "separation, and where another stop changes that speed meanwhile by over 1 % of what "
+        "this impact does.",
         note="It is a result of waves, fluid and films, never an input of the flexible "
         "variants; a body still vibrating from an earlier impact may "
         "rebound faster than it arrived.",
@@ -118,18 +139,29 @@ EVENT_MEASURES: tuple[Measure[ImpactEvent], ...] = described_in(
         digits=3,
         column=Column("", 1.0, ".4f"),
         page=True,
+        why=_besides,
     ),
     Measure(
         key="energy_loss",
         symbol="W",
         unit="J",
-        definition="Kinetic energy of the centre of mass before the impact minus that after it.",
+        definition="Kinetic energy of the centre of mass before the impact minus that after it, of "
+        "the relative motion where both bodies move; missing as the restitution.",
         digits=3,
         column=Column("uJ", 1000000.0, ".4g"),
         page=True,
+        why=_besides,
     ),
 )
 """Of one impact; contacts closer than the longest period of the needle are one."""
+
+SPEEDS = "speed: highest since the film began to press; at touch: when the faces meet"
+"""Head of a table of impacts with films."""
+
+
+def shown_measures(*, filmed: bool) -> tuple[Measure[ImpactEvent], ...]:
+    """Measures of impacts for a table; without a film both speeds are the same."""
+    return tuple(measure for measure in EVENT_MEASURES if filmed or measure.key != TOUCH_SPEED.key)
 
 
 def _at_shares(way: Literal["opening", "closing"]) -> tuple[Measure[StrokeVariant], ...]:
@@ -138,8 +170,8 @@ def _at_shares(way: Literal["opening", "closing"]) -> tuple[Measure[StrokeVarian
             key=f"{way}_time_at_{share}_percent",
             symbol=f"t_{way[0]},{share}",
             unit="s",
-            definition=f"From the start of the run until {share} % of the lift are passed on the "
-            f"way of {way}.",
+            definition=f"From the start of the run until {share} % of what the body travels itself "
+            f"are passed on the way of {way}.",
             read=attrgetter(f"needle_times.{way}.at_{share}"),
             absent=NOT_REACHED,
         )
@@ -154,8 +186,9 @@ VARIANT_MEASURES: tuple[Measure[StrokeVariant], ...] = described_in(
         symbol="t_o",
         unit="s",
         definition="From time zero (that of the first run, if this one continues it) to the first "
-        "touch of the opening stop in the first whole stroke, else in the longest. No value where "
-        "it is not touched; never negative.",
+        "touch of the opening stop in the first whole stroke, else in the longest: the stop that "
+        "ends the lift, perhaps one of a body that carries the needle. No value where it is not "
+        "touched; never negative.",
         read=lambda variant: variant.needle_times.opening.touch,
         column=Column("ms", 1000.0, ".4f", "opens"),
         page=True,

@@ -528,9 +528,9 @@ def _highest_pressure(rows: Rows) -> float:
 
 
 def _lift(rows: Rows, needle: str) -> float | None:
-    """Unloaded travel between the stops [m]; None without stops."""
-    travel = Travel.of(rows)
-    lift = travel.highest({needle: 1.0})[0] - travel.lowest({needle: 1.0})[0]
+    """What the unloaded needle travels itself [m]; None without stops."""
+    (low, high), _ = Travel.of(rows).lift(needle)
+    lift = high - low
     return lift if isfinite(lift) else None
 
 

@@ -9,7 +9,7 @@ runs share, the model and what counts as an impact, is not seen.
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
-from math import inf, isfinite, isnan, nan
+from math import inf, isnan, nan
 from operator import attrgetter
 from typing import NamedTuple
 
@@ -239,7 +239,7 @@ def _pairs(run: Sequence[ImpactEvent], other: Sequence[ImpactEvent]) -> Iterator
 def _change(event: ImpactEvent, other: ImpactEvent, number: int) -> ImpactChange:
     """Change of one impact, without what the end cuts off."""
     both = (event, other)
-    over = all(isfinite(e.restitution) for e in both)
+    over = all(e.is_over for e in both)
     grows = not over and any(e.peak_time - e.time > _LATE * e.contact_time for e in both)
     return ImpactChange(
         number=number,

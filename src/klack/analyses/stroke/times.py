@@ -1,6 +1,6 @@
 """Times of opening and closing."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
 
@@ -14,6 +14,7 @@ from klack.simulation.network_result import ImpactEvent, NetworkResult
 __all__ = ["LiftTimes", "Passage", "all_lift_times", "lift_times"]
 
 Vector = NDArray[np.float64]
+Closes = Callable[[ImpactEvent, tuple[str, ...]], bool]
 
 _MOVED = 0.1  # share of the lift at which a motion begins and ends
 _LEAST = 0.01  # share of the lift between stops that is worth times of its own
@@ -31,7 +32,8 @@ class Passage:
     stop
         End stop, or empty.
     touch [s]
-        First contact there, unless a film cushions it.
+        First contact there, unless a film cushions it; where several stops in a row end the lift,
+        the one that closes the last of them.
     """
 
     at_10: float | None = None
@@ -86,22 +88,25 @@ def all_lift_times(
     travel = Travel.of(rows)
     found = []
     for row in sorted(rows.bodies, key=lambda row: row.component != needle):
-        low, below = travel.lowest({row.component: 1.0})
-        high, above = travel.highest({row.component: 1.0})
         is_needle = row.component == needle
+        port = point if is_needle else row.names[0]
+        displacement = result.channels[f"{row.component}.{port} displacement"].values
+        (low, high), stops = travel.lift(row.component, float(displacement[0]))
         if row.body.rigid_count == 0 or not (
             is_needle or (isfinite(high - low) and high - low > _NO_LIFT)
         ):
             continue
-        port = point if is_needle else row.names[0]
         found.append(
             lift_times(
                 result.time,
-                result.channels[f"{row.component}.{port} displacement"].values,
+                displacement,
                 result.events,
                 body=row.component,
                 ends=(low, high),
-                stops=("".join(below[:1]), "".join(above[:1])),
+                stops=stops,
+                gaps={
+                    stop: result.channels[f"{stop} gap"].values for side in stops for stop in side
+                },
             )
         )
     return tuple(found)
@@ -114,7 +119,8 @@ def lift_times(
     *,
     body: str,
     ends: tuple[float, float],
-    stops: tuple[str, str],
+    stops: tuple[tuple[str, ...], tuple[str, ...]],
+    gaps: Mapping[str, Vector] | None = None,
 ) -> LiftTimes:
     """Times of one body: the first stroke that passes 90 % of its lift, else the longest one.
 
@@ -128,6 +134,10 @@ def lift_times(
         Along +z, the direction of opening.
     ends [m]
         Closed and open; infinite without a stop.
+    stops
+        That end the lift on either side, first the one that stands.
+    gaps (n,) [m]
+        Of stops, where several end the lift.
     """
     closed, opened = ends
     free = not (isfinite(closed) and isfinite(opened))
@@ -139,8 +149,8 @@ def lift_times(
             starts="closed",
             lift=None,
             between_stops=not free,
-            opening=Passage(stop=stops[1]),
-            closing=Passage(stop=stops[0]),
+            opening=Passage(stop="".join(stops[1][:1])),
+            closing=Passage(stop="".join(stops[0][:1])),
         )
     share = (displacement - low) / (high - low)
     is_open = bool(share[0] > 0.5)
@@ -151,7 +161,12 @@ def lift_times(
         low, high = (high - way, high) if is_open else (low, low + way)
         share = (displacement - low) / (high - low)
     rest, far = stops[::-1] if is_open else stops
-    away, back = _stroke(time, 1.0 - share if is_open else share, events, rest, far)
+
+    def closes(event: ImpactEvent, row: tuple[str, ...]) -> bool:
+        others = [gaps[stop] for stop in row if gaps and stop != event.stop]
+        return all(np.interp(event.time, time, gap) <= 0.0 for gap in others)
+
+    away, back = _stroke(time, 1.0 - share if is_open else share, events, (rest, far), closes)
     if is_open:  # passed 10 % from the open end: 90 % of the lift
         away, back = _mirrored(away), _mirrored(back)
     return LiftTimes(
@@ -165,14 +180,19 @@ def lift_times(
 
 
 def _stroke(
-    time: Vector, share: Vector, events: Sequence[ImpactEvent], rest: str, far: str
+    time: Vector,
+    share: Vector,
+    events: Sequence[ImpactEvent],
+    ends: tuple[tuple[str, ...], tuple[str, ...]],
+    closes: Closes,
 ) -> tuple[Passage, Passage]:
-    """Away from the end at rest, and back."""
+    """Away from the end at rest, and back; ``ends`` are the stops there and at the other end."""
+    rest, far = ends
     outside = np.concatenate(([False], share >= _MOVED, [False]))
     edges = np.flatnonzero(outside[1:] != outside[:-1])
     strokes = [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
     if not strokes:
-        return Passage(stop=far), Passage(stop=rest)
+        return Passage(stop="".join(far[:1])), Passage(stop="".join(rest[:1]))
     peaks = [float(share[a:b].max()) for a, b in strokes]
     whole = [i for i, peak in enumerate(peaks) if peak >= 1.0 - _MOVED]
     first, end = strokes[whole[0] if whole else int(np.argmax(peaks))]
@@ -188,20 +208,22 @@ def _stroke(
         k = first + int(at[-1]) if at.size else time.size
         return _crossing(time, share, k, level) if k + 1 < time.size else None
 
-    until = time[end] if end < time.size else np.inf
+    until = float(time[end]) if end < time.size else np.inf
+    there = _touch(events, far, float(time[max(first - 1, 0)]), until, closes)
+    home = _touch(events, rest, float(time[top]), np.inf, closes)
     away = Passage(
         at_10=leaving(0.1),
         at_50=leaving(0.5),
         at_90=leaving(0.9),
-        stop=far,
-        touch=_touch(events, far, float(time[max(first - 1, 0)]), float(until)),
+        stop=there.stop if there else "".join(far[:1]),
+        touch=there.time if there else None,
     )
     back = Passage(
         at_10=returning(0.1),
         at_50=returning(0.5),
         at_90=returning(0.9),
-        stop=rest,
-        touch=_touch(events, rest, float(time[top]), np.inf),
+        stop=home.stop if home else "".join(rest[:1]),
+        touch=home.time if home else None,
     )
     return away, back
 
@@ -221,6 +243,15 @@ def _crossing(time: Vector, share: Vector, k: int, level: float) -> float:
     return float(time[k] + part * (time[k + 1] - time[k]))
 
 
-def _touch(events: Sequence[ImpactEvent], stop: str, after: float, until: float) -> float | None:
-    times = [event.time for event in events if event.stop == stop and after <= event.time <= until]
-    return min(times, default=None)
+def _touch(
+    events: Sequence[ImpactEvent],
+    stops: tuple[str, ...],
+    after: float,
+    until: float,
+    closes: Closes,
+) -> ImpactEvent | None:
+    """First impact that closes all stops in a row."""
+    for event in events:
+        if event.stop in stops and after <= event.time <= until and closes(event, stops):
+            return event
+    return None

@@ -1,0 +1,131 @@
+"""What a stroke of a valve will move: bodies, what meets at each stop, and a first speed."""
+
+from collections.abc import Iterator, Mapping
+from math import isfinite, sqrt
+
+from klack.case.valve import ValveCase
+from klack.case.valve_roles import END_STOP, FLEXIBLE_BODY, Meeting, find_meetings, travel_of
+from klack.hydraulics.chamber import Chamber
+from klack.hydraulics.pressure_face import PressureFace
+from klack.hydraulics.pressure_source import PressureSource
+from klack.mechanics.rigid_mass import RigidMass
+from klack.mechanics.spring import Spring
+from klack.network.network import Network
+from klack.network.port import Role
+from klack.network.ranges import Travel
+from klack.units import format_si
+
+__all__ = ["valve_rows"]
+
+Row = tuple[str, str, str]
+Rows = Iterator[tuple[str, tuple[Row, ...]]]
+
+
+def valve_rows(case: ValveCase) -> Rows:
+    """Rows of bodies that move and of end stops, as of ``inspect_case``."""
+    network = case.network.network()
+    meetings = find_meetings(network)
+    travel = travel_of(case, network, meetings)
+    masses = _masses(case, network)
+    bodies = [
+        name
+        for name, part in network.components.items()
+        if any(kind.role is Role.MOTION for kind in part.port_kinds().values())
+        and not (part.type == FLEXIBLE_BODY and case.bodies[str(getattr(part, "body", ""))].fixed)
+    ]
+    lifts = {name: travel.lift(name)[0] for name in bodies}
+    yield "case: bodies that move", tuple(_moving(network, bodies, masses, travel))
+    yield "case: end stops", tuple(_stops(network, meetings, travel))
+    if speeds := tuple(_speeds(network, masses, lifts)):
+        yield "case: first estimate of closing", speeds
+
+
+def _masses(case: ValveCase, network: Network) -> dict[str, float]:
+    """Masses of rigid bodies and of drawn ones [kg]."""
+    found = {}
+    for name, part in network.components.items():
+        if isinstance(part, RigidMass):
+            found[name] = part.mass
+        drawn = case.bodies.get(str(getattr(part, "body", "")))
+        if drawn is None or drawn.geometry is None or drawn.geometry.profile is None:
+            continue
+        volumes = {solid: p.volume for solid, p in drawn.geometry.profile.profiles().items()}
+        materials = case.materials_of(str(getattr(part, "body", "")), volumes)
+        found[name] = sum(volume * materials[s].density for s, volume in volumes.items())
+    return found
+
+
+def _moving(
+    network: Network, bodies: list[str], masses: Mapping[str, float], travel: Travel
+) -> Iterator[Row]:
+    for name in bodies:
+        (low, high), (below, above) = travel.lift(name)
+        mass = f"{1e3 * masses[name]:.6g} g, " if name in masses else ""
+        ends = [
+            f"{format_si(at, 'm', 4)} ({' and '.join(names)})" if isfinite(at) else "no stop"
+            for at, names in ((low, below), (high, above))
+        ]
+        yield network.components[name].type, name, f"{mass}travels from {ends[0]} to {ends[1]}"
+
+
+def _stops(network: Network, meetings: Mapping[str, Meeting], travel: Travel) -> Iterator[Row]:
+    for name, met in meetings.items():
+        part = network.components[name]
+        pair = [".".join(side) if side else "ground" for side in (met.upper, met.lower)]
+        gap = float(getattr(part, "gap", 0.0))
+        factors = dict[str, float]()
+        bounded = {body for bound in travel.bounds for body in (bound.upper, bound.lower)}
+        for side, sign in ((met.upper, 1.0), (met.lower, -1.0)):
+            if side and side[0] in bounded:
+                factors[side[0]] = factors.get(side[0], 0.0) + sign
+        most = gap + travel.highest(factors)[0]
+        opens = f"opens to {format_si(most, 'm', 4)}" if isfinite(most) else "opens without end"
+        film = ", film" if getattr(part, "film", None) is not None else ""
+        yield END_STOP, name, f"{' on '.join(pair)}: gap {format_si(gap, 'm', 4)}, {opens}{film}"
+
+
+def _speeds(
+    network: Network, masses: Mapping[str, float], lifts: Mapping[str, tuple[float, float]]
+) -> Iterator[Row]:
+    r"""Speed of each body at the end of its travel: ``v = sqrt(2 W / m)``, from rest at the other.
+
+    ``W`` is the work of linear springs, of both ends in proportion to their travels, and of
+    pressures as they are stated, from the open end to the closed one.  Limits: magnets, flow,
+    friction, films and impacts on the way are left out, so that it is no bound.
+    """
+    at: dict[tuple[str, str], str] = {}
+    pressure: dict[tuple[str, str], float] = {}
+    for node in network.nodes:
+        bodies = node.having(Role.MOTION)
+        sources = [network.components[joint.component] for joint in node.joints]
+        stated = [
+            float(part.pressure)
+            for part in sources
+            if isinstance(part, Chamber | PressureSource) and part.pressure is not None
+        ]
+        for joint in node.joints:
+            if bodies:
+                at[joint.component, joint.name] = bodies[0].component
+            if stated:
+                pressure[joint.component, joint.name] = stated[0]
+    for body, (low, high) in lifts.items():
+        way, mass = high - low, masses.get(body, 0.0)
+        if not isfinite(way) or way <= 0.0 or mass <= 0.0:
+            continue
+        springs, fluid = 0.0, 0.0
+        for name, part in network.components.items():
+            if isinstance(part, Spring):
+                for port, sign, other in (("end", 1.0, "base"), ("base", -1.0, "end")):
+                    if at.get((name, port)) == body:
+                        far = lifts.get(at.get((name, other), ""), (0.0, 0.0))
+                        reach = high - far[1] + low - far[0]
+                        if not isfinite(reach):
+                            reach = high + low
+                        springs += way * (sign * part.preload + 0.5 * part.stiffness * reach)
+            elif isinstance(part, PressureFace) and at.get((name, "body")) == body:
+                above = pressure.get((name, "fluid"), network.ambient.pressure)
+                fluid -= part.signed_area * (above - network.ambient.pressure) * way
+        work = springs + fluid
+        parts = f"springs {format_si(springs, 'J', 3)}, pressures {format_si(fluid, 'J', 3)}"
+        speed = f"{sqrt(2.0 * work / mass):.3g} m/s" if work > 0.0 else "does not close by itself"
+        yield "speed", body, f"{speed}: {parts} on {1e3 * mass:.4g} g over {format_si(way, 'm', 4)}"
