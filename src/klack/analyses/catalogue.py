@@ -77,7 +77,7 @@ ANALYSES: tuple[Entry, ...] = (
     Entry(
         "magnet.analysis:MAGNET",
         "klack magnet map",
-        "klack magnet my-magnet.yaml",
+        "klack magnet docs/how-to/lifting_magnet.yaml",
     ),
     Entry("noise.analysis:NOISE", "klack noise study", "klack noise demo-valve-axisymmetric"),
     Entry(
