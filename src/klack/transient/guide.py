@@ -182,7 +182,7 @@ def guide_at_sections(
     require_positive("guide: clearance", clearance, "m")
     require_nonnegative("guide: friction", friction, "-")
     require_nonnegative("guide: viscous", viscous, "N s/m")
-    count, own = len(sections), np.flatnonzero(model.owner == model.bodies.index(name))
+    count, own = len(sections), _coordinates(model, name, sections[0])
     motion = np.zeros((count, 6, model.mode_count))
     compliance = np.zeros((count, 2, 2))
     for k, section in enumerate(sections):
@@ -195,7 +195,7 @@ def guide_at_sections(
     radius = np.array([section.radius for section in sections])
     offset = centre[:, :2].copy()
     if on is not None:
-        inside = np.flatnonzero(model.owner == model.bodies.index(on[0]))
+        inside = _coordinates(model, on[0], on[1][0])
         for k, section in enumerate(on[1]):
             motion[k][:, inside] -= section.motion
             offset[k] -= section.centre[:2]
@@ -224,6 +224,12 @@ def guide_at_sections(
         friction=np.full(count, friction),
         viscous=np.full(count, viscous / count),
     )
+
+
+def _coordinates(model: InterfaceModel, name: str, section: ShaftSection) -> NDArray[np.int64]:
+    """Modal coordinates of a body; of the first one for a name that the model does not have."""
+    number = model.bodies.index(name) if name in model.bodies else 0
+    return np.flatnonzero(model.owner == number)[: section.motion.shape[1]]
 
 
 def require_within(body: str, surface: str, height: float, z: NDArray[np.float64]) -> None:
