@@ -19,6 +19,7 @@ from klack.errors import InputError
 from klack.input.section import Computed
 
 __all__ = [
+    "CELSIUS",
     "KINDS",
     "Acceleration",
     "Angle",
@@ -68,6 +69,7 @@ __all__ = [
     "Volume",
     "VolumeFlow",
     "base_powers",
+    "format_in",
     "format_si",
     "is_level",
     "parse_quantity",
@@ -77,6 +79,7 @@ __all__ = [
     "size_of_unit",
     "takes_prefix",
     "typed",
+    "unit_in",
 ]
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
@@ -85,6 +88,7 @@ _ATOM = r"[A-Za-zµμ°%]+(?:(?:\^|\*\*)-?\d(?:\.\d)?)?"
 _UNIT = rf"(?:1 ?/ ?)?{_ATOM}(?: ?[*/·] ?{_ATOM}| {_ATOM})*"
 _QUANTITY = re.compile(rf"(?P<number>{_NUMBER}) ?(?P<unit>{_UNIT})?")
 _LONGEST = 60
+_ZERO_CELSIUS = 273.15
 _PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 
 
@@ -212,6 +216,7 @@ FLUX_DENSITY = Kind("a flux density", "T", "1.5 T", ("T", "mT"))
 FIELD_STRENGTH = Kind("a field strength", "A/m", "120 A/m", ("A/m", "kA/m"))
 PERMEANCE = Kind("a permeance", "H", "20 nH", ("H", "uH", "nH"), smallest=1e-21)
 FLUX = Kind("a magnetic flux", "Wb", "20 uWb", ("Wb", "mWb", "uWb"), smallest=1e-21)
+CELSIUS = "degC"
 TEMPERATURE = Kind("a temperature", "K", "20 degC", ("degC", "K"), {"K": 1.0}, largest=1e6)
 TEMPERATURE_RISE = Kind(
     "a difference of temperatures", "K", "5 K", ("K", "mK"), {"K": 1.0, "mK": 1e-3}, largest=1e6
@@ -598,6 +603,36 @@ def format_si(value: float, unit: str, digits: int = 4) -> str:
     return f"{scaled:.{max(digits, 3)}g} {_PREFIXES[power]}{unit}"  # 450 nm, not 4.5e+02 nm
 
 
+def unit_in(text: object, kind: Kind) -> tuple[str, float]:
+    """Unit that a file has at a quantity, and its size in SI; none for a number or an expression.
+
+    >>> unit_in("601.3 kPa", PRESSURE), unit_in("20 °C", TEMPERATURE), unit_in("= lift", LENGTH)
+    (('kPa', 1000.0), ('degC', 1.0), ('', 1.0))
+    """
+    if not isinstance(text, str):
+        return "", 1.0
+    try:
+        if kind is TEMPERATURE and _celsius(text, kind) is not None:
+            return CELSIUS, 1.0
+        unit = _split(text, kind, "quantity")[1]
+        return (unit, _factor(text, unit, kind, "quantity")) if unit else ("", 1.0)
+    except InputError:
+        return "", 1.0
+
+
+def format_in(value: float, unit: str, size: float, digits: int = 4) -> str:
+    """Write a value in SI in a unit of this size; :func:`parse_quantity` reads it.
+
+    >>> format_in(6.013e5, "bar", 1e5), format_in(2e-7, "mm^3", 1e-9), format_in(1e4, "N/mm", 1e3)
+    ('6.013 bar', '200 mm^3', '10 N/mm')
+    >>> format_in(293.15, CELSIUS, 1.0)
+    '20 degC'
+    """
+    if unit == CELSIUS:  # digits of the difference, not of K
+        return f"{round(value - _ZERO_CELSIUS, 1):g} {unit}"
+    return f"{float(f'{value / size:.{digits}g}'):.{max(digits, 6)}g} {unit}"
+
+
 def typed(kind: Kind) -> tuple[BeforeValidator, WithJsonSchema]:
     """Pydantic metadata for a field of this kind, in SI."""
     schema = {
@@ -640,7 +675,7 @@ def _celsius(value: object, kind: Kind) -> float | None:
     if isinstance(value, str):
         match = re.fullmatch(rf"({_NUMBER}) ?(?:degC|°C)", " ".join(value.split()))
         if match:
-            return _in_range(round(float(match[1]) + 273.15, 6), value, kind, "temperature")
+            return _in_range(round(float(match[1]) + _ZERO_CELSIUS, 6), value, kind, "temperature")
     return None
 
 

@@ -17,10 +17,18 @@ from klack.analyses.noise.run import click_sound
 from klack.analyses.noise.source import impact_sources, sources_of
 from klack.analyses.stroke.content import stroke_content
 from klack.analyses.stroke.run import run_stroke
-from klack.app.explorer import Explorer, drawn, sliders_of, stroke_numbers
+from klack.app.answers import Slider, StudyChoice
+from klack.app.explorer import Explorer, drawn, sliders_of, stroke_numbers, written
 from klack.app.reader import Reader
-from klack.app.texts import checked_text, exchanged_text
+from klack.app.texts import (
+    checked_text,
+    exchanged_text,
+    study_offer,
+    study_source,
+    study_text,
+)
 from klack.case.any_case import read_case_tree, tree_of
+from klack.case.key_path import quantity_at
 from klack.case.reader import find_case, read_case
 from klack.errors import InputError
 from klack.machine.stages import collected_warnings
@@ -334,3 +342,92 @@ def test_a_valve_in_its_machine_is_heard_at_every_ear(tmp_path):
     assert explorer.listen(moved, "far").number.value < explorer.listen(moved).number.value
     fresh = Explorer().open(explorer.text_at(moved), path).first  # with a machine of its own
     assert fresh.numbers[-1].value == pytest.approx(near.numbers[-1].value, rel=1e-12)
+
+
+def offered(name: str, text: str = "") -> dict[str, Slider]:
+    path = find_case(name)
+    tree = tree_of(text or path.read_text("utf-8"), path)
+    return {slider.key: slider for slider in sliders_of(tree.any_case(), tree)}
+
+
+def test_sliders_have_the_units_of_the_case():
+    """Not 601.3 kPa, 10 kN/m and 2e-07 m^3; a temperature moves by degrees, not from 59 K on."""
+    sliders = offered("demo-stroke")
+    of = {key.removeprefix("network."): slider for key, slider in sliders.items()}
+    pressure = of["components.feed.pressure"]
+    warmth = of["ambient.temperature"]
+
+    assert of["components.spring.stiffness"].text(9e3) == "9 N/mm"
+    assert pressure.text(5.5e5) == "5.5 bar"
+    assert sliders["noise.mount.mass"].text(0.05) == "50 g"
+    assert sliders["noise.plate.loss_factor"].text(0.03) == "3 %"
+    assert (warmth.text(warmth.low), warmth.written) == ("-60 degC", "20 degC")
+    assert [round(end, 2) for end in warmth.about(0.1)] == [283.15, 303.15]
+    assert pressure.about(0.1) == pytest.approx((5.4117e5, 6.6143e5), rel=1e-12)  # 10 % of it
+
+
+def test_every_slider_is_read_back_as_it_is_written():
+    """In its own unit to the four digits that are shown: 0.05 %, of temperatures 0.05 K."""
+    for name in ("demo-stroke", "warm-valve", "demo-valve-axisymmetric"):
+        path = find_case(name)
+        tree = tree_of(path.read_text("utf-8"), path)
+        case = tree.any_case()
+        for slider in sliders_of(case, tree):
+            if slider.written == "not given":
+                continue
+            value = 0.37 * slider.low + 0.63 * slider.high
+            read = quantity_at(case, slider.place).parse(written(slider, value))
+            assert read == pytest.approx(value, rel=5e-4, abs=0.05 if slider.unit == "K" else 0.0)
+
+
+def test_the_lift_is_one_slider():
+    """The case links the gaps of stop and coil: both move, in the file as well."""
+    keys = ("network.components.opening.gap", "network.components.coil.gap")
+    path = find_case("demo-stroke")
+    text = path.read_text("utf-8")
+    sliders = offered("demo-stroke")
+    found = Explorer()
+    found._tree, found._case = tree_of(text, path), tree_of(text, path).any_case()
+    found._sliders = sliders
+    moved = found._case_at({keys[0]: 93e-6}).network.components
+    text_then = found.text_at({keys[0]: 93e-6})
+    unlinked = offered("demo-stroke", text.replace("opening.gap: lift", "opening.gap: 1 * lift"))
+
+    assert keys[1] not in sliders
+    assert sliders[keys[0]].label == "lift"
+    assert (moved["opening"].gap, moved["coil"].gap) == (93e-6, 93e-6)
+    assert text_then.count("gap: 93 um") == 2
+    assert {*keys} <= {*unlinked}  # an expression may be another value
+
+
+def test_a_study_of_the_lift_varies_both_gaps():
+    path = find_case("demo-stroke")
+    choice = StudyChoice(
+        ranges={"network.components.opening.gap": ("90 um", "110 um")},
+        measures=("opening_time",),
+        objectives={},
+        design="sobol",
+        points=4,
+    )
+    study = study_source(study_text(choice, path.read_text("utf-8"), str(path)), path)[1].study
+
+    assert [*study.parameters] == ["lift"]
+    assert {*study.linked} == {"network.components.opening.gap", "network.components.coil.gap"}
+
+
+def test_a_study_is_offered_only_measures_that_its_case_can_have():
+    """Rigid bodies radiate nothing, and a valve without noise.mounts has no levels there."""
+    rigid = Path("docs/how-to/small_valve.yaml")
+    drop = find_case("sphere-on-rod")
+    noise = {
+        path: {
+            item.name.removeprefix("noise.")
+            for item in study_offer(path.read_text("utf-8"), str(path)).measures
+            if item.name.startswith("noise.")
+        }
+        for path in (rigid, drop)
+    }
+
+    assert noise[rigid] == {"peak_force", "force_level", "valid_from", "balanced_below"}
+    assert {"radiated_energy", "sound_exposure_level_weighted"} <= noise[drop]
+    assert not {"mount_force_level", "mount_velocity_level"} & noise[drop]

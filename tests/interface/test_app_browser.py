@@ -1,5 +1,6 @@
 """The pages in a browser: they answer, stay within the window, and load nothing from elsewhere."""
 
+import json
 import re
 import shutil
 from pathlib import Path
@@ -74,12 +75,37 @@ def test_a_double_click_starts_what_was_under_the_pointer_and_only_once(page, se
         page.wait_for_timeout(700)
         (job,) = jobs.all()
         jobs.cancel(job.name)
-        page.get_by_role("button", name="Dismiss").click()
+        dismiss = page.get_by_role("button", name="Dismiss")
+        dismiss.wait_for()
+        row = page.locator(".k-row", has=dismiss)
+        assert "cancelled" in row.inner_text()
+        assert row.locator(".k-error").count() == 0  # it was asked for
+        dismiss.click()
         assert job.case == "valve/b.yaml"
         assert page.locator(".q-notification").count() == 0
         page.wait_for_selector("text=klack impact valve/b.yaml", state="detached")
     for name in ("a", "b"):
         (folder / "valve" / f"{name}.yaml").unlink()
+
+
+def test_a_run_that_is_done_leads_to_its_result(page, server, folder):
+    asked = {"command": "impact", "case": CASE, "out": "klack-results/done", "started": 100.0}
+    run = folder / ".klack-app" / "jobs" / "20260101-000000-0123abcd"
+    run.mkdir(parents=True)
+    (run / "job.json").write_text(json.dumps(asked))
+    (run / "ending.json").write_text('{"code": 0, "ended": 121.0}')
+    (folder / "klack-results" / "done").mkdir(parents=True)
+    (folder / "klack-results" / "done" / "report.html").write_text("<p>report</p>")
+    page.goto(f"{server.base}/")
+    row = page.locator(".k-row", has=page.get_by_role("button", name="Dismiss"))
+    row.wait_for()
+    ways = {link.inner_text(): link.get_attribute("href") for link in row.locator("a").all()}
+
+    assert "done in 21 s" in row.inner_text()
+    assert [*ways] == ["Report", "Show", "Sliders", "Hear"]
+    assert ways["Hear"].endswith("case.yaml#k-hear")
+    shutil.rmtree(run)
+    shutil.rmtree(folder / "klack-results" / "done")
 
 
 def test_all_of_a_long_list_is_found_by_a_part_of_its_name(page, server, folder):

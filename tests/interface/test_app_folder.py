@@ -17,6 +17,7 @@ import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import chdir
+from dataclasses import replace
 from pathlib import Path
 
 import psutil
@@ -31,6 +32,7 @@ from klack.app.state import Notes, Sounds, State, Uploads
 from klack.app.valve_plan import Plans, ValvePlan
 from klack.case import case_text
 from klack.errors import InputError
+from klack.terminal.progress import PROGRESS_FILE, show_progress
 
 TEXT = "klack: 1\ntitle: <script>alert(1)</script>\n"
 
@@ -543,6 +545,45 @@ def test_progress_is_read_from_the_folder(folder_jobs, sleeping):
     (found,) = jobs.all()
 
     assert (found.stage, found.fraction) == ("modes", 0.25)
+
+
+def test_a_second_run_says_how_far_it_is_of_the_whole(folder_jobs, sleeping):
+    """From the stages of the first one: 2, 6 and 4 s; half of the second are 5 of 12 s."""
+    jobs = Jobs(folder_jobs)
+    runs = folder_jobs.path / ".klack-app" / "jobs"
+    first = runs / jobs.start("impact", "bad.yaml", "out").name
+    told = {"stage": "report", "fraction": 0.0, "since": 108.0}
+    told["spent"] = {"mesh": 2.0, "modes": 6.0}
+    (first / "progress.json").write_text(json.dumps(told))
+    (first / "ending.json").write_text('{"code": 0, "ended": 112.0}')
+    sleeping[0].kill()
+    sleeping[0].wait()
+    (earlier,) = jobs.all()
+    job = jobs.start("impact", "bad.yaml", "out")
+    told = {"stage": "modes", "fraction": 0.5, "since": 202.0, "spent": {"mesh": 2.0}}
+    (runs / job.name / "progress.json").write_text(json.dumps(told))
+    (found,) = (one for one in jobs.all() if one.name == job.name)
+    share, words = found.progress(found.started + 5.0)
+    alone, alone_words = replace(found, before={}).progress(found.started + 5.0)
+
+    assert dict(earlier.spent) == {"mesh": 2.0, "modes": 6.0, "report": 4.0}
+    assert share == pytest.approx(5.0 / 12.0, rel=1e-12)
+    assert words == "modes (2 of 3), 50 % of it; 5 s so far; about 7 s left, as the last time"
+    assert (alone, alone_words) == (None, "modes, 50 %; 5 s so far")
+
+
+def test_the_file_of_progress_has_the_times_of_the_stages(tmp_path, monkeypatch):
+    file = tmp_path / "progress.json"
+    monkeypatch.setenv(PROGRESS_FILE, str(file))
+    with show_progress() as progress:
+        progress("mesh", 0.0)
+        time.sleep(0.3)
+        progress("modes", 0.0)
+    told = json.loads(file.read_text())
+
+    assert told["stage"] == "modes"
+    assert [*told["spent"]] == ["starting", "mesh"]
+    assert 0.29 < told["spent"]["mesh"] < 3.0  # the sleep, and a loaded machine
 
 
 @pytest.mark.parametrize("name", ["..", "../../x", "20260101-000000-0123456g", ""])

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.input.problem import Key
-from klack.units import format_si
+from klack.units import format_in, format_si
 
 __all__ = [
     "Answer",
@@ -195,6 +195,10 @@ class Slider:
         Whether bodies depend on it, so that it does not move here.
     written
         What the case has there.
+    own, size
+        Unit in which the case has it, and its size in SI; empty for one of klack's choice.
+    also
+        Other places that have the same value always: a lift is the gap of a stop and of a coil.
     """
 
     key: str
@@ -207,10 +211,26 @@ class Slider:
     step: float
     needs_mesh: bool
     written: str
+    own: str = ""
+    size: float = 1.0
+    also: tuple[Key, ...] = ()
+
+    @property
+    def places(self) -> tuple[Key, ...]:
+        """Where the case has the value."""
+        return (self.place, *self.also)
 
     def text(self, value: float) -> str:
         """Value with its unit, as people read it."""
-        return format_si(value, self.unit)
+        return format_in(value, self.own, self.size) if self.own else format_si(value, self.unit)
+
+    def about(self, share: float) -> tuple[float, float]:
+        """Ends of a range: this share of the value on both sides, of a temperature that of 100 K.
+
+        A share of kelvin from absolute zero would be an arctic night to a summer in the desert.
+        """
+        by = share * (100.0 if self.unit == "K" else abs(self.start))
+        return self.start - by, self.start + by
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -60,7 +60,7 @@ from klack.input.problem import CaseProblem, Key
 from klack.machine.progress import silent
 from klack.machine.stages import collected_warnings
 from klack.signals.sampled import TimeSeries
-from klack.units import Kind, format_si
+from klack.units import TEMPERATURE, Kind, unit_in
 
 __all__ = [
     "Curves",
@@ -200,6 +200,7 @@ def stroke_numbers(variant: StrokeVariant, channels: StrokeChannels) -> tuple[Nu
 
 
 _MOST = 60
+_WARMER = 80.0  # [K] of sliders of temperatures, up and down
 _REACH = 2.5  # times the value of the case, up; to a fifth of it, down
 _FIRST: tuple[tuple[str, ...], ...] = (
     ("speed",),
@@ -230,12 +231,30 @@ def sliders_of(case: AnyCase, tree: CaseTree) -> tuple[Slider, ...]:
         needs_mesh = any(kind.makes_bodies(case, key) for key in case.behind(place))
         if quantity.value == 0 or not isfinite(quantity.value):
             continue
-        found.append(_slider(place, quantity.kind, quantity.value, needs_mesh))
+        text = written_at(tree.data, place)
+        found.append(_slider(place, quantity.kind, quantity.value, needs_mesh, text))
+    found = _joined(case, found)
     if isinstance(case, Case):
         found += _offered(case, tree)
     moving = _in_turns(s for s in found if not s.needs_mesh)
     fixed = [s for s in found if s.needs_mesh and "profile" not in s.place]
     return tuple(moving[:_MOST] + fixed[:_MOST])
+
+
+def _joined(case: AnyCase, sliders: Sequence[Slider]) -> list[Slider]:
+    """One slider for places that the study of the case links to one word of its own."""
+    linked = case.study.linked if case.study is not None else {}
+    first: dict[tuple[str, float], int] = {}
+    found: list[Slider] = []
+    for slider in sliders:
+        word = linked.get(slider.key, "")
+        at = first.setdefault((word, slider.start), len(found)) if word.isidentifier() else None
+        if at is None or at == len(found):
+            label = word.replace("_", " ") if at is not None else slider.label
+            found.append(replace(slider, label=label))
+        else:
+            found[at] = replace(found[at], also=(*found[at].also, slider.place))
+    return found
 
 
 def _offered(case: Case, tree: CaseTree) -> Iterator[Slider]:
@@ -267,15 +286,18 @@ def written(slider: Slider, value: float) -> str | float:
     if not isfinite(value):
         raise InputError(slider.key, got=str(value), expected="a number", hint="move the slider.")
     text = slider.text(value)
-    return text if slider.unit else float(text)
+    return text if slider.unit or slider.own else float(text)
 
 
-def _slider(place: Key, kind: Kind, value: float, needs_mesh: bool) -> Slider:
+def _slider(place: Key, kind: Kind, value: float, needs_mesh: bool, text: object) -> Slider:
     unit = "" if kind.bare else kind.unit
+    own, size = unit_in(text, kind)
     low, high = sorted((0.2 * value, _REACH * value))
+    if kind is TEMPERATURE:
+        low, high = max(value - _WARMER, 1.0), value + _WARMER
     if kind.bare and 0 < value < 1:
         high = min(high, 0.99)
-    return Slider(
+    found = Slider(
         key=".".join(map(str, place)),
         place=place,
         label=_label(place),
@@ -285,8 +307,11 @@ def _slider(place: Key, kind: Kind, value: float, needs_mesh: bool) -> Slider:
         start=value,
         step=(high - low) / _STEPS,
         needs_mesh=needs_mesh,
-        written=format_si(value, unit),
+        written="",
+        own=own,
+        size=size,
     )
+    return replace(found, written=found.text(value))
 
 
 def _label(place: Key) -> str:
@@ -455,8 +480,10 @@ class Explorer:
         """Text of the case with these values, otherwise as written."""
         assert self._tree is not None
         places = {
-            self._sliders[key].place: self._sliders[key].text(value)
+            place: slider.text(value)
             for key, value in values.items()
+            for slider in [self._sliders[key]]
+            for place in slider.places
         }
         return with_values(self._tree, places) if places else self._text
 
@@ -481,7 +508,7 @@ class Explorer:
     def _case_at(self, values: Values) -> Any:
         assert self._tree is not None
         assert self._case is not None
-        changes = {}
+        changes: dict[Key, str | float] = {}
         for key, value in values.items():
             slider = self._sliders.get(key)
             if slider is None or slider.needs_mesh:
@@ -491,7 +518,7 @@ class Explorer:
                     expected="one of the sliders",
                     hint="change it in the case, and open that.",
                 )
-            changes[slider.place] = written(slider, value)
+            changes |= dict.fromkeys(slider.places, written(slider, value))
         kind: Any = type(self._case)
         return case_at(kind, self._tree, self._parts_beside(set(changes)), changes)
 

@@ -5,7 +5,7 @@ again::
 
     job.json       what was asked for: command, case, folder of the result
     process.json   number of the process and when it began
-    progress.json  stage and fraction; of a study also how many points are done
+    progress.json  stage, fraction and seconds of earlier stages; of a study also its points
     live           record of a study that runs or was stopped
     ending.json    exit code, when it ended
     cancelled      empty: it was asked to stop
@@ -20,9 +20,9 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field, replace
 from math import isfinite
 from pathlib import Path
 from threading import Lock
@@ -33,7 +33,7 @@ import psutil
 from klack.app.folder import OWN, OpenFolder, replace_file, result_names
 from klack.errors import InputError
 from klack.files.held import HeldFolder
-from klack.machine.progress import PointCount
+from klack.machine.progress import PointCount, duration_text
 from klack.terminal.progress import PROGRESS_FILE
 
 __all__ = ["COMMANDS", "LIVE", "OF_STUDIES", "Job", "Jobs", "State"]
@@ -74,6 +74,12 @@ class Job:
         The last of what it printed.
     points
         Of a study that has begun to compute.
+    since, ended [s]
+        Since 1970: when the stage began, and the run ended; 0 if not.
+    spent [s]
+        Time of each stage before, once ended of all.
+    before [s]
+        The same of an earlier run of the case that reached its end.
     """
 
     name: str
@@ -88,6 +94,28 @@ class Job:
     told: str = ""
     study: str = ""
     points: PointCount | None = None
+    since: float = 0.0
+    ended: float = 0.0
+    spent: Mapping[str, float] = field(default_factory=dict)
+    before: Mapping[str, float] = field(default_factory=dict)
+
+    def progress(self, now: float) -> tuple[float | None, str]:
+        """Share of the whole, as long as an earlier run tells it, and words on stage and times."""
+        fraction = min(max(self.fraction, 0.0), 1.0)
+        words = [self.stage]
+        if self.stage in self.before:
+            words[0] += f" ({[*self.before].index(self.stage) + 1} of {len(self.before)})"
+        if fraction:
+            words[0] += f", {100.0 * fraction:.0f} %" + " of it" * bool(self.before)
+        words.append(f"{duration_text(max(now - self.started, 0.0))} so far")
+        if self.stage not in self.before:
+            return None, "; ".join(words)
+        ahead = [*self.before].index(self.stage)
+        times = [*self.before.values()]
+        share = fraction or min(max(now - self.since, 0.0) / max(times[ahead], 1e-9), 1.0)
+        left = sum(times[ahead + 1 :]) + times[ahead] * (1.0 - share)
+        words.append(f"about {duration_text(left)} left, as the last time")
+        return 1.0 - left / max(sum(times), 1e-9), "; ".join(words)
 
 
 class Jobs:
@@ -188,8 +216,17 @@ class Jobs:
             names = sorted(os.listdir(self._place), reverse=True)
         except OSError:
             return []
-        found = (self._job(name) for name in names if _NAME.fullmatch(name))
-        return [job for job in found if job is not None]
+        read = (self._job(name) for name in names if _NAME.fullmatch(name))
+        found = [job for job in read if job is not None]
+        whole = {
+            (job.command, job.case): job.spent for job in reversed(found) if job.state == "done"
+        }
+        return [
+            replace(job, before=whole.get((job.command, job.case), {}))
+            if job.state == "running"
+            else job
+            for job in found
+        ]
 
     def live(self, name: str) -> Path:
         """Record folder of a running or stopped study."""
@@ -228,18 +265,26 @@ class Jobs:
         try:
             known = {key: asked[key] for key in ("command", "case", "out", "started")}
             code = int(ending["code"]) if ending else None
+            stage, since = str(progress.get("stage", "starting")), float(progress.get("since", 0.0))
+            spent = {str(of): float(time) for of, time in progress.get("spent", {}).items()}
+            end = float(ending["ended"]) if ending else 0.0
+            if end and since:
+                spent[stage] = spent.get(stage, 0.0) + end - since
             return Job(
                 name=name,
                 **known,
                 state=_state(is_running, code, is_cancelled),
-                stage="stopping" if is_cancelled else str(progress.get("stage", "starting")),
+                stage="stopping" if is_cancelled else stage,
                 fraction=float(progress.get("fraction", 0.0)),
                 code=code,
                 told=self._tail(name) if code else "",
                 study=str(asked.get("study", "")),
                 points=_points(progress.get("points")),
+                since=since,
+                ended=end,
+                spent=spent,
             )
-        except (KeyError, TypeError, ValueError):  # not of this version
+        except (AttributeError, KeyError, TypeError, ValueError):  # not of this version
             return None
 
     def _process(self, name: str) -> psutil.Process | None:

@@ -25,7 +25,6 @@ from klack.case.study_source import StudySource, study_of
 from klack.errors import InputError, KlackError
 from klack.input.problem import CaseProblem, Key
 from klack.input.section import Section
-from klack.units import format_si
 
 __all__ = [
     "checked_text",
@@ -181,14 +180,20 @@ def study_text(choice: StudyChoice, case_text: str, case_path: str) -> str:
         "  # keys of the case and their ranges; a tolerance is {normal: {mean: 12 N, sd: 0.3 N}}",
         "  parameters:",
     ]
+    linked: list[str] = []
     for key, (low, high) in choice.ranges.items():
         known = today.get(key)
         if known is None:
             raise _refused(key[:80], "a key that the case has no number at", "one of the list", "")
-        word = format_si(known.start, known.unit)
+        name = known.label.replace(" ", "_") if known.also else key
         lines.append(
-            f"    {_as_yaml(key)}: {{from: {_as_yaml(low)}, to: {_as_yaml(high)}}}  # today {word}"
+            f"    {_as_yaml(name)}: {{from: {_as_yaml(low)}, to: {_as_yaml(high)}}}"
+            f"  # today {known.text(known.start)}"
         )
+        if known.also:
+            linked += [f"    {'.'.join(map(str, place))}: {name}" for place in known.places]
+    if linked:
+        lines += ["  linked:  # what always has the same value", *linked]
     measures = dict.fromkeys((*choice.measures, *choice.objectives))
     of = {item.name: item.measure for item in kind_of(case).measures(case, measures)}
     lines.append("  measures:")

@@ -54,11 +54,12 @@ def show_progress(quiet: bool = False) -> Iterator[Progress]:
 
 
 class _ToFile:
-    """Stage, fraction and points in a file, for ``klack app``."""
+    """Stage, fraction, points and the seconds of earlier stages in a file, for ``klack app``."""
 
     def __init__(self, path: Path) -> None:
         self._path, self._stage, self._next = path, "", 0.0
         self._points: dict[str, Any] = {}
+        self._since, self._spent = time.time(), dict[str, float]()
 
     def counted(self, count: PointCount) -> None:
         """Points that go with the next stage or fraction."""
@@ -68,8 +69,14 @@ class _ToFile:
         now = time.monotonic()
         if stage == self._stage and now < self._next:
             return
+        if stage != self._stage:
+            clock = time.time()
+            ended = self._stage or "starting"
+            self._spent[ended] = self._spent.get(ended, 0.0) + clock - self._since
+            self._since = clock
         self._stage, self._next = stage, now + _OFTEN
-        text = json.dumps({"stage": stage, "fraction": fraction} | self._points)
+        told = {"stage": stage, "fraction": fraction, "since": self._since, "spent": self._spent}
+        text = json.dumps(told | self._points)
         new = self._path.with_suffix(".new")
         with suppress(OSError):  # the work goes on without being watched
             new.write_text(text, encoding="utf-8")

@@ -23,6 +23,7 @@ from klack.analyses.noise.record import (
 )
 
 __all__ = [
+    "AT_MOUNTS",
     "BODY_MEASURES",
     "CLICK_MEASURES",
     "DESIGN_MEASURES",
@@ -162,7 +163,7 @@ def _mounted(
     return level
 
 
-_AT_MOUNTS: tuple[Measure[NoiseDesign], ...] = tuple(
+AT_MOUNTS: tuple[Measure[NoiseDesign], ...] = tuple(
     replace(
         _LEVEL,
         key=key,
@@ -391,7 +392,7 @@ DESIGN_MEASURES: tuple[Measure[NoiseDesign], ...] = described_in(
         deviation="factor",
         page=True,
     ),
-    *_AT_MOUNTS,
+    *AT_MOUNTS,
     Measure(
         key="valid_from",
         symbol="f_1",

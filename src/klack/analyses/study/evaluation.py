@@ -363,12 +363,19 @@ def _of_rows(rows: Sequence[PointRow]) -> tuple[str, ...]:
     return tuple(found)
 
 
+def _to_have(measure: str) -> str:
+    """What may give a measure a value."""
+    if measure.startswith("noise."):
+        return "bodies with named surfaces; levels at mounts need noise.mounts as well"
+    return "a longer run.duration if it comes later"
+
+
 def row_warnings(
     rows: Sequence[PointRow], today: PointRow, columns: Sequence[StudyColumn]
 ) -> tuple[str, ...]:
     """Numbers of failed and doubtful points, with frequent reasons."""
     missing = (
-        f"'{item.name}' has no value at any point. Try: a longer run.duration if it comes later."
+        f"'{item.name}' has no value at any point. Try: {_to_have(item.name)}."
         for item in columns
         if not np.isfinite(item.values).any()
     )

@@ -5,7 +5,7 @@ number, there is none: shots without a rebound are mostly those that rebound hig
 over the others would be too low.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf, isnan
@@ -19,7 +19,7 @@ from klack.analyses.impact.measures import LEVEL_MEASURES, OBLIQUE_MEASURES
 from klack.analyses.impact.record import LevelResult
 from klack.analyses.measures import Measure
 from klack.analyses.noise.body import Transfers
-from klack.analyses.noise.measures import CLICK_MEASURES, DESIGN_MEASURES
+from klack.analyses.noise.measures import AT_MOUNTS, CLICK_MEASURES, DESIGN_MEASURES
 from klack.analyses.noise.record import NoiseDesign
 from klack.analyses.noise.run import click_sound, noise_design
 from klack.analyses.noise.source import NoiseSource
@@ -62,7 +62,8 @@ _NOISE = "noise"
 """Before the names of measures of noise."""
 
 _OF_DESIGNS = [measure.key for measure in DESIGN_MEASURES]
-NOISE_NAMES = tuple(f"{_NOISE}.{key}" for key in _OF_DESIGNS)
+_OF_FORCE = ("peak_force", "force_level", "valid_from", "balanced_below")
+_OF_MOUNTS = tuple(measure.key for measure in AT_MOUNTS)
 NOISE_WORDS = f"of the noise {_NOISE}.KEY with a key of: {one_of(_OF_DESIGNS)}"
 
 
@@ -332,7 +333,16 @@ def impact_measures(case: Case, names: Iterable[str]) -> tuple[ChosenMeasure, ..
 
 def impact_measure_names(case: Case) -> tuple[str, ...]:
     """Measures of an impact, its noise, and its shots if there are any."""
-    return (*_OF_LEVELS, *NOISE_NAMES, *(SHOT_NAMES if case.shots is not None else ()))
+    shots = SHOT_NAMES if case.shots is not None else ()
+    return (*_OF_LEVELS, *_noise_names(case, has_surfaces=case.has_surfaces), *shots)
+
+
+def _noise_names(case: Case | ValveCase, *, has_surfaces: bool) -> Iterator[str]:
+    """Measures of noise that a case can have: without surfaces to radiate those of the force."""
+    has_mounts = case.noise is not None and case.noise.mounts is not None
+    for key in _OF_DESIGNS if has_surfaces else _OF_FORCE:
+        if has_mounts or key not in _OF_MOUNTS:
+            yield f"{_NOISE}.{key}"
 
 
 def _impact_measure(case: Case, name: str) -> ChosenMeasure | None:
@@ -396,9 +406,12 @@ def stroke_measures(case: ValveCase, names: Iterable[str]) -> tuple[ChosenMeasur
 
 def stroke_measure_names(case: ValveCase) -> tuple[str, ...]:
     """Measures of a stroke, first impacts on each stop, restrictions, and noise."""
-    of_impacts = (f"{stop}.{key}" for stop in _stops(case) for key in _OF_IMPACTS)
+    stops = _stops(case)
+    of_impacts = (f"{stop}.{key}" for stop in stops for key in _OF_IMPACTS)
     of_ways = (f"{name}.{key}" for name in _restrictions(case) for key in _OF_DELIVERIES)
-    return (*_OF_VARIANTS, *of_impacts, *of_ways, *NOISE_NAMES)
+    has_surfaces = any(body.has_surfaces for body in case.bodies.values())
+    noise = _noise_names(case, has_surfaces=has_surfaces) if stops else ()
+    return (*_OF_VARIANTS, *of_impacts, *of_ways, *noise)
 
 
 def _stops(case: ValveCase) -> list[str]:

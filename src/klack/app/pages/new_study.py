@@ -22,12 +22,11 @@ from klack.app.pages.frame import (
 from klack.app.state import State
 from klack.app.study_files import free_name
 from klack.errors import KlackError
-from klack.units import format_si
 
 __all__ = ["new_study_page"]
 
 _AT_FIRST = 12  # parameters that are seen without "more"
-_LOW, _HIGH = 0.9, 1.1  # times the value of the case
+_SHARE = 0.1  # of the value of the case, up and down
 _MOST_POINTS = 1_000_000
 _FIRST_POINTS = 64
 
@@ -96,8 +95,8 @@ class _NewStudy:
     def _show_parameters(self, sliders: tuple[Slider, ...]) -> None:
         with table("kp-offer", "", "today", "from", "to"):
             for slider in sliders:
-                low, high = sorted((_LOW * slider.start, _HIGH * slider.start))
-                ends = format_si(low, slider.unit), format_si(high, slider.unit)
+                low, high = map(slider.text, slider.about(_SHARE))
+                ends = (low, high)
                 self._ranges[slider.key] = ends
                 with ui.element("tr"):
                     with ui.element("td"):

@@ -34,6 +34,7 @@ from klack.app.pages.studies import show_study_run
 from klack.app.state import LONGEST_NOTE, State
 from klack.errors import InputError, KlackError
 from klack.files.whole import mark_of
+from klack.machine.progress import duration_text
 
 __all__ = ["overview_page"]
 
@@ -48,6 +49,7 @@ _Row = tuple[str, ui.element]
 _Told = TypeVar("_Told")
 _HEAD = 120  # characters of one that is folded
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,60}")
+_SHOWN = ("impact", "stroke")  # commands whose results have bodies, and cases sliders
 _WORDS = {
     "running": "runs",
     "done": "done",
@@ -166,8 +168,8 @@ class _Overview:
                     self._progress[job.name] = _progress_bar(began)
                     self._progress[job.name](job)
                 else:
-                    plain(f"{_WORDS[job.state]}, {began}", "div").classes("k-soft")
-                    if job.told:
+                    plain(f"{_ending(job)}, {began}", "div").classes("k-soft")
+                    if job.told and job.state != "cancelled":  # which was asked for
                         plain(job.told, "div").classes("k-error")
             with ui.element("div").classes("k-tools"):
                 if job.state == "running":
@@ -175,7 +177,19 @@ class _Overview:
                         "Cancel", partial(is_done, self._state.jobs.cancel, job.name), of=job.out
                     )
                 else:
+                    if job.state == "done":
+                        self._show_ways(job)
                     button("Dismiss", partial(self._forget, job.name), of=job.out)
+
+    def _show_ways(self, job: Job) -> None:
+        """From a run that is done to its result."""
+        if self._state.folder.exists(f"{job.out}/report.html"):
+            report = address("report", f"{job.out}/report.html")
+            link("Report", report, new=True, of=job.out).classes("k-main-btn")
+        if job.command in _SHOWN:
+            link("Show", address("show", job.out), of=job.out)
+            link("Sliders", address("sliders", job.case), of=job.out)
+            link("Hear", f"{address('sliders', job.case)}#k-hear", of=job.out)
 
     async def _forget(self, name: str) -> None:
         await is_done(self._state.jobs.forget, name)
@@ -524,14 +538,24 @@ def _progress_bar(began: str) -> Callable[[Job], None]:
         inner = ui.element("i")
 
     def show(job: Job) -> None:
-        percent = round(100 * min(max(job.fraction, 0.0), 1.0))
-        words.set_text(f"{job.stage}, {percent} %, since {began}")
+        share, told = job.progress(time.time())
+        words.set_text(f"{told}; since {began}")
+        percent = None if share is None else round(100.0 * share)
         if bar.props.get("aria-valuenow") != percent:
             bar.props["aria-valuenow"] = percent
-            inner.style(f"width:{percent}%")
+            inner.style(f"width:{percent or 0}%")
+        bar.classes(add="" if percent else "k-busy", remove="k-busy" if percent else "")
         bar.props["aria-label"] = f"{job.case}: {job.stage}"
+        bar.props["aria-valuetext"] = told
 
     return show
+
+
+def _ending(job: Job) -> str:
+    """How a run ended, and after how long."""
+    took = job.ended - job.started
+    after = f" in {duration_text(took)}" if job.state == "done" and took > 0.0 else ""
+    return f"{_WORDS[job.state]}{after}"
 
 
 def _title(text: str) -> None:

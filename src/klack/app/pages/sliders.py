@@ -38,7 +38,6 @@ from klack.app.pages.frame import (
 from klack.app.state import State
 from klack.app.worker import Worker
 from klack.errors import KlackError
-from klack.units import format_si
 
 __all__ = ["sliders_page"]
 
@@ -104,6 +103,7 @@ class _Sliders:
             with ui.element("div"):
                 self._show_answers(opened)
         self._draw(opened.first)
+        ui.run_javascript("document.getElementById(location.hash.slice(1))?.scrollIntoView()")
 
     def _show_side(self, opened: Opened) -> None:
         moving = [slider for slider in opened.sliders if not slider.needs_mesh]
@@ -137,7 +137,7 @@ class _Sliders:
         with ui.element("div").classes("k-slider") as row:
             with element("label", for_=f"s-{slider.key}", title=slider.key):
                 plain(slider.label)
-                shown = plain(format_si(slider.start, slider.unit), "output")
+                shown = plain(slider.text(slider.start), "output")
             bar = element(
                 "input",
                 type="range",
@@ -154,7 +154,7 @@ class _Sliders:
                     value = min(max(float(event.args), slider.low), slider.high)
                 except (TypeError, ValueError):
                     return
-                shown.set_text(format_si(value, slider.unit))
+                shown.set_text(slider.text(value))
                 row.classes("moved")
                 self._values[slider.key] = value
                 self._moved.set()
@@ -172,7 +172,7 @@ class _Sliders:
             self._charts = [DescribedChart(title, EMPTY) for title in TITLES]
             self._spectrogram = DescribedChart("Spectrogram of the click", EMPTY)
         with ui.element("section").classes("k-sheet k-pad").style("margin-top:16px"):
-            heading("Hear it")
+            heading("Hear it").props("id=k-hear")
             if len(opened.first.ears) > 1:
                 ears = {name: name for name in opened.first.ears}
                 choice_field("At the ear", ears, opened.first.ears[0], self._hear_at)
@@ -343,7 +343,7 @@ class _Sliders:
         for key, (row, shown) in self._rows.items():
             slider = sliders[key]
             row.classes(remove="moved")
-            shown.set_text(format_si(slider.start, slider.unit))
+            shown.set_text(slider.text(slider.start))
         ui.run_javascript(
             "document.querySelectorAll('.k-slider input').forEach(e => "
             "e.value = e.getAttribute('value'))"

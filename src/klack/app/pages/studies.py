@@ -33,6 +33,7 @@ from klack.app.study_files import (
     result_of_study,
 )
 from klack.errors import InputError, KlackError
+from klack.machine.progress import duration_text
 
 __all__ = ["StudyPanel", "show_study_run", "study_points_page"]
 
@@ -221,17 +222,10 @@ def _status(job: Job) -> str:
         return f"{job.stage}, since {began}"
     parts = [f"{count.done} of {count.most} points"]
     if count.left:
-        parts.append(f"about {_duration(count.left)} left")
+        parts.append(f"about {duration_text(count.left)} left")
     if count.best:
         parts.append(count.best)
     return "; ".join(parts)
-
-
-def _duration(seconds: float) -> str:
-    if seconds < 100.0:
-        return f"{seconds:.0f} s"
-    minutes = round(seconds / 60.0)
-    return f"{minutes} min" if minutes < 100 else f"{minutes // 60} h {minutes % 60} min"
 
 
 _OFTEN = 1.5  # [s] that the run is looked at
