@@ -373,7 +373,7 @@ def test_every_slider_is_read_back_as_it_is_written():
         tree = tree_of(path.read_text("utf-8"), path)
         case = tree.any_case()
         for slider in sliders_of(case, tree):
-            if slider.written == "not given":
+            if slider.needs_mesh or slider.written == "not given":
                 continue
             value = 0.37 * slider.low + 0.63 * slider.high
             read = quantity_at(case, slider.place).parse(written(slider, value))

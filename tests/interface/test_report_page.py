@@ -6,20 +6,25 @@ import zlib
 from collections import Counter
 from contextlib import suppress
 from dataclasses import replace
+from importlib.resources import files
+from io import BytesIO
 
 import numpy as np
 import pytest
 import typst
+from matplotlib import pyplot
 from matplotlib.axes import Axes
 
 from klack.analyses.impact.content import report_content
 from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.stroke.content import NEXT_STEPS
 from klack.cli.commands import parser
-from klack.report.chart import AxisSpec, Chart, Curve, Panel
+from klack.report.chart import AxisSpec, Chart, Curve, Mark, Panel
 from klack.report.html import render_html
+from klack.report.interactive import figure_of
 from klack.report.page import Content, NextStep, Section, Table
 from klack.report.pdf import render_pdf
+from klack.report.printed import STYLE, shown_chart
 
 pytestmark = pytest.mark.slow
 
@@ -98,13 +103,13 @@ def pages_of(paper: bytes) -> int:
 
 
 def test_figures_that_nearly_fit_are_drawn_smaller_instead_of_leaving_half_a_page():
-    # 0.7 + 2 * 1.05 * 1.9 = 4.7 in = 119 mm high; with heading and caption 138 mm of 259
+    # 0.9 + 2 * 1.05 * 1.7 = 4.5 in = 114 mm high; with heading and caption 133 mm of 259
     assert pages_of(render_pdf(one_chart_each(8))) == 5  # two each, and the first page's head
 
 
 def test_a_figure_that_needs_a_page_of_its_own_keeps_its_size():
-    # 0.7 + 4 * 1.05 * 1.9 = 8.7 in = 221 mm
-    assert pages_of(render_pdf(one_chart_each(3, panels=4))) == 5
+    # 0.9 + 4 * 1.05 * 1.7 = 8.0 in = 204 mm; the last one leaves room for the words at the end
+    assert pages_of(render_pdf(one_chart_each(3, panels=4))) == 4
 
 
 _EMPTY = Content(
@@ -144,3 +149,63 @@ def test_a_figure_is_drawn_once_and_the_pages_are_set_once(store: str, tmp_path,
     assert calls == {"drawn": 6 if store == "off" else 3, "set": 2}
     render_pdf(one_chart_each(1, panels=2))  # another one
     assert calls["drawn"] == (8 if store == "off" else 5)
+
+
+def test_letters_in_figures_have_eight_points_on_paper_and_on_a_telephone():
+    """Paper draws a figure at LETTERS times its share of the width; 1 px of a screen is 3/4 pt."""
+    template = files("klack.report").joinpath("template.typ").read_text("utf-8")
+    smallest = float(re.search(r"#let smallest = ([\d.]+)", template)[1])
+    sizes = [v for k, v in STYLE.items() if k.endswith("size")]
+    narrow = files("klack.report").joinpath("page.js").read_text("utf-8")
+    pixels = [int(size) for size in re.findall(r"size: (\d+)\}", narrow)]
+    shown = figure_of(marked(1.0))["layout"]
+    pixels += [shown["font"]["size"], *(mark["font"]["size"] for mark in shown["annotations"])]
+
+    assert min(sizes) * smallest >= 8.0
+    assert min(pixels) * 0.75 >= 8.0
+
+
+def marked(at: float) -> Chart:
+    x = np.linspace(0.0, 1.0, 5)
+    panel = Panel(
+        y=AxisSpec(label="y"),
+        curves=(Curve(x=x, y=x, label="line"),),
+        marks=(Mark(value=at, label="347 kHz, the last of them"),),
+    )
+    return Chart(name="marked", title="marked", x=AxisSpec(label="x"), panels=(panel,))
+
+
+@pytest.mark.parametrize("at", [0.0, 0.3, 0.7, 1.0])
+def test_a_label_stays_within_its_plot(at: float):
+    """At the left end right of its line, at the right end left of it; drawn and measured."""
+    (label,) = figure_of(marked(at))["layout"]["annotations"]
+    axes = shown_chart(marked(at))
+    axes.figure.draw_without_rendering()
+    (text,) = axes.texts
+    frame, box = axes.get_window_extent(), text.get_window_extent()
+    pyplot.close(axes.figure)
+
+    assert label["xanchor"] == ("right" if at > 0.6 else "left")
+    assert frame.x0 <= box.x0
+    assert box.x1 <= frame.x1
+
+
+def test_a_table_that_goes_on_shows_it(browser):
+    """A shadow at the side that is hidden: darker pixels there than in a table that fits."""
+    wide = Table(columns=tuple("abcdefghijkl"), rows=(tuple(f"{'9' * 9}" for _ in range(12)),))
+    seen = {}
+    for name, table in (("wide", wide), ("fits", Table(columns=("a",), rows=(("1",),)))):
+        page = browser.new_page(viewport={"width": 400, "height": 700})
+        page.set_content(render_html(replace(_EMPTY, numbers=table)))
+        box = page.locator(".scroll").first.bounding_box()
+        clip = {"x": box["x"] + box["width"] - 6, "y": box["y"] + 1, "width": 4, "height": 4}
+        image = plt_image(page.screenshot(clip=clip))
+        seen[name] = float(image.mean())
+        page.close()
+
+    assert seen["fits"] > 0.995
+    assert seen["wide"] < 0.97
+
+
+def plt_image(png: bytes) -> np.ndarray:
+    return pyplot.imread(BytesIO(png))[..., :3]

@@ -18,6 +18,7 @@ from klack.analyses.stroke.analysis import STROKE, first_impact, stroke_answer
 from klack.analyses.stroke.axis import guide_of
 from klack.analyses.stroke.content import stroke_charts, stroke_content
 from klack.analyses.stroke.film_frames import film_charts
+from klack.analyses.stroke.measures import pace
 from klack.analyses.stroke.record import (
     FluidSummary,
     LineSummary,
@@ -633,3 +634,40 @@ def test_a_guide_with_a_film_is_known_to_the_report(study: StrokeStudy):
     assert found is not None
     assert found.film is not None
     assert found.film.length == pytest.approx(1e-3, rel=1e-12)
+
+
+# --------------------------------------------------------------------------- what is read first
+
+
+def test_ten_numbers_come_first_and_no_paragraphs_are_among_them(study: StrokeStudy):
+    content = stroke_content(study)
+    first = {row[0] for row in content.numbers.rows}
+    further = next(s for s in content.sections if s.title == "Further numbers").tables
+
+    assert len(first) <= 10
+    assert {"opening time", "closing time", "largest lift"} <= first
+    assert all(len(cell) < 40 for row in content.numbers.rows for cell in row)
+    named = {row[0] for table in further for row in table.rows}
+    assert {"impacts", "energy residual", "computing time", "shortest time step"} <= named
+    assert not first & named
+
+
+def test_the_speed_of_the_computation_has_a_direction(study: StrokeStudy):
+    wall, end = 4e-4, float(study.reference.result.time[-1])
+    quick = replace(study.reference, result=replace(study.reference.result, wall_time=wall))
+
+    assert pace(quick) == f"{end / wall:.3g} times faster than real time"
+    assert "than real time" in stroke_content(study).answer
+
+
+def test_a_document_has_one_micro_and_one_way_of_powers(study: StrokeStudy):
+    noted = replace(study, warnings=("wider by 3 um, area 2 mm^2, {gap: 3 um^2}, 1.5e-07 of it",))
+    content = stroke_content(noted)
+    words = [content.answer, *content.warnings]
+    for table in (content.numbers, *(t for s in content.sections for t in s.tables)):
+        words += [*table.columns, *(cell for row in table.rows for cell in row)]
+
+    assert content.warnings[0] == "wider by 3 µm, area 2 mm², {gap: 3 um^2}, 1.5·10⁻⁷ of it"
+    for word in words:
+        plain = re.sub(r"\{.*\}", "", word)  # of a case, to be copied
+        assert not re.search(r"[\[/]u[msN]\b|\d[ \u00a0]u[msN]\b|\d[eE][+−-]?\d", plain), word

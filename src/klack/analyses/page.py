@@ -66,7 +66,7 @@ def page_of(
         case_text=record.case_text,
         versions=", ".join([made, *libraries, *own_code(record.own_components)]),
         next_steps=tuple(next_steps),
-    )
+    ).spelled()
 
 
 def stage_table(stage_times: Mapping[str, float], wall_time: float) -> Table:

@@ -140,6 +140,9 @@ AREA_OPACITY = 0.3
 LABEL_STEP = 0.13
 """Share of the panel between labels of vertical marks."""
 
+_TURNING = 0.6
+"""Share of the x axis beyond which labels stand left of their lines, also where it is narrow."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AxisSpec:
@@ -254,6 +257,25 @@ class Chart:
     x: AxisSpec
     panels: tuple[Panel, ...]
     note: str = ""
+
+    def turns(self, x: float) -> bool:
+        """Whether a label at this value stands left of it: the right end would cut it."""
+        low, high = self._ends
+        if self.x.log:
+            if min(low, x) <= 0.0:
+                return False
+            low, high, x = log10(low), log10(high), log10(x)
+        return high > low and (x - low) / (high - low) > _TURNING
+
+    @property
+    def _ends(self) -> tuple[float, float]:
+        """Lowest and highest value of the x axis."""
+        if self.x.range is not None:
+            return self.x.range
+        drawn = [curve.x for panel in self.panels for curve in panel.curves]
+        known = np.concatenate(drawn) if drawn else np.zeros(0)
+        known = known[np.isfinite(known) & (known > 0.0 if self.x.log else True)]
+        return (float(known.min()), float(known.max())) if known.size else (0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -17,7 +17,6 @@ from klack.report.chart import (
     BarChart,
     Chart,
     Curve,
-    Panel,
     ParallelChart,
     RingFrames,
     frame_text,
@@ -188,7 +187,7 @@ def plotly_chart(chart: Chart) -> dict[str, Any]:
         layout[f"yaxis{_suffix(i)}"] = _axis(panel.y) | {"domain": [bottom, top]}
         top = bottom - _PANEL_GAP
         data += [_curve(curve, i, chart.x.unit, panel.y.unit, named) for curve in panel.curves]
-        _add_marks(layout, panel, i, chart.x.log)
+        _add_marks(layout, chart, i)
     return {"data": data, "layout": layout}
 
 
@@ -341,7 +340,8 @@ def _curve(curve: Curve, panel: int, x_unit: str, y_unit: str, named: set[str]) 
     return trace
 
 
-def _add_marks(layout: dict[str, Any], panel: Panel, index: int, log_x: bool) -> None:
+def _add_marks(layout: dict[str, Any], chart: Chart, index: int) -> None:
+    panel = chart.panels[index]
     y_axis = f"y{_suffix(index)} domain"
     for band in panel.bands:
         layout["shapes"].append(
@@ -360,7 +360,7 @@ def _add_marks(layout: dict[str, Any], panel: Panel, index: int, log_x: bool) ->
             }
         )
         if band.label:
-            layout["annotations"].append(_label(band.label, band.low, 0.02, y_axis, log_x, "left"))
+            layout["annotations"].append(_label(chart, band.label, band.low, 0.02, y_axis))
     upright = [mark for mark in panel.marks if mark.label and mark.axis == "x"]
     for mark in panel.marks:
         across = mark.axis == "y"
@@ -378,17 +378,17 @@ def _add_marks(layout: dict[str, Any], panel: Panel, index: int, log_x: bool) ->
         )
     for i, mark in enumerate(upright):  # one below the other
         height = 0.98 - LABEL_STEP * i
-        layout["annotations"].append(_label(mark.label, mark.value, height, y_axis, log_x, "left"))
+        layout["annotations"].append(_label(chart, mark.label, mark.value, height, y_axis))
 
 
-def _label(text: str, x: float, y: float, y_axis: str, log_x: bool, anchor: str) -> dict[str, Any]:
+def _label(chart: Chart, text: str, x: float, y: float, y_axis: str) -> dict[str, Any]:
     return {
         "text": escape(text),
-        "x": log10(x) if log_x and x > 0 else x,
+        "x": log10(x) if chart.x.log and x > 0 else x,
         "y": y,
         "xref": "x",
         "yref": y_axis,
-        "xanchor": anchor,
+        "xanchor": "right" if chart.turns(x) else "left",
         "yanchor": "bottom" if y < 0.5 else "top",
         "showarrow": False,
         "font": {"size": 11, "color": "#444a52"},

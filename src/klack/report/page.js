@@ -54,7 +54,9 @@ function draw() {
   for (const plot of document.querySelectorAll(".plot")) {
     const figure = JSON.parse(plot.nextElementSibling.textContent);
     if (figure.axes && plot.firstChild) continue;
-    if (figure.axes) {
+    if (figure.axes) {  // upright lettering needs its room: scrolled where the window is narrow
+      plot.style.minWidth = `${64 * figure.axes.length + 100}px`;
+      plot.parentElement.classList.add("drawn");
       drawParallel(plot, figure);
       continue;
     }
@@ -65,6 +67,7 @@ function draw() {
       config: {responsive: true, displaylogo: false, displayModeBar: !narrow.matches, modeBarButtons: [buttons]}});
     if (!figure.frames) drawn.push([plot, figure]);
   }
+  letReach();
 }
 function repaint(paper) {
   for (const [plot, figure] of drawn) {
@@ -76,7 +79,7 @@ dark.addEventListener("change", () => repaint(false));
 narrow.addEventListener("change", () => { if (window.Plotly) draw(); });
 // what is wider than the window is scrolled, with the keyboard as well
 function letReach() {
-  for (const box of document.querySelectorAll(".scroll, figure.wide")) {
+  for (const box of document.querySelectorAll(".scroll, figure.wide, figure.drawn")) {
     const title = box.closest(".part")?.querySelector("h2") || document.querySelector("h1");
     const given = box.scrollWidth > box.clientWidth
       ? {tabindex: "0", role: "group", "aria-label": `${title.textContent}, wider than the window`} : {};

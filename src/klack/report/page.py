@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 from klack.report.chart import AnyChart
+from klack.report.wording import spelled
 
 __all__ = ["Content", "NextStep", "Picture", "Section", "Sound", "Table"]
 
@@ -23,6 +24,11 @@ class Table:
 
     columns: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
+
+    def spelled(self) -> Self:
+        """The same with units and powers as pages spell them."""
+        rows = tuple(tuple(map(spelled, row)) for row in self.rows)
+        return replace(self, columns=tuple(map(spelled, self.columns)), rows=rows)
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +100,31 @@ class Content:
     case_text: str
     versions: str
     next_steps: tuple[NextStep, ...] = ()
+
+    def spelled(self) -> Self:
+        """The same with units and powers as pages spell them; the case stays as it is written."""
+
+        def terms(items: tuple[tuple[str, str], ...]) -> tuple[tuple[str, str], ...]:
+            return tuple((term, spelled(text)) for term, text in items)
+
+        sections = tuple(
+            replace(
+                section,
+                paragraphs=tuple(map(spelled, section.paragraphs)),
+                charts=tuple(replace(c, note=spelled(c.note)) for c in section.charts),
+                tables=tuple(table.spelled() for table in section.tables),
+            )
+            for section in self.sections
+        )
+        return replace(
+            self,
+            answer=spelled(self.answer),
+            numbers=self.numbers.spelled(),
+            warnings=tuple(map(spelled, self.warnings)),
+            sections=sections,
+            definitions=terms(self.definitions),
+            limits=terms(self.limits),
+        )
 
     def placed(self, *, result: str = "", case: str = "") -> Self:
         """Write folder and case, as typed at a terminal, into the next steps.

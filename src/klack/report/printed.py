@@ -5,7 +5,6 @@ SVG has letters as outlines.
 
 from collections.abc import Callable, Iterable
 from io import BytesIO
-from math import log
 from pathlib import Path
 from typing import Any
 
@@ -109,26 +108,30 @@ def _draw(axes: Any, chart: RingFrames, k: int, norm: Normalize) -> PatchCollect
     axes.set_ylim(-1.04, 1.04)
     axes.set_aspect("equal")
     axes.set_axis_off()
-    axes.set_title("\n".join(frame_text(chart, k).split(", ")), fontsize=6.8)
+    axes.set_title("\n".join(frame_text(chart, k).split(", ")))
     return drawn
 
+
+LETTERS = 9.8
+"""Size of letters [pt]: 8 on a page that draws a figure at 0.82 of its size, see template.typ."""
+
+_LINE = 0.1
+"""Share of a panel of the share 1 that a line of letters takes."""
 
 _WIDTH = 6.7
 """Text width of an A4 page [in]."""
 
-_NEAR_END = 0.88
-"""Share of the axis beyond which labels stand left of their lines."""
-
 STYLE: dict[str, Any] = {
     "font.family": "DejaVu Sans",
-    "font.size": 8.0,
+    "font.size": LETTERS,
     "axes.linewidth": 0.6,
     "axes.grid": True,
     "axes.axisbelow": True,
     "grid.color": "#e3e6ea",
     "grid.linewidth": 0.5,
     "legend.frameon": False,
-    "legend.fontsize": 7.5,
+    "legend.fontsize": LETTERS,
+    "axes.titlesize": LETTERS,
     "legend.handlelength": 3.2,
     "lines.scale_dashes": False,
     "svg.fonttype": "path",
@@ -222,11 +225,11 @@ def _parallel(chart: ParallelChart, width: float, blank: Blank) -> Figure:
                 span = ends[k, 1] - ends[k, 0]
                 marks = [((i - ends[k, 0]) / span, word) for i, word in enumerate(axis.words)]
             for height, text in marks:
-                axes.text(k, height, f" {plain(text)}", fontsize=6.0, ha="left", va="center")
+                axes.text(k, height, f" {plain(text)}", ha="left", va="center")
         axes.set_xlim(-0.1, len(chart.axes) - 0.6)
         axes.set_ylim(-0.04, 1.04)
         texts = [plain(axis.spec.text) for axis in chart.axes]
-        axes.set_xticks(x, texts, rotation=20, ha="right", fontsize=6.5)
+        axes.set_xticks(x, texts, rotation=20, ha="right")
         axes.set_yticks([])
         axes.set_frame_on(False)
         bar = figure.colorbar(shown, ax=axes, pad=0.01)
@@ -236,12 +239,12 @@ def _parallel(chart: ParallelChart, width: float, blank: Blank) -> Figure:
 
 def _curves(chart: Chart, width: float, blank: Blank) -> Figure:
     shares = [panel.share for panel in chart.panels]
-    figure = blank(figsize=(width, 0.7 + 1.9 * sum(shares)), layout="constrained")
+    figure = blank(figsize=(width, 0.9 + 1.7 * sum(shares)), layout="constrained")
     grid = figure.subplots(
         len(shares), 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": shares}
     )[:, 0]
     for panel, axes in zip(chart.panels, grid, strict=True):
-        _draw_panel(axes, panel, chart.x)
+        _draw_panel(axes, panel, chart)
     _scale(grid[-1], chart.x, "x")
     _legend(figure, grid)
     return figure
@@ -272,7 +275,6 @@ def _bars(chart: BarChart, blank: Blank) -> Figure:
                 bars,
                 texts,
                 label_type="center",
-                fontsize=7,
                 color="black" if light else "white",
                 bbox={"facecolor": COLOURS[part.colour], "edgecolor": "none", "pad": 0.8},
             )
@@ -285,32 +287,21 @@ def _bars(chart: BarChart, blank: Blank) -> Figure:
         return figure
 
 
-def _draw_panel(axes: Any, panel: Panel, x: AxisSpec) -> None:
+def _draw_panel(axes: Any, panel: Panel, chart: Chart) -> None:
     for band in panel.bands:
         axes.axvspan(band.low, band.high, color="#dbe9f6", alpha=0.45, linewidth=0, zorder=0)
         if band.label:
-            _note(axes, band.low, 0.02, " " + band.label, "left", "bottom")
+            _note(axes, band.low, 0.02, band.label, "bottom", turned=chart.turns(band.low))
     for mark in panel.marks:
         draw = axes.axvline if mark.axis == "x" else axes.axhline
         draw(mark.value, color="#5b626b", linewidth=0.7, dashes=(3, 3), zorder=1)
     upright = [mark for mark in panel.marks if mark.label and mark.axis == "x"]
     for i, mark in enumerate(upright):
-        side = "right" if _share_of_axis(x, mark.value) > _NEAR_END else "left"
-        text = f"{mark.label} " if side == "right" else f" {mark.label}"
-        _note(axes, mark.value, 0.98 - LABEL_STEP * i, text, side, "top")
+        height = 0.98 - max(LABEL_STEP, _LINE / panel.share) * i
+        _note(axes, mark.value, height, mark.label, "top", turned=chart.turns(mark.value))
     for curve in panel.curves:
         _draw_curve(axes, curve)
     _scale(axes, panel.y, "y")
-
-
-def _share_of_axis(x: AxisSpec, value: float) -> float:
-    """Place on an axis, 0 to 1; 0 without a range."""
-    if x.range is None:
-        return 0.0
-    low, high = x.range
-    if x.log:
-        return log(value / low) / log(high / low)
-    return (value - low) / (high - low)
 
 
 def _draw_curve(axes: Any, curve: Curve) -> None:
@@ -338,15 +329,14 @@ def _draw_curve(axes: Any, curve: Curve) -> None:
         line.set_dashes([0.6 * length for length in DASHES[curve.style]])
 
 
-def _note(axes: Any, x: float, y: float, text: str, side: str, height: str) -> None:
+def _note(axes: Any, x: float, y: float, text: str, height: str, *, turned: bool) -> None:
     axes.text(
         x,
         y,
-        plain(text),
+        plain(f"{text} " if turned else f" {text}"),
         transform=axes.get_xaxis_transform(),
-        ha=side,
+        ha="right" if turned else "left",
         va=height,
-        fontsize=6.5,
         color="#444a52",
         clip_on=True,
         bbox={"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 0.6},
@@ -354,7 +344,9 @@ def _note(axes: Any, x: float, y: float, text: str, side: str, height: str) -> N
 
 
 def _scale(axes: Any, spec: AxisSpec, which: str) -> None:
-    getattr(axes, f"set_{which}label")(plain(spec.text))
+    # upright, a label and its unit in one line are longer than a low panel
+    text = spec.text if which == "x" else spec.text.replace(" [", "\n[")
+    getattr(axes, f"set_{which}label")(plain(text))
     if spec.log:
         getattr(axes, f"set_{which}scale")("log")
     if spec.ticks:
@@ -371,7 +363,8 @@ def _legend(figure: Figure, grid: Any) -> None:
             entries.setdefault(label, handle)
     if not entries:
         return
-    columns = 3 if max(map(len, entries)) < 30 else 2
+    longest = max(map(len, entries))
+    columns = 3 if longest < 20 else 2 if longest < 40 else 1
     figure.legend(
         entries.values(), entries.keys(), loc="outside upper left", ncols=min(columns, len(entries))
     )

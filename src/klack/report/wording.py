@@ -22,6 +22,7 @@ __all__ = [
     "share",
     "signed",
     "signed_share",
+    "spelled",
     "typeset",
 ]
 
@@ -30,6 +31,11 @@ _WITHOUT_PREFIX = ("", "dB", "dBA", "sone", "phon", "acum")
 _PURE_POWER = re.compile(r"m\^(?P<power>[23])")
 _SMALL = 0.1  # [m] areas and volumes of less than its power are in mm^2, mm^3
 _MINUS, _NONE = "\N{MINUS SIGN}", "–"
+_BRACES = re.compile(r"(\{[^{}]*\})")
+_MICRO = re.compile(r"(?:(?<=\d[ \u00a0\u202f])|(?<=[\[/*\u00b7]))u(?=(?:m|s|N|J|A|F|H|V|W|Wb|Pa)\b)")
+_POWER = re.compile(r"(\b(?:[mcuµkn]?m|s|N|A|Pa))\^(-?[1-9])\b")
+_EXPONENT = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?)e([+\-\u2212]?\d+)(?!\w|\.\d)")
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _THIN, _FIXED = "\N{NARROW NO-BREAK SPACE}", "\N{NO-BREAK SPACE}"
 
 
@@ -183,6 +189,29 @@ def power(value: float) -> str:
     '3.2e−13'
     """
     return f"{value:.1e}".replace("-", _MINUS)
+
+
+def spelled(text: str) -> str:
+    r"""Words of klack as a page spells units and powers: one micro, one way of exponents.
+
+    Braces hold keys of a case, to be copied as they are.
+
+    >>> spelled("12 us on 5 N/um, 47.2 mm^3 {volume: 47.2 mm^3}").replace("\xa0", " ")
+    '12 µs on 5 N/µm, 47.2 mm³ {volume: 47.2 mm^3}'
+    >>> spelled("5.7e−15, at 2e+04 1/s: 8e-17."), spelled("stop 1e5b and 'us'")
+    ('5.7·10⁻¹⁵, at 2·10⁴ 1/s: 8·10⁻¹⁷.', "stop 1e5b and 'us'")
+    """
+    parts = _BRACES.split(text)
+    for k in range(0, len(parts), 2):
+        plain = _MICRO.sub("µ", parts[k])
+        plain = _POWER.sub(lambda found: found[1] + found[2].translate(_RAISED), plain)
+        parts[k] = _EXPONENT.sub(_power_of_ten, plain)
+    return "".join(parts)
+
+
+def _power_of_ten(found: re.Match[str]) -> str:
+    exponent = str(int(found[2].replace(_MINUS, "-"))).translate(_RAISED)
+    return f"{found[1]}\N{MIDDLE DOT}10{exponent}"
 
 
 def typeset(text: str) -> str:

@@ -35,7 +35,7 @@ from klack.analyses.stroke.measures import (
     NOT_REACHED,
     SPEEDS,
     VARIANT_MEASURES,
-    real_time_factor,
+    pace,
     shown_measures,
     steps_told,
 )
@@ -65,6 +65,7 @@ __all__ = [
     "stroke_answer",
     "time_rows",
     "told_deliveries",
+    "unbalanced",
 ]
 
 
@@ -86,6 +87,7 @@ AXIS_COLUMNS = ("axis at seat x, y [um]", "tilt x, y [mrad]")
 CHANGES = "what changes when all time steps are doubled"
 
 _TOLD = 20
+_NO_FORCE = 1e-12  # [N]
 
 
 class _Variant(NamedTuple):
@@ -473,8 +475,15 @@ def start_text(variant: StrokeVariant) -> str:
     parts = [f"{body} {_from_to(ys)}" for body, ys in places.items()]
     for name, p in start.pressure.items():
         parts.append(f"{name} {p / 1e5:.5g} bar" + (" (stated)" if start.stated[name] else ""))
-    left = max((abs(force) for force in start.residual.values()), default=0.0)
-    return f"start at rest: {', '.join(parts)}; forces balance to {format_si(left, 'N', 1)}"
+    return f"start at rest: {', '.join(parts)}; forces balance to {unbalanced(variant)}"
+
+
+def unbalanced(variant: StrokeVariant) -> str:
+    """Force that the equilibrium at the start leaves on a body: round-off has no digits."""
+    start = variant.result.start
+    residual = () if start is None else start.residual.values()
+    left = max((abs(force) for force in residual), default=0.0)
+    return format_si(left, "N", 1) if left > _NO_FORCE else f"less than {format_si(_NO_FORCE, 'N')}"
 
 
 def _from_to(displacements: list[float]) -> str:
@@ -503,8 +512,7 @@ def stroke_answer(study: StrokeStudy) -> str:
     words.append(
         f"These numbers come from the variant '{variant.name}' ({variant.label}), "
         f"{quantity(float(variant.result.time[-1] - variant.result.time[0]), 's', 3)} computed in "
-        f"{quantity(variant.result.wall_time, 's', 2)}: {real_time_factor(variant):.3g} times the "
-        "real time."
+        f"{quantity(variant.result.wall_time, 's', 2)}, {pace(variant)}."
     )
     words += [_compared(variant, other) for other in list(study.variants.values())[1:]]
     return " ".join(word for word in words if word)

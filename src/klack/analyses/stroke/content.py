@@ -17,10 +17,10 @@ from klack.analyses.stroke.analysis import (
     first_impact,
     has_films,
     largest,
-    start_text,
     stroke_answer,
     time_rows,
     told_deliveries,
+    unbalanced,
 )
 from klack.analyses.stroke.axis import (
     acts_across,
@@ -48,6 +48,7 @@ from klack.analyses.stroke.measures import (
     SPEEDS,
     VARIANT_MEASURES,
     shown_measures,
+    step_parts,
 )
 from klack.analyses.stroke.missing import cut_records
 from klack.analyses.stroke.pairs import BY_PAIR, PAIR_MEASURES, impacts_by_pair
@@ -92,6 +93,7 @@ def stroke_content(study: StrokeStudy) -> Content:
         Section(title="Loops of the iron", charts=_named(loop_chart(study))),
         _comparison(study, wet=False),
         _impacts(study),
+        Section(title="Further numbers", tables=_further_tables(study)),
         Section(
             title="Energy",
             charts=_named(energy_bars(study), mechanical_energy_bars(study)),
@@ -263,7 +265,7 @@ def _impacts(study: StrokeStudy) -> Section:
     return Section(title="All impacts", paragraphs=tuple(paragraphs), tables=tuple(tables))
 
 
-_OF_FIRST = ("approach_speed", "touch_speed", "peak_force", "contact_time", "restitution")
+_OF_FIRST = ("approach_speed", "touch_speed", "peak_force", "restitution")
 
 
 def _computed(study: StrokeStudy) -> Section:
@@ -349,42 +351,95 @@ def _time_tables(study: StrokeStudy) -> tuple[Table, ...]:
 
 
 def _number_table(study: StrokeStudy) -> Table:
-    variants = list(study.variants.values())
-    shown = [_row(measure, variants) for measure in VARIANT_MEASURES if measure.page]
-    first = 1 + max(i for i, row in enumerate(shown) if row[0] in ("closing time", "impacts"))
-    starts = [start_text(variant).removeprefix("start ") for variant in variants]
-    rows = [*shown[:first], ("start", *(text or "continued, or free" for text in starts))]
-    channels = study.channels
-    for title, names, unit in (
-        ("largest current", channels.current, "A"),
-        ("largest magnetic force", channels.magnetic_force, "N"),
-        ("largest lift", (channels.lift,), "m"),
-    ):
-        values = [largest(variant, names) for variant in variants]
-        if np.isfinite(values).any():
-            rows.append((title, *(quantity(value, unit) for value in values)))
+    """The numbers that are asked for first, ten for a valve with two stops."""
+    rows = [*_of_variants(study, ("opening_time", "closing_time")), *_largest(study, first=True)]
     for stop in shown_stops(study):
-        events = [first_impact(variant, stop) for variant in variants]
-        filmed = any(has_films(study, variant, stop) for variant in variants)
-        rows += [
-            (
-                f"first impact, {stop}: {measure.title or measure.name}",
-                *("–" if event is None else measure.on_page(event) for event in events),
-            )
-            for measure in shown_measures(filmed=filmed)
-            if measure.key in _OF_FIRST
-        ]
+        rows += _of_first(
+            study, stop, ("approach_speed", "touch_speed", "peak_force", "restitution")
+        )
+    return Table(columns=_heads(study), rows=tuple(rows))
+
+
+def _further_tables(study: StrokeStudy) -> tuple[Table, ...]:
+    """All other key numbers; the state at the start and the steps in time."""
+    variants = list(study.variants.values())
+    rows = [*_of_variants(study, ("impacts",)), *_largest(study, first=False)]
+    for stop in shown_stops(study):
+        rows += _of_first(study, stop, ("contact_time",))
     rows += [
         (f"set left on {stop}", *(_set_left(variant, stop) for variant in variants))
         for stop in dict.fromkeys(stop for variant in variants for stop in variant.result.faces)
     ]
-    rows += shown[first:]
-    heads = [
-        f"{variant.name}{' (reference)' if variant is variants[0] and len(variants) > 1 else ''}"
-        f"\n{variant.label}"
-        for variant in variants
+    rows += _of_variants(study, ("energy_residual", "degrees_of_freedom", "step", "wall_time"))
+    states = [_state_at_start(variant) for variant in variants]
+    steps = [dict(step_parts(variant)) for variant in variants]
+    found = [Table(columns=_heads(study), rows=tuple(rows))]
+    for title, columns in (("at rest at the start", states), ("steps in time", steps)):
+        names = tuple(dict.fromkeys(name for column in columns for name in column))
+        if names:
+            cells = tuple((name, *(column.get(name, "–") for column in columns)) for name in names)
+            found.append(Table(columns=(title, *study.variants), rows=cells))
+    return tuple(found)
+
+
+def _heads(study: StrokeStudy) -> tuple[str, ...]:
+    variants = list(study.variants.values())
+    return (
+        "",
+        *(
+            f"{variant.name}{' (reference)' if variant is variants[0] and variants[1:] else ''}"
+            f"\n{variant.label}"
+            for variant in variants
+        ),
+    )
+
+
+def _of_variants(study: StrokeStudy, keys: tuple[str, ...]) -> list[tuple[str, ...]]:
+    variants = list(study.variants.values())
+    return [_row(measure, variants) for measure in VARIANT_MEASURES if measure.key in keys]
+
+
+def _largest(study: StrokeStudy, *, first: bool) -> list[tuple[str, ...]]:
+    """Largest lift and current, or magnetic force, of those that the valve has."""
+    channels = study.channels
+    found = (
+        (("largest lift", (channels.lift,), "m"), ("largest current", channels.current, "A"))
+        if first
+        else (("largest magnetic force", channels.magnetic_force, "N"),)
+    )
+    rows = []
+    for title, names, unit in found:
+        values = [largest(variant, names) for variant in study.variants.values()]
+        if np.isfinite(values).any():
+            rows.append((title, *(quantity(value, unit) for value in values)))
+    return rows
+
+
+def _of_first(study: StrokeStudy, stop: str, keys: tuple[str, ...]) -> list[tuple[str, ...]]:
+    """Measures of the first impact on a stop."""
+    variants = study.variants.values()
+    events = [first_impact(variant, stop) for variant in variants]
+    filmed = any(has_films(study, variant, stop) for variant in variants)
+    return [
+        (
+            f"first impact, {stop}: {measure.title or measure.name}",
+            *("–" if event is None else measure.on_page(event) for event in events),
+        )
+        for measure in shown_measures(filmed=filmed)
+        if measure.key in keys and measure.page
     ]
-    return Table(columns=("", *heads), rows=tuple(rows))
+
+
+def _state_at_start(variant: StrokeVariant) -> dict[str, str]:
+    """Where bodies rest, and at which pressures."""
+    start = variant.result.start
+    if start is None:
+        return {}
+    found = {f"{name}, displacement": quantity(y, "m", 3) for name, y in start.displacement.items()}
+    for name, pressure in start.pressure.items():
+        stated = "\nstated in the case" if start.stated[name] else ""
+        found[f"{name}, pressure"] = f"{1e-5 * pressure:.5g} bar{stated}"
+    return found | {"unbalanced force": unbalanced(variant)}
 
 
 def _set_left(variant: StrokeVariant, stop: str) -> str:
