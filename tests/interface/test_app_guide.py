@@ -106,7 +106,16 @@ def test_from_two_step_files_by_clicking_to_a_case(page, server, folder):
     onward(page, ".ks-view canvas")
     settle(page)
     page.locator(".ks-view").first.scroll_into_view_if_needed()
-    assert page.locator("#k-next").is_disabled()
+    page.wait_for_selector("text=Proposed from the geometry: needle.tip hits housing.seat")
+    for name, role in (
+        ("needle.tip", "contact"),
+        ("housing.seat", "contact"),
+        ("housing.rim", "held"),
+    ):
+        box = page.get_by_label(name, exact=True)
+        assert box.input_value() == role
+        box.select_option("")
+    page.wait_for_function("document.getElementById('k-next').disabled")
     assert page.locator(".ks").get_attribute("class").split().count("ks-dark") == 1
 
     page.get_by_role("checkbox", name="needle", exact=True).uncheck()

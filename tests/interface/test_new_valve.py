@@ -334,6 +334,39 @@ def test_a_body_has_one_contact_face_and_a_face_one_role():
     assert (kept.needle_contact, kept.housing_contact, kept.held) == ("tip", "seat", ())
 
 
+@pytest.mark.parametrize("source", ["table", "step", "raised"])
+def test_the_faces_of_the_demo_valve_are_proposed_from_its_geometry(source, tables, steps):
+    """A ball of 0.6 mm drawn in its cone of 90 degrees touches it to the digits of the drawing."""
+    parts = dict(tables)
+    if source == "step":
+        parts = {body: part_of_step(body, steps / f"{body}.step") for body in BODIES}
+    if source == "raised":
+        parts["needle"] = part_of_table("needle", raised(EXAMPLES["needle"], 0.1))
+    faces = {body: part.facts.faces for body, part in parts.items()}
+    plan, words = ValvePlan().with_proposals(faces)
+    given = ValvePlan(held=("top",))
+
+    assert plan.roles == PLAN.roles
+    assert ("100 um apart" in words) is (source == "raised")
+    assert given.with_proposals(faces) == (given, "")  # what is chosen stays
+
+
+def test_faces_are_called_by_their_place(tables):
+    places = {
+        f"{body}.{face.name}": face.place
+        for body, part in tables.items()
+        for face in part.facts.faces
+    }
+
+    assert places["housing.bottom"] == "bottom"
+    assert (places["housing.rim"], places["housing.bore"]) == ("outside", "bore")
+    assert (places["needle.tip"], places["housing.seat"], places["housing.floor"]) == (
+        "arc",
+        "cone",
+        "shoulder",
+    )
+
+
 async def _parts(*parts: bytes):
     for part in parts:
         yield part

@@ -372,7 +372,7 @@ def test_pace_counts_what_is_computed_and_what_is_left(monkeypatch):
     told.tell(250, 150)
     now = 60.0
     told.tell(500, 400)
-    assert heard.lines == ["200 of 500 points, 3.6e+04 in an hour, 30 s left; best so far point 7"]
+    assert heard.lines == ["200 of 500 points, 36 000 in an hour, 30 s left; best so far point 7"]
 
 
 @pytest.mark.parametrize(

@@ -102,6 +102,8 @@ class Answer:
         That it took.
     run
         Level or variant of a result.
+    inputs
+        Of a result beside another one: keys of the case that differ, there and here.
     """
 
     force: tuple[Curve, ...]
@@ -119,6 +121,7 @@ class Answer:
     doubts: tuple[str, ...] = ()
     seconds: float = 0.0
     run: str = ""
+    inputs: tuple[tuple[str, str, str], ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -340,10 +343,20 @@ class Checked:
 
 @dataclass(frozen=True, kw_only=True)
 class FaceFacts:
-    """A face of a part, for a list."""
+    """A face of a part, for a list.
+
+    Parameters
+    ----------
+    place
+        Where it lies on its part: ``"bottom"``, ``"outside"``.
+    line
+        Points (r, z) [m] along it; none for a part that is not turned.
+    """
 
     name: str
     words: str
+    place: str = ""
+    line: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

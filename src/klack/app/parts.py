@@ -21,11 +21,13 @@ from klack.mesh.profile import Profile
 from klack.mesh.quality import PoorElementError
 from klack.mesh.sizing import MeshSizing
 from klack.mesh.solid import mesh_step, read_step
-from klack.mesh.step_content import StepContent, StepPart, step_content
+from klack.mesh.step_content import StepContent, step_content
 from klack.mesh.step_profile import NotTurnedError, profiles_of_step
 
 __all__ = ["Part", "outline_of_table", "part_of_step", "part_of_table"]
 
+
+Floats = NDArray[np.float64]
 
 _MOST = 500  # rows
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,60}")
@@ -187,7 +189,7 @@ class Part:
         if self.is_half(model):
             assert self.profiles is not None
             return _profile_faces(self.profiles)
-        return () if self.content is None else tuple(map(_step_face, self.content.faces))
+        return () if self.content is None else tuple(_step_faces(self.content))
 
     @property
     def facts(self) -> PartFacts:
@@ -296,21 +298,60 @@ def _plainly_named(profiles: Mapping[str, Profile]) -> dict[str, Profile]:
 
 
 def _profile_faces(profiles: Mapping[str, Profile]) -> tuple[FaceFacts, ...]:
-    found = []
+    lines, arcs = {}, set()
     for name in dict.fromkeys(n for profile in profiles.values() for n in profile.names):
         curves = [c for p in profiles.values() for c in p.curves if c.name == name]
-        points = np.concatenate([c.at(np.linspace(0, 1, 33)) for c in curves])
+        lines[name] = np.concatenate([c.at(np.linspace(0, 1, 33)) for c in curves])
+        if any(c.centre is not None for c in curves):
+            arcs.add(name)
+    every = np.concatenate(list(lines.values()))
+    ends = every.min(axis=0), every.max(axis=0)
+    found = []
+    for name, points in lines.items():
         low, high = points.min(axis=0), points.max(axis=0)
-        kind = "arc, " if any(c.centre is not None for c in curves) else ""
-        words = f"{kind}r {_range(low[0], high[0])}, z {_range(low[1], high[1])}"
-        found.append(FaceFacts(name=name, words=words))
+        place = "arc" if name in arcs else _place(low, high, ends)
+        words = f"r {_range(low[0], high[0])}, z {_range(low[1], high[1])}"
+        line = tuple((float(r), float(z)) for r, z in points)
+        found.append(FaceFacts(name=name, words=words, place=place, line=line))
     return tuple(found)
 
 
-def _step_face(part: StepPart) -> FaceFacts:
-    count = "" if part.count == 1 else f"{part.count} faces, "
-    z = _range(float(part.low[2]), float(part.high[2]))
-    return FaceFacts(name=part.name, words=f"{count}{part.size * 1e6:.4g} mm^2, z {z}")
+def _step_faces(content: StepContent) -> Iterator[FaceFacts]:
+    """Faces of solids: of a box around each, the largest distance from the axis and its heights."""
+    boxes = {
+        part.name: (_around(part.low, part.high), np.array([part.low[2], part.high[2]]))
+        for part in content.faces
+    }
+    r = max((far for far, _ in boxes.values()), default=0.0)
+    heights = np.array([z for _, z in boxes.values()] or [[0.0, 0.0]])
+    ends = np.array([0.0, heights.min()]), np.array([r, heights.max()])
+    for part in content.faces:
+        far, (low, high) = boxes[part.name]
+        count = "" if part.count == 1 else f"{part.count} faces, "
+        # where it is no plane across the axis, the box has no smallest distance: a wall
+        near = 0.0 if high - low < _EVEN * (ends[1][1] - ends[0][1]) else far
+        place = _place(np.array([near, low]), np.array([far, high]), ends)
+        words = f"{count}{part.size * 1e6:.4g} mm^2, z {_range(float(low), float(high))}"
+        yield FaceFacts(name=part.name, words=words, place=place)
+
+
+def _around(low: Floats, high: Floats) -> float:
+    return float(np.max(np.abs([low[:2], high[:2]])))
+
+
+_EVEN = 1e-3  # of the size of the part
+
+
+def _place(low: Floats, high: Floats, ends: tuple[Floats, Floats]) -> str:
+    """Where a face between two corners (r, z) lies on a part between its own two."""
+    least = _EVEN * float(np.max(ends[1] - ends[0]))
+    if high[1] - low[1] < least:
+        is_low, is_high = low[1] - ends[0][1] < least, ends[1][1] - high[1] < least
+        return "bottom" if is_low else "top" if is_high else "shoulder"
+    if high[0] - low[0] < least:
+        is_in = low[0] - ends[0][0] < least and ends[0][0] > least
+        return "outside" if ends[1][0] - high[0] < least else "bore" if is_in else "wall"
+    return "cone"
 
 
 def _range(low: float, high: float) -> str:

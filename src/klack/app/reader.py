@@ -33,7 +33,14 @@ from klack.app.explorer import (
     stroke_numbers,
 )
 from klack.app.study_points import StudyPoints, points_json
-from klack.app.texts import checked_text, exchanged_text, study_offer, study_problem, study_text
+from klack.app.texts import (
+    checked_text,
+    differing_inputs,
+    exchanged_text,
+    study_offer,
+    study_problem,
+    study_text,
+)
 from klack.errors import InputError, KlackError
 from klack.signals.sampled import TimeSeries
 
@@ -114,10 +121,11 @@ class Reader:
                 expected="two of klack impact, or two of klack stroke",
                 hint="tick compare at two of one kind in the list of results.",
             )
-        found = [
-            _answer(analysis.load(Path(folder)))
+        records = [
+            analysis.load(Path(folder))
             for analysis, folder in zip(analyses, (first, second), strict=True)
         ]
+        found = [_answer(record) for record in records]
         known = [pressure for _, pressures in found for pressure in pressures.values()]
         scale = full_scale_of(*known) if known else 1.0
         words = level_statement(scale) if known else ""
@@ -130,7 +138,8 @@ class Reader:
             )
             for answer, pressures in found
         )
-        return one, other
+        inputs = differing_inputs(*(record.case_text for record in records))
+        return one, replace(other, inputs=inputs)
 
 
 def _doubts(record: Any) -> tuple[str, ...]:

@@ -28,6 +28,7 @@ from klack.input.section import Section
 
 __all__ = [
     "checked_text",
+    "differing_inputs",
     "exchanged_text",
     "form_of",
     "study_offer",
@@ -75,6 +76,35 @@ def study_source(text: str, path: Path) -> tuple[StudyFile, StudySource, CaseTre
     file = validated(StudyFile, text, path, data, lines)
     source = StudySource(study=file.study, path=path, lines=lines, text=text)
     return file, source, CaseTree(path=path, text=text, data=data, lines=lines)
+
+
+_NO_INPUT = ("title", "description", "study", "calibration")
+_LONGEST_INPUT = 60  # characters
+
+
+def differing_inputs(first: str, second: str) -> tuple[tuple[str, str, str], ...]:
+    """Keys that two cases have written otherwise, with both texts."""
+    try:
+        one, other = (parse(text, Path("case.yaml"))[0] for text in (first, second))
+    except KlackError:  # of a result that holds another text
+        return ()
+    return tuple(_differing(one, other))
+
+
+def _differing(one: Any, other: Any, above: Key = ()) -> Iterator[tuple[str, str, str]]:
+    if isinstance(one, dict) and isinstance(other, dict):
+        for key in dict.fromkeys((*one, *other)):
+            if above or key not in _NO_INPUT:
+                yield from _differing(one.get(key), other.get(key), (*above, key))
+    elif one != other:
+        yield ".".join(map(str, above)), _in_short(one), _in_short(other)
+
+
+def _in_short(value: Any) -> str:
+    if value is None:
+        return "–"
+    text = value if isinstance(value, str) else json.dumps(value, default=str, ensure_ascii=False)
+    return text if len(text) <= _LONGEST_INPUT else "other entries"
 
 
 def study_words(study: CaseStudy) -> str:

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-__all__ = ["PointCount", "Progress", "counted", "duration_text", "remark", "silent"]
+__all__ = ["PointCount", "Progress", "counted", "duration_text", "per_hour", "remark", "silent"]
 
 Progress = Callable[[str, float], None]
 """Called with stage and fraction, 0 to 1."""
@@ -43,6 +43,17 @@ def counted(progress: Progress, count: PointCount) -> None:
 
 def silent(stage: str, fraction: float) -> None:
     """No progress report."""
+
+
+def per_hour(rate: float) -> str:
+    """How many in an hour, at a rate per second, to three digits and without a power of ten.
+
+    >>> per_hour(2.4391), per_hour(0.00214)
+    ('8 780 in an hour', '7.7 in an hour')
+    """
+    found = float(f"{3600.0 * rate:.3g}")
+    text = f"{found:,.0f}".replace(",", " ") if found >= 100.0 else f"{found:g}"
+    return f"{text} in an hour"
 
 
 def duration_text(seconds: float) -> str:

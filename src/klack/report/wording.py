@@ -32,7 +32,9 @@ _PURE_POWER = re.compile(r"m\^(?P<power>[23])")
 _SMALL = 0.1  # [m] areas and volumes of less than its power are in mm^2, mm^3
 _MINUS, _NONE = "\N{MINUS SIGN}", "–"
 _BRACES = re.compile(r"(\{[^{}]*\})")
-_MICRO = re.compile(r"(?:(?<=\d[ \u00a0\u202f])|(?<=[\[/*\u00b7]))u(?=(?:m|s|N|J|A|F|H|V|W|Wb|Pa)\b)")
+_MICRO = re.compile(
+    r"(?:(?<=\d[ \u00a0\u202f])|(?<=[\[/*\u00b7]))u(?=(?:m|s|N|J|A|F|H|V|W|Wb|Pa)\b)"
+)
 _POWER = re.compile(r"(\b(?:[mcuµkn]?m|s|N|A|Pa))\^(-?[1-9])\b")
 _EXPONENT = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?)e([+\-\u2212]?\d+)(?!\w|\.\d)")
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -198,8 +200,8 @@ def spelled(text: str) -> str:
 
     >>> spelled("12 us on 5 N/um, 47.2 mm^3 {volume: 47.2 mm^3}").replace("\xa0", " ")
     '12 µs on 5 N/µm, 47.2 mm³ {volume: 47.2 mm^3}'
-    >>> spelled("5.7e−15, at 2e+04 1/s: 8e-17."), spelled("stop 1e5b and 'us'")
-    ('5.7·10⁻¹⁵, at 2·10⁴ 1/s: 8·10⁻¹⁷.', "stop 1e5b and 'us'")
+    >>> spelled("5.7e−15, at 2e+04 1/s: 0.0e+00."), spelled("stop 1e5b and 'us'")
+    ('5.7·10⁻¹⁵, at 2·10⁴ 1/s: 0.', "stop 1e5b and 'us'")
     """
     parts = _BRACES.split(text)
     for k in range(0, len(parts), 2):
@@ -210,6 +212,8 @@ def spelled(text: str) -> str:
 
 
 def _power_of_ten(found: re.Match[str]) -> str:
+    if float(found[1]) == 0.0:
+        return "0"
     exponent = str(int(found[2].replace(_MINUS, "-"))).translate(_RAISED)
     return f"{found[1]}\N{MIDDLE DOT}10{exponent}"
 

@@ -127,7 +127,7 @@ def residual_rows(record: OperatingPoints) -> list[tuple[str, str]]:
         "voltage of each coil": (record.voltage_left, "V"),
     }
     return [
-        (name, f"{float(np.max(values[found])):.1e} {unit}")
+        (name, format_si(float(np.max(values[found])), unit, 2))
         for name, (values, unit) in rows.items()
     ]
 

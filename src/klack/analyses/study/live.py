@@ -8,7 +8,7 @@ from time import perf_counter
 
 from klack.analyses.study.analysis import STUDY
 from klack.analyses.study.record import StudyRecord
-from klack.machine.progress import PointCount, Progress, counted, duration_text, remark
+from klack.machine.progress import PointCount, Progress, counted, duration_text, per_hour, remark
 
 __all__ = ["LIVE", "LiveRecord", "Pace", "ProgressPage", "Seen"]
 
@@ -38,7 +38,7 @@ class Pace:
         self._last, self._wait = now, min(2.0 * self._wait, _LONGEST)
         text = f"{done} of {self._most} points"
         if left is not None:
-            text += f", {3600.0 * rate:.3g} in an hour"
+            text += f", {per_hour(rate)}"
             text += f", {duration_text(left)} left"
         remark(self._progress, f"{text}; {best}" if best else text)
         return True

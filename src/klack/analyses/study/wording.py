@@ -14,6 +14,7 @@ from klack.analyses.study.record import (
     StudyRecord,
     StudySurrogate,
 )
+from klack.machine.progress import per_hour
 from klack.report.wording import fixed, quantity
 from klack.units import format_si, is_level
 
@@ -177,10 +178,9 @@ def rate_text(record: StudyRecord) -> str:
     """How many points were computed, and how fast."""
     parts = [f"{record.computed} points computed now"]
     if record.computed and record.point_time > 0.0:
-        rate = 3600.0 * record.computed / record.point_time
         crew = f"{record.threads} {record.workers}" if record.threads > 1 else "one core"
         parts[0] += f" in {format_si(record.point_time, 's', 3)} on {crew}"
-        parts.append(f"{rate:.3g} in an hour")
+        parts.append(per_hour(record.computed / record.point_time))
     if record.kept:
         parts.append(f"{record.kept} were there")
     failed = int(record.failed.sum())

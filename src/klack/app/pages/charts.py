@@ -54,6 +54,8 @@ EMPTY: dict[str, Any] = {
 """Of a chart whose numbers follow."""
 
 
+_MOST_INPUTS = 40  # rows
+
 TITLES = ("Contact force", "Motion", "Third octaves of the force")
 """Of the charts of an answer."""
 
@@ -226,6 +228,20 @@ def _show(state: State, ghost: Answer, now: Answer, names: tuple[str, str]) -> N
     label = "main numbers of both results"
     with element("section", "k-section k-sheet k-scroll", tabindex="0", aria_label=label):
         _show_numbers(now, ghost, names)
+    with ui.element("section").classes("k-section"):
+        heading("Inputs that differ")
+        if now.inputs:
+            label = "inputs that differ"
+            with (
+                element("div", "k-sheet k-scroll", tabindex="0", aria_label=label, role="group"),
+                table("", "key of the case", names[1], names[0]),
+            ):
+                for key, there, here in now.inputs[:_MOST_INPUTS]:
+                    row(key, there, here)
+            if len(now.inputs) > _MOST_INPUTS:
+                plain(f"and {len(now.inputs) - _MOST_INPUTS} more", "p").classes("k-note")
+        else:
+            plain("None: both have the same case.", "p").classes("k-soft")
     with ui.element("div").classes("k-grid"):
         for title, figure in zip(TITLES, answer_figures(now, ghost, names), strict=True):
             DescribedChart(title, figure)

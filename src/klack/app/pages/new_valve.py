@@ -65,6 +65,7 @@ class _Guide:
     def __init__(self, state: State, plan: ValvePlan) -> None:
         self._state, self._plan = state, plan
         self._facts: dict[str, PartFacts | str] = {}
+        self._proposed = ""  # why faces were chosen
         self._writing, self._turn = asyncio.Lock(), asyncio.Lock()
         self._is_checking = False  # the step that is shown has not its answer yet
 
@@ -243,7 +244,9 @@ class _Guide:
             await self._read_parts()
             known = {body: tuple(face.name for face in self._faces_of(body)) for body in BODIES}
             if all(self.facts(body) is not None for body in BODIES):
-                await self.keep(self._plan.with_faces(known))
+                faces = {body: self._faces_of(body) for body in BODIES}
+                plan, self._proposed = self._plan.with_faces(known).with_proposals(faces)
+                await self.keep(plan)
             if self._plan.step:  # another step is shown by now, of what was read before
                 await self._show()
             else:
@@ -260,7 +263,7 @@ class _Guide:
 
     async def _show_faces(self) -> None:
         faces = {body: self._faces_of(body) for body in BODIES}
-        step = FacesStep(faces, lambda: self._plan, self.keep)
+        step = FacesStep(faces, lambda: self._plan, self.keep, self._proposed)
         step.build()
 
         async def drawn() -> None:

@@ -256,7 +256,7 @@ _CLICKS = {
 class FacesStep:
     """Bodies beside the list of their faces; each shows what is chosen or pointed at in the other.
 
-    ``keep`` keeps another plan.
+    ``keep`` keeps another plan; ``proposed`` says why faces are chosen already.
     """
 
     def __init__(
@@ -264,8 +264,9 @@ class FacesStep:
         faces: Mapping[str, tuple[FaceFacts, ...]],
         plan: Callable[[], ValvePlan],
         keep: Callable[[ValvePlan], Awaitable[None]],
+        proposed: str,
     ) -> None:
-        self._faces, self._plan, self._keep = faces, plan, keep
+        self._faces, self._plan, self._keep, self._proposed = faces, plan, keep, proposed
         self._click = self._missing() or "held"
         self._boxes: dict[str, ui.element] = {}
         self._rows: dict[str, ui.element] = {}
@@ -274,6 +275,8 @@ class FacesStep:
 
     def build(self) -> None:
         """Make the list, and a place for the bodies."""
+        if self._proposed:
+            plain(self._proposed, "p").classes("k-read").props("role=status")
         with ui.element("div").classes("k-pick"):
             with ui.element("div"):
                 with ui.element("div").classes("k-head"):
@@ -317,7 +320,10 @@ class FacesStep:
         roles = _OF_NEEDLE if body == "needle" else _ROLES
         with ui.element("label").classes("k-face") as row:
             with ui.element("div"):
-                plain(face.name, "div")
+                plain(
+                    face.name if face.place in ("", face.name) else f"{face.place}: {face.name}",
+                    "div",
+                )
                 plain(face.words, "small").classes("k-soft")
             now = self._plan().roles.get(name, "")
 
