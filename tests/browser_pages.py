@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-__all__ = ["PAGES", "Place", "made_folder", "planned", "watched"]
+__all__ = ["PAGES", "Place", "controls", "made_folder", "planned", "watched"]
 
 CASE = "valve/case.yaml"
 _COMPUTED = (
@@ -36,6 +36,8 @@ class Place:
         What is done before it is looked at, for what opens on a page: a dialog.
     before : callable
         What is made in the folder before it is opened.
+    picture : str
+        Name of its picture in ``docs/images``, made by ``docs/app_pictures.py``.
     """
 
     name: str
@@ -43,6 +45,7 @@ class Place:
     ready: str
     then: Callable[[Any], None] = lambda page: None
     before: Callable[[Path], None] = lambda folder: None
+    picture: str = ""
 
     def open(self, page: Any, base: str, folder: Path) -> None:
         """Show it."""
@@ -99,35 +102,53 @@ _BOTH = "a=klack-results/impact&b=klack-results/impact"
 
 PAGES = (
     Place("overview", "/", "text=2 notes on this result", _open_all),
+    Place("cases", "/", "text=2 notes on this result", picture="app-cases"),
     Place("dialog, new case", "/", "text=2 notes on this result", _press("New case")),
     Place("dialog, duplicate", "/", "text=2 notes on this result", _press(f"Duplicate {CASE}")),
     Place("dialog, note", "/", "text=2 notes on this result", _press(f"Note {CASE}")),
     Place("case, impact", f"/case?path={CASE}", "text=valid impact", _open_all),
-    Place("case, stroke", "/case?path=stroke/case.yaml", "text=valid stroke"),
+    Place("case, stroke", "/case?path=stroke/case.yaml", "text=valid stroke", picture="app-case"),
     Place("case, not valid", f"/case?path={CASE}", "text=valid impact", _refused),
     Place("case, none", "/case?path=none.yaml", ".k-error"),
     Place("sliders", f"/sliders?path={CASE}", ".k-badge.good", _open_all),
+    Place("sliders, closed", f"/sliders?path={CASE}", ".k-badge.good", picture="app-sliders"),
     Place("compare", f"/compare?{_BOTH}", "text=sound exposure level"),
     Place("new study", f"/new-study?path={CASE}", "text=Write the study"),
-    Place("points", "/points?path=klack-results/study", "#kp-root[data-points]"),
+    Place(
+        "points",
+        "/points?path=klack-results/study",
+        "#kp-root[data-points]",
+        picture="app-studies",
+    ),
     Place("bodies of a case", "/show?path=stroke/case.yaml", ".ks-view canvas"),
     Place("bodies of a result", "/show?path=klack-results/impact", ".ks-view canvas"),
     Place("new valve", "/new", ".k-steps button", before=_unplanned),
     *(
-        Place(f"new valve, {name}", "/new", ready, before=planned(step, **other))
-        for step, name, ready, other in (
-            (0, "drawings", "textarea", {}),
-            (1, "faces", ".ks-view canvas", {}),
-            (2, "materials", "text=Young's modulus", {}),
-            (3, "motion", "text=Speed at the impact", {}),
-            (4, "check", ".k-finding", {}),
-            (4, "check, with errors", ".k-badge.out", {"speed": "fast"}),
-            (5, "case", "text=klack: 1", {}),
+        Place(f"new valve, {name}", "/new", ready, before=planned(step, **other), picture=picture)
+        for step, name, ready, other, picture in (
+            (0, "drawings", "textarea", {}, "new-valve-parts"),
+            (1, "faces", ".ks-view canvas", {}, "new-valve-faces"),
+            (2, "materials", "text=Young's modulus", {}, ""),
+            (3, "motion", "text=Speed at the impact", {}, ""),
+            (4, "check", ".k-finding", {}, "new-valve-checks"),
+            (4, "check, with errors", ".k-badge.out", {"speed": "fast"}, ""),
+            (5, "case", "text=klack: 1", {}, ""),
         )
     ),
     *(Place(f"report, {name}", _REPORT.format(name), ".main-svg") for name, *_ in _COMPUTED),
     *(Place(f"show, {name}", f"file:show-{name}.html", ".ks-panel h3") for name, _ in _SHOWN),
 )
+
+
+_CONTROLS = """() => [
+  ...document.querySelectorAll("#k-body :is(h1, h2, h3, button, a.k-btn, .k-tick)")
+].filter(e => e.checkVisibility()).map(e => e.innerText.trim()).filter(word => word)"""
+
+
+def controls(page: Any) -> list[str]:
+    """Headings, buttons, links and boxes that are seen, in their order."""
+    found: list[str] = page.evaluate(_CONTROLS)
+    return found
 
 
 def made_folder(folder: Path) -> Path:

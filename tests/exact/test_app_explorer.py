@@ -17,11 +17,13 @@ from klack.analyses.noise.run import click_sound
 from klack.analyses.noise.source import impact_sources, sources_of
 from klack.analyses.stroke.content import stroke_content
 from klack.analyses.stroke.run import run_stroke
-from klack.app.answers import Slider, StudyChoice
+from klack.app.answers import Answer, Curve, Slider, StudyChoice
 from klack.app.explorer import Explorer, drawn, sliders_of, stroke_numbers, written
+from klack.app.pages.charts import answer_figures
 from klack.app.reader import Reader
 from klack.app.texts import (
     checked_text,
+    differing_inputs,
     exchanged_text,
     study_offer,
     study_source,
@@ -431,3 +433,27 @@ def test_a_study_is_offered_only_measures_that_its_case_can_have():
     assert noise[rigid] == {"peak_force", "force_level", "valid_from", "balanced_below"}
     assert {"radiated_energy", "sound_exposure_level_weighted"} <= noise[drop]
     assert not {"mount_force_level", "mount_velocity_level"} & noise[drop]
+
+
+def test_stops_of_the_pinned_design_are_told_apart():
+    x = np.linspace(0.0, 1.0, 3)
+    stops = tuple(Curve(name=name, x=x, y=x) for name in ("seat", "opening"))
+    answer = Answer(
+        force=stops, lift=(), time_unit="ms", bands=np.zeros(0), levels=np.zeros(0), numbers=()
+    )
+    lines = answer_figures(answer, answer, ("now", "pinned"))[0]["data"]
+    looks = {(line["line"]["color"], line["line"]["dash"]) for line in lines}
+
+    assert len(looks) == 4
+    assert lines[0]["line"]["color"] == lines[2]["line"]["color"]  # the seat, pinned and now
+
+
+def test_a_comparison_lists_the_inputs_that_differ():
+    """Speed and mesh; not the title, nor what both have."""
+    other = TEXT.replace("speed: 0.3 m/s", "speed: 0.4 m/s").replace("title: ", "title: other ")
+    assert other != TEXT
+
+    assert differing_inputs(TEXT, TEXT) == ()
+    assert differing_inputs(TEXT, other) == (("motion.speed", "0.3 m/s", "0.4 m/s"),)
+    assert differing_inputs("klack: [", TEXT) == ()
+    assert differing_inputs("a: 1", "b: 2") == (("a", "1", "–"), ("b", "–", "2"))

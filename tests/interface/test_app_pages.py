@@ -1,5 +1,6 @@
 """Every page in a browser: axe-core, rules of layout, the Tab key, nothing from elsewhere."""
 
+import json
 import re
 import time
 from collections.abc import Iterator
@@ -8,7 +9,7 @@ from typing import Any
 
 import pytest
 from app_browser import LONG, server, settle
-from browser_pages import PAGES, Place, made_folder, watched
+from browser_pages import PAGES, Place, controls, made_folder, watched
 from page_rules import (
     HAS_AXE,
     SCHEMES,
@@ -113,6 +114,19 @@ def test_the_page_that_asks_for_the_password_is_sound_and_says_what_was_wrong(br
 @pytest.mark.skipif(HAS_AXE, reason="axe-core is here")
 def test_axe_core_is_here():
     pytest.skip("pages not tested with axe-core: axe-playwright-python is not installed")
+
+
+def test_the_pictures_of_the_documentation_have_what_the_pages_have(page, server, folder):
+    """Headings, buttons and boxes of each picture, as they were when it was made."""
+    known = json.loads(Path("docs/images/app-pictures.json").read_text("utf-8"))
+    seen = {}
+    for place in PAGES:
+        if place.picture:
+            place.open(page, server.base, folder)
+            settle(page)
+            seen[place.picture] = controls(page)
+
+    assert seen == known  # else: python docs/app_pictures.py
 
 
 def test_motion_is_reduced_for_those_who_ask_for_it(page, server, folder):

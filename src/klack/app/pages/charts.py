@@ -74,9 +74,14 @@ def _curves_figure(
     now: Sequence[Curve], ghost: Sequence[Curve], x: str, y: str, names: tuple[str, str]
 ) -> dict[str, Any]:
     several = len(now) > 1 or len(ghost) > 1
-    data = [
-        _line(curve, _GHOST, f"{curve.name}, {names[1]}" if several else names[1], dash="dash")
-        for curve in ghost
+    data = [  # of several stops each in the colour that it has now
+        _line(
+            curve,
+            _COLOURS[i % 3] if several else _GHOST,
+            f"{curve.name}, {names[1]}" if several else names[1],
+            dash="dash",
+        )
+        for i, curve in enumerate(ghost)
     ]
     data += [
         _line(curve, _COLOURS[i % 3], f"{curve.name}, {names[0]}" if several else names[0])

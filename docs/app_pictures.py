@@ -1,0 +1,53 @@
+"""Make the pictures of the pages of ``klack app``: ``python docs/app_pictures.py``.
+
+The pages are those of ``tests/browser_pages.py`` that name a picture, of a folder that is computed
+for them.  What has to be on each picture, its headings, buttons and boxes, is kept in
+``images/app-pictures.json``; ``tests/interface/test_app_pages.py`` compares that with the pages.
+Pixels are not compared: letters differ from machine to machine.
+"""
+
+import io
+import json
+import os
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from PIL import Image
+from playwright.sync_api import sync_playwright
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+from browser_pages import PAGES, controls, made_folder
+from served_app import Served
+
+IMAGES = Path(__file__).parent / "images"
+SIZE = {"width": 1120, "height": 800}
+COLOURS = 128
+
+
+def main() -> None:
+    """Open each page and draw it."""
+    seen = {}
+    with TemporaryDirectory() as place, sync_playwright() as driver:
+        folder = made_folder(Path(place))
+        browser = driver.chromium.launch(executable_path=os.environ.get("CHROMIUM"))
+        page = browser.new_page(viewport=SIZE)
+        page.set_default_timeout(300_000)
+        with Served(folder) as server:
+            page.goto(server.address)
+            page.wait_for_selector("#k-body")
+            for item in (item for item in PAGES if item.picture):
+                item.open(page, server.base, folder)
+                page.wait_for_timeout(3000)  # charts and scenes are drawn
+                seen[item.picture] = controls(page)
+                drawn = Image.open(io.BytesIO(page.screenshot()))
+                drawn.quantize(COLOURS).save(IMAGES / f"{item.picture}.png", optimize=True)
+        browser.close()
+    text = json.dumps(seen, indent=1, ensure_ascii=False)
+    (IMAGES / "app-pictures.json").write_text(text + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
