@@ -19,7 +19,7 @@ from playwright.sync_api import sync_playwright
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-from browser_pages import PAGES, controls, made_folder
+from browser_pages import PAGES, controls, launched, made_folder
 from served_app import Served
 
 IMAGES = Path(__file__).parent / "images"
@@ -31,8 +31,10 @@ def main() -> None:
     """Open each page and draw it."""
     seen = {}
     with TemporaryDirectory() as place, sync_playwright() as driver:
-        folder = made_folder(Path(place))
-        browser = driver.chromium.launch(executable_path=os.environ.get("CHROMIUM"))
+        folder = Path(place) / "valves"  # its name is on every page
+        folder.mkdir()
+        made_folder(folder)
+        browser = launched(driver)
         page = browser.new_page(viewport=SIZE)
         page.set_default_timeout(300_000)
         with Served(folder) as server:

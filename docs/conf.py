@@ -61,6 +61,7 @@ html_title = f"klack {version}"
 html_math_renderer = "mathml"
 html_static_path = ["static"]
 html_css_files = ["klack.css"]
+html_search_scorer = "static/search_scorer.js"
 html_copy_source = False
 html_show_sourcelink = False
 pygments_style = "friendly"

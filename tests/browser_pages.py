@@ -7,7 +7,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-__all__ = ["PAGES", "Place", "controls", "made_folder", "planned", "watched"]
+__all__ = [
+    "PAGES",
+    "Place",
+    "chromium",
+    "controls",
+    "launched",
+    "made_folder",
+    "planned",
+    "watched",
+]
 
 CASE = "valve/case.yaml"
 _COMPUTED = (
@@ -138,6 +147,25 @@ PAGES = (
     *(Place(f"report, {name}", _REPORT.format(name), ".main-svg") for name, *_ in _COMPUTED),
     *(Place(f"show, {name}", f"file:show-{name}.html", ".ks-panel h3") for name, _ in _SHOWN),
 )
+
+
+# charts of thousands of points, drawn in two dimensions, would take that renderer 15 s
+SOFTWARE_GL = (
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-accelerated-2d-canvas",
+)
+
+
+def chromium() -> str | None:
+    """The browser of this machine."""
+    return shutil.which("chromium") or shutil.which("chromium-browser")
+
+
+def launched(library: Any) -> Any:
+    """Chromium without a display, which draws three dimensions by software."""
+    return library.chromium.launch(executable_path=chromium(), args=[*SOFTWARE_GL, "--no-sandbox"])
 
 
 _CONTROLS = """() => [

@@ -8,9 +8,12 @@ from xml.etree import ElementTree
 import pytest
 from json_schema_check import require_documented
 
-from klack.case.any_case import load_valve_case
+from klack.case.any_case import load_any_case, load_valve_case
+from klack.case.reader import find_case
 from klack.cli.main import main
+from klack.mesh.solid import write_step_revolved
 from klack.network.catalogue import type_words
+from klack.viewer.source import view_of_source
 
 HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
 VALVE = HOW_TO / "small_valve.yaml"
@@ -240,3 +243,18 @@ def test_an_own_type_is_listed_last(capsys, monkeypatch):
     *_, (word, last) = json.loads(capsys.readouterr().out)["types"].items()
     assert word == "eddy_brake:EddyBrake"
     assert set(last["keys"]) == {"damping", "critical_speed"}
+
+
+@pytest.mark.slow
+def test_a_turned_step_file_is_drawn_from_its_half_section(tmp_path):
+    """The solid of this needle has 7000 nodes in a mesh as coarse; a box has no half section."""
+    occ = pytest.importorskip("netgen.occ")
+    bodies = load_any_case(find_case("demo-valve-axisymmetric")).bodies
+    profile = next(iter(bodies["needle"].geometry.profile.profiles().values()))
+    write_step_revolved({"needle": profile}, tmp_path / "needle.step")
+    occ.Box(occ.Pnt(0, 0, 0), occ.Pnt(4, 3, 6)).WriteStep(str(tmp_path / "box.step"))
+    turned, box = (view_of_source(tmp_path / f"{name}.step") for name in ("needle", "box"))
+
+    assert int(turned.bodies[0].about.split()[0]) < 1000
+    assert turned.notes[0].startswith("A turned part")
+    assert not box.notes[0].startswith("A turned part")

@@ -4,13 +4,13 @@ Nothing in it was computed by a solver; it only has the shape, the size and the 
 thing, so that reports and stores can be tested alone.
 """
 
-import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from browser_pages import chromium, launched
 from json_schema_check import every_result_is_documented  # noqa: F401
 
 from klack.acoustics.comparison import compare_histories
@@ -31,26 +31,15 @@ from klack.mesh.mesh import ElementBlock, Mesh
 
 MASS, SPEED = 2.96e-3, 0.5
 
-# charts of thousands of points, drawn in two dimensions, would take that renderer 15 s
-SOFTWARE_GL = (
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--disable-accelerated-2d-canvas",
-)
-
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
     """Chromium without a display, which draws three dimensions by software."""
     sync_api = pytest.importorskip("playwright.sync_api")
-    program = shutil.which("chromium") or shutil.which("chromium-browser")
-    if program is None:
+    if chromium() is None:
         pytest.skip("no chromium here")
     with sync_api.sync_playwright() as library:
-        started = library.chromium.launch(
-            executable_path=program, args=[*SOFTWARE_GL, "--no-sandbox"]
-        )
+        started = launched(library)
         yield started
         started.close()
 

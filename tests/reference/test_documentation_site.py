@@ -9,11 +9,13 @@ import subprocess
 import sys
 from html.parser import HTMLParser
 from pathlib import Path
-from urllib.parse import unquote, urldefrag
+from urllib.parse import quote, unquote, urldefrag
 
 import pytest
 
 pytest.importorskip("sphinx")
+from browser_pages import chromium, launched
+
 pytest.importorskip("myst_parser")
 pytest.importorskip("furo")
 
@@ -102,6 +104,32 @@ def test_every_link_inside_the_site_leads_somewhere(pages):
             elif anchor and target in pages and anchor not in pages[target].anchors:
                 broken.append((file.name, link))
     assert broken == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("words", ["yield", "FMU", "cancel run"])
+def test_a_search_finds_pages_before_names_of_the_interface(site, words):
+    """The kinds of results are those of Sphinx, which marks each with its own."""
+    driver = pytest.importorskip("playwright.sync_api").sync_playwright
+    if chromium() is None:
+        pytest.skip("no chromium here")
+    with driver() as library:
+        browser = launched(library)
+        page = browser.new_page()
+        page.goto(f"{(site / 'search.html').as_uri()}?q={quote(words)}")
+        page.wait_for_function(
+            "document.querySelector('#search-results p')?.innerText.match(/[0-9]/)"
+        )
+        page.wait_for_selector("#search-results li")
+        page.wait_for_timeout(1000)
+        kinds = page.evaluate(
+            "[...document.querySelectorAll('#search-results li')].map(item => item.className)"
+        )
+        browser.close()
+    objects = ["object" in kind for kind in kinds]
+
+    assert not objects[0]
+    assert objects == sorted(objects)
 
 
 @pytest.mark.slow
