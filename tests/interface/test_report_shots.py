@@ -197,7 +197,7 @@ def test_key_numbers_stand_beside_the_centred_ones(content: Content) -> None:
 
     assert rows["restitution"][:2] == ["0.9951", "0.9951\n0.0000"]  # 4.4e-5 below
     assert rows["rebound height"][0] == "44.00 µm"
-    assert rows["energy residual, largest"][-1] == "1.0e−06"
+    assert rows["energy residual, largest"][-1] == "1.0·10⁻⁶"
     assert all(len(row) == len(content.numbers.columns) for row in content.numbers.rows)
 
 

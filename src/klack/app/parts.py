@@ -323,7 +323,7 @@ def _step_faces(content: StepContent) -> Iterator[FaceFacts]:
         for part in content.faces
     }
     r = max((far for far, _ in boxes.values()), default=0.0)
-    heights = np.array([z for _, z in boxes.values()] or [[0.0, 0.0]])
+    heights = np.array([z for _, z in boxes.values()] or [np.zeros(2)])
     ends = np.array([0.0, heights.min()]), np.array([r, heights.max()])
     for part in content.faces:
         far, (low, high) = boxes[part.name]
