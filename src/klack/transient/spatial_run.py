@@ -307,9 +307,9 @@ class _Moving:
     def start(self, balance: Callable[[Vector], StaticStart] | None) -> StaticStart | None:
         self.read()
         for what, given in (self.q, self.valve.placement), (self.v, self.valve.velocity):
-            for body, here in zip(self.model.moving, given.reshape(-1, 6), strict=False):
+            for body, move in zip(self.model.moving, given.reshape(-1, 6), strict=False):
                 own = self.model.rigid_of(body.number)
-                what[own] += rigid_coordinates(body.rigid[:, own], here)
+                what[own] += rigid_coordinates(body.rigid[:, own], move)
         self.take_gaps()
         self.sides.place(self.q)
         rests = balance is not None and not np.any(self.v)
