@@ -265,9 +265,6 @@ def _impacts(study: StrokeStudy) -> Section:
     return Section(title="All impacts", paragraphs=tuple(paragraphs), tables=tuple(tables))
 
 
-_OF_FIRST = ("approach_speed", "touch_speed", "peak_force", "restitution")
-
-
 def _computed(study: StrokeStudy) -> Section:
     tables = [body_table(study.bodies)] if study.bodies else []
     if study.stops:
@@ -354,9 +351,7 @@ def _number_table(study: StrokeStudy) -> Table:
     """The numbers that are asked for first, ten for a valve with two stops."""
     rows = [*_of_variants(study, ("opening_time", "closing_time")), *_largest(study, first=True)]
     for stop in shown_stops(study):
-        rows += _of_first(
-            study, stop, ("approach_speed", "touch_speed", "peak_force", "restitution")
-        )
+        rows += _of_first(study, stop, ("approach_speed", "peak_force", "restitution"))
     return Table(columns=_heads(study), rows=tuple(rows))
 
 
@@ -365,7 +360,7 @@ def _further_tables(study: StrokeStudy) -> tuple[Table, ...]:
     variants = list(study.variants.values())
     rows = [*_of_variants(study, ("impacts",)), *_largest(study, first=False)]
     for stop in shown_stops(study):
-        rows += _of_first(study, stop, ("contact_time",))
+        rows += _of_first(study, stop, ("touch_speed", "contact_time"))
     rows += [
         (f"set left on {stop}", *(_set_left(variant, stop) for variant in variants))
         for stop in dict.fromkeys(stop for variant in variants for stop in variant.result.faces)
