@@ -124,6 +124,8 @@ def stroke_study() -> StrokeStudy:
         opening_time=None,
         closing_time=6e-4,
         times=(times, replace(times, body="piston", lift=None)),
+        restrictions=(),
+        line_ends=(),
     )
     return fill(
         StrokeStudy,

@@ -267,7 +267,7 @@ class Jobs:
             code = int(ending["code"]) if ending else None
             stage, since = str(progress.get("stage", "starting")), float(progress.get("since", 0.0))
             spent = {str(of): float(time) for of, time in progress.get("spent", {}).items()}
-            end = float(ending["ended"]) if ending else 0.0
+            end = float(ending.get("ended", 0.0)) if ending else 0.0
             if end and since:
                 spent[stage] = spent.get(stage, 0.0) + end - since
             return Job(

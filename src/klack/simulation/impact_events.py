@@ -248,7 +248,9 @@ def judged(
                     if handle in owner and any(owner[handle] is side for side in sides)
                 ]
                 share[c, k] = sum(shared) / own
-    after = np.column_stack([np.full(len(stops), -np.inf), np.zeros(share.shape)])
+    after = before.copy()
+    if not before.size:
+        after = np.column_stack([np.full(len(stops), -np.inf), np.zeros(share.shape)])
     found = []
     for event in events:
         c = stops[event.stop]

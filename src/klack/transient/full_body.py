@@ -393,7 +393,11 @@ class FullBody:
 
     def rigid_velocity(self, field: NDArray[np.float64]) -> NDArray[np.float64]:
         """Rigid motion (6,) [m/s], [rad/s] with the momenta of a whole field."""
-        return rigid_motion(self.body) @ (self.body.rigid_modes.T @ (self.whole_mass @ field))
+        body = self.body
+        if body.dimension == 1:
+            along = float(body.nodal_mass @ field) / body.mass
+            return np.array([0.0, 0.0, along, 0.0, 0.0, 0.0])
+        return rigid_motion(body) @ (body.rigid_modes.T @ (self.whole_mass @ field))
 
     def refresh(self) -> None:
         """Recompute K u and K v, which every step only adds to."""
