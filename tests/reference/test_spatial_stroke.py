@@ -29,7 +29,7 @@ from klack.analyses.impact.run import run_impact
 from klack.analyses.stroke.analysis import STROKE
 from klack.analyses.stroke.axis import axis_over_time_chart, axis_path_chart
 from klack.analyses.stroke.content import stroke_content
-from klack.analyses.stroke.run import run_stroke, variant_network
+from klack.analyses.stroke.run import run_stroke, stop_summaries, variant_network
 from klack.analyses.stroke_shots.run import run_stroke_shots
 from klack.assembling.valve import build_valve
 from klack.case import read_case
@@ -460,6 +460,20 @@ def test_two_centred_bodies_make_the_axial_stroke():
         assert one.peak_force == pytest.approx(other.peak_force, rel=4e-3)
         assert one.restitution == pytest.approx(other.restitution, abs=2e-3)
     assert abs(ours.books.relative_residual) < 1e-11
+
+
+@pytest.mark.slow
+def test_faces_that_yield_are_told_where_points_are_elastic():
+    """A force three times as high as the faces bear: no word of a set, one of what is left out."""
+    soft = TWO.replace("density: 7850 kg/m^3", "density: 7850 kg/m^3, yield: 60 MPa")
+    valve = build_valve(read_valve_case(soft, CASE_TWO))
+
+    assert not any(contact.loops for contact in valve.contacts.values())
+    with pytest.warns(
+        AccuracyWarning, match="yields before .* klack stroke along the axis"
+    ) as told:
+        stop_summaries(valve)
+    assert sum("yields before" in str(item.message) for item in told) == 3  # stops of steel
 
 
 @pytest.mark.slow

@@ -153,7 +153,9 @@ def build_stop(
                 static, pair, upper, lower, stop.friction, key=_friction_key(name)
             )
     loops = None
-    if is_consistent(case.network.components[name]) and stop.worn is None:
+    # contact point by point is elastic, and told as such
+    yields = case.motion == "axial" and stop.worn is None
+    if yields and is_consistent(case.network.components[name]):
         with warnings_of(f"stop '{name}'"):
             loops = _loops(case, stop, pair, flexibility, static, progress, name)
     loaded = static if rubbing is None else rubbing
