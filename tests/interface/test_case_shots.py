@@ -487,6 +487,7 @@ HALF = CASE.read_text(encoding="utf-8")
 GUIDE_HALF = next(line + "\n" for line in HALF.splitlines() if line.startswith("guide:"))
 COARSE = HALF.replace("0.02 mm, e", "0.1 mm, e").replace("angles: 24", "angles: 8")
 ALONG_HALF = HALF.replace("motion: three-dimensional\n", "").replace(GUIDE_HALF, "")
+LAW = "law: {kind: consistent}"
 FLAT, SWEPT = "model: axisymmetric", "model: swept\n      layers: 8"
 
 
@@ -504,6 +505,11 @@ def read_half(text):
             "an axisymmetric 'housing' and a three-dimensional 'needle'",
         ),
         (HALF.replace("angles: 24", "angles: 5"), "angles: got 5"),
+        (HALF.replace(LAW, f"restitution: 0.5, {LAW}", 1), "restitution: got 0.5 with motion"),
+        (
+            HALF.replace(LAW, f"series_compliance: 2 um/kN, {LAW}", 1),
+            "series_compliance: got 2e-09 m/N beside a consistent law",
+        ),
     ],
 )
 def test_what_contradicts_itself_is_told_with_its_bodies(text, expected):

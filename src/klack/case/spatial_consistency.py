@@ -177,6 +177,14 @@ def _check_stop(case: ValveSections, name: str, part: Component) -> None:
             expected="law: {kind: consistent}",
             hint="write it, or use motion: axial.",
         )
+    restitution = getattr(part, "restitution", None)
+    if restitution is not None:
+        raise CaseProblem(
+            (*key, "restitution"),
+            got=f"{restitution:g} with motion: three-dimensional",
+            expected="no restitution: bodies and friction of the faces lose the energy there",
+            hint="leave it out, or use motion: axial.",
+        )
     stop = case.stops[name]
     if stop.worn is not None:
         raise CaseProblem(

@@ -232,6 +232,14 @@ def _check_laws(case: ValveSections) -> None:
                 expected=f"the surfaces of the stop: stops: {{{name}: {{between: ...}}}}",
                 hint=f"add them (bodies of this case: {one_of(case.bodies)}), or give a law.",
             )
+        series = getattr(part, "series_compliance", 0.0)
+        if series > 0.0:
+            raise CaseProblem(
+                ("network", "components", name, "series_compliance"),
+                got=f"{series:g} m/N beside a consistent law",
+                expected="no series compliance: that law comes with its own",
+                hint="leave it out, or give the end stop a linear law.",
+            )
         if case.reduction.correction != "consistent":
             raise CaseProblem(
                 ("reduction", "correction"),
