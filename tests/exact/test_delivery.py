@@ -74,7 +74,7 @@ def test_a_constant_pressure_passes_the_steady_flow_times_the_time():
     assert item.steady_flow == pytest.approx(flow, rel=1e-12)
     assert item.back_mass == pytest.approx(0.0, abs=1e-15 * item.mass)
     assert item.first_flow is None  # it flows from the start
-    assert item.outward == 0  # from one given pressure to another
+    assert item.left == item.mass  # from one given pressure to another
 
 
 @pytest.mark.parametrize("record", [1e-5, 3.7e-5])
@@ -139,7 +139,8 @@ def test_a_piston_delivers_what_it_displaces():
     out = RHO * 2e-7 - density * left
     assert way > 5e-5
     assert found[0].mass == pytest.approx(out, rel=1e-10)
-    assert (found[0].outward, found[1].outward) == (1, -1)
+    assert [item.ends for item in found] == [(False, True), (True, False)]
+    assert found[1].left == pytest.approx(found[0].left, rel=1e-9)
     for key in ("mass", "peak_flow", "final_flow", "volume"):
         assert getattr(found[1], key) == pytest.approx(-getattr(found[0], key), rel=1e-9)
     assert found[1].first_flow == pytest.approx(found[0].first_flow, rel=1e-9)
@@ -207,7 +208,8 @@ def test_gas_passes_what_its_chamber_gains():
     gained = np.ptp(result.channels["room mass"].values[[0, -1]])
     assert found["inlet"].mass - found["outlet"].mass == pytest.approx(gained, rel=1e-9)
     assert found["outlet"].volume > 2e-9
-    assert found["inlet"].outward == -1
+    assert found["inlet"].ends == (True, False)
+    assert found["inlet"].left == 0.0
 
 
 def test_gas_between_given_pressures_alone_is_not_computed():
@@ -220,7 +222,7 @@ def test_gas_between_given_pressures_alone_is_not_computed():
 # ---- numbers of one flow, given as records ------------------------------------------------------
 
 
-def flow_of(values, step, starts=(), component="nozzle", outward=1):
+def flow_of(values, step, starts=(), component="nozzle"):
     """Deliveries of a given flow [kg/s], constant in each record."""
     time = step * np.arange(len(values) + 1)
     channel = ChannelData(unit="kg/s", values=np.concatenate([[0.0], values]))
@@ -234,7 +236,7 @@ def flow_of(values, step, starts=(), component="nozzle", outward=1):
         passed="",
         pressures=("sac pressure", ""),
         ambient=1e5,
-        outward=outward,
+        ends=(False, True),
         density=700.0,
         starts=starts,
         until=float(time[-1]),
@@ -288,6 +290,21 @@ def test_a_flow_that_turns_round_and_one_that_goes_on():
     assert rising.flows_on
     assert rising.last_flow is None
     assert rising.steady_flow is None  # nowhere steady
+
+
+def test_a_flow_under_way_has_an_end_but_no_beginning():
+    """A valve that starts open; a command that comes while the pulse before it still flows."""
+    open_first = flow_of(trapezoid()[400:], 1e-6, starts=(5e-5,))["nozzle"]
+    assert (open_first.first_flow, open_first.flow_delay) == (None, None)
+    assert open_first.last_flow == pytest.approx(3.99e-4, rel=1e-9)
+    assert not open_first.flows_on
+    found = flow_of(trapezoid(), 1e-6, starts=(5e-5, 2.8e-4, 5e-4))
+    first, second, third = (found[f"nozzle.{k}"] for k in (1, 2, 3))
+    assert first.flows_on
+    assert (second.first_flow, second.last_flow, second.flows_on) == (None, None, True)
+    assert (third.first_flow, third.flows_on) == (None, False)
+    assert third.last_flow == pytest.approx(7.99e-4, rel=1e-9)
+    assert found["nozzle"].last_flow == pytest.approx(7.99e-4, rel=1e-9)
 
 
 def test_mirrored_ports_mirror_every_number():
@@ -410,8 +427,8 @@ def test_every_injector_has_the_commands_of_its_own_driver():
     for number, start in ((1, 1.0), (2, 19.75), (3, 7.25), (4, 13.5)):
         starts = found[f"injector{number}_holes"].starts
         assert starts == pytest.approx(1e-3 * np.arange(start, 60.0, 25.0))
-        assert found[f"injector{number}_holes"].outward == 1
-        assert found[f"injector{number}_nozzle"].outward == 0
+        assert found[f"injector{number}_holes"].ends == (False, True)
+        assert found[f"injector{number}_nozzle"].ends == (False, False)
     assert "feed" not in found  # a line
 
 

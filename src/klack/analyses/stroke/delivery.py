@@ -57,8 +57,8 @@ class Restriction:
     pressures
         Channels at ports a and b; empty for the surroundings.
     ambient [Pa]
-    outward [-]
-        1 where port b leads to the surroundings or a given pressure, -1 for port a, 0 within.
+    ends
+        Whether ports a and b are at the surroundings or at a given pressure.
     density [kg/m^3]
         At the pressure of the surroundings.
     starts [s]
@@ -72,7 +72,7 @@ class Restriction:
     passed: str
     pressures: tuple[str, str]
     ambient: float
-    outward: int
+    ends: tuple[bool, bool]
     density: float
     starts: tuple[float, ...]
     until: float
@@ -86,6 +86,8 @@ class Delivery:
     ----------
     pulse
         Command from whose start to that of the next one it counts; 0 for the whole run.
+    ends
+        Whether ports a and b are at the surroundings or at a given pressure.
     begin, end [s]
     mass [kg]
         Of both directions together.
@@ -94,14 +96,16 @@ class Delivery:
     peak_flow, steady_flow, initial_flow, final_flow [kg/s]
         Means over records.
     first_flow, last_flow, flow_delay [s]
-        Without a driver there is no delay.
+        Without a driver there is no delay, and no first flow of one that is there from the start.
+    flows_on
+        Whether what began to flow, or flowed when the command came, still does at the end.
     opening_pressure, closing_pressure [Pa]
         Before less behind, at the first and at the last flow.
     """
 
     component: str
     pulse: int
-    outward: int
+    ends: tuple[bool, bool]
     begin: float
     end: float
     mass: float
@@ -114,6 +118,7 @@ class Delivery:
     first_flow: float | None
     last_flow: float | None
     flow_delay: float | None
+    flows_on: bool
     opening_pressure: float | None
     closing_pressure: float | None
 
@@ -125,12 +130,12 @@ class Delivery:
     @property
     def leads_out(self) -> bool:
         """Whether it leads to the surroundings, or to a given pressure."""
-        return self.outward != 0
+        return any(self.ends)
 
     @property
-    def flows_on(self) -> bool:
-        """Whether what began to flow still does at the end."""
-        return self.first_flow is not None and self.last_flow is None
+    def left(self) -> float:
+        """Mass that leaves the valve by it [kg]."""
+        return abs(self.mass) if self.ends[self.mass > 0.0] else 0.0
 
     @property
     def hysteresis(self) -> float | None:
@@ -184,7 +189,7 @@ def restrictions_of(rows: Rows, network: Network, until: float) -> tuple[Restric
                 passed="" if name in flows else f"{name} {PASSED}",
                 pressures=(_pressure(names, a), _pressure(names, b)),
                 ambient=ambient.pressure,
-                outward=(b in given) - (a in given),
+                ends=(a in given, b in given),
                 density=density,
                 starts=starts_of(network, name, until),
                 until=until,
@@ -274,7 +279,7 @@ def _delivery(
     flow, middle = pieces / np.diff(t), 0.5 * (t[:-1] + t[1:])
     mass = float(np.sum(pieces))
     way = -1.0 if mass < 0.0 else 1.0
-    first, last = _times(middle, way * (flow - flow[0]), least)
+    first, last, flows_on = _times(middle, way * flow, least)
 
     def drop(moment: float | None) -> float | None:
         return None if moment is None else way * _drop(item, result, moment)
@@ -282,7 +287,7 @@ def _delivery(
     return Delivery(
         component=item.component,
         pulse=pulse,
-        outward=item.outward,
+        ends=item.ends,
         begin=begin,
         end=end,
         mass=mass,
@@ -295,16 +300,26 @@ def _delivery(
         first_flow=first,
         last_flow=last,
         flow_delay=None if first is None or command is None else first - command,
+        flows_on=flows_on and (first is not None or pulse > 0),
         opening_pressure=drop(first),
         closing_pressure=drop(last),
     )
 
 
-def _times(middle: Vector, rise: Vector, least: float) -> tuple[float | None, float | None]:
-    """When a flow has risen, and when it has fallen again, between the middles of records."""
+def _times(middle: Vector, flow: Vector, least: float) -> tuple[float | None, float | None, bool]:
+    """When a flow has risen, when it has fallen again, and whether it has not.
+
+    Times lie between the middles of records.  A flow above half of the largest one is no leak: in
+    the first record it is under way, in the last one it goes on.
+    """
+    top = float(flow.max())
+    under_way = float(flow[0]) > max(_OPEN * top, least)
+    if under_way and flow[-1] > _OPEN * top:
+        return None, None, True
+    rise = flow - flow[-1 if under_way else 0]
     level = _BEGUN * float(rise.max())
     if not level > _BEGUN * least:
-        return None, None
+        return None, None, False
     above = np.flatnonzero(rise > level)
 
     def crossing(k: int) -> float:
@@ -312,7 +327,9 @@ def _times(middle: Vector, rise: Vector, least: float) -> tuple[float | None, fl
         return float(middle[k] + part * (middle[k + 1] - middle[k]))
 
     last = int(above[-1])
-    return crossing(int(above[0]) - 1), None if last + 1 == rise.size else crossing(last)
+    first = None if under_way else crossing(int(above[0]) - 1)
+    flows_on = last + 1 == rise.size
+    return first, None if flows_on else crossing(last), flows_on
 
 
 def _steady(flow: Vector, least: float, way: float) -> float | None:

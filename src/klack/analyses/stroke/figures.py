@@ -127,7 +127,7 @@ def delivery_chart(study: StrokeStudy) -> Chart | None:
     wet = next((item for item in study.variants.values() if item.restrictions), None)
     if wet is None or wet.result.time.size < 2:
         return None
-    shown = [item for item in wet.restrictions if item.outward] or list(wet.restrictions)
+    shown = [item for item in wet.restrictions if any(item.ends)] or list(wet.restrictions)
     masses, flows = list[Curve](), list[Curve]()
     time = 1e3 * wet.result.time
     for item, look in zip(shown, map(look_of, range(_MOST_PARTS)), strict=False):

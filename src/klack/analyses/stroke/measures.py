@@ -254,8 +254,8 @@ VARIANT_MEASURES: tuple[Measure[StrokeVariant], ...] = described_in(
         symbol="m",
         unit="kg",
         definition="Mass that leaves the valve through all restrictions that lead to the "
-        "surroundings or to a given pressure, each that passes more out than in; missing without "
-        "such a restriction.",
+        "surroundings or to a given pressure, each that passes more out than in, from one given "
+        "pressure to another too; missing without such a restriction.",
         page=True,
     ),
     Measure(
@@ -415,7 +415,8 @@ DELIVERY_MEASURES: tuple[Measure[Delivery], ...] = described_in(
         symbol="t_f",
         unit="s",
         definition="When the mass flow has risen by 1 % of its largest rise above the first one; "
-        "missing where it does not rise.",
+        "missing where it does not rise, and where it is above half of its largest value from the "
+        "start.",
         digits=5,
         column=Column("ms", 1e3, ".4f"),
         page=True,
@@ -433,8 +434,8 @@ DELIVERY_MEASURES: tuple[Measure[Delivery], ...] = described_in(
         key="last_flow",
         symbol="t_l",
         unit="s",
-        definition="When it has fallen to that level for good; missing where it flows on at the "
-        "end.",
+        definition="When it has fallen to that level for good, or within 1 % to its last value if "
+        "it flowed from the start; missing where it flows on at the end.",
         digits=5,
         column=Column("ms", 1e3, ".4f"),
         page=True,

@@ -223,7 +223,7 @@ class StrokeVariant:
     def delivered_mass(self) -> float | None:
         """Mass that leaves the valve through all restrictions that lead out [kg]."""
         ends = [item for item in self.deliveries.values() if item.leads_out and not item.pulse]
-        return sum(max(item.outward * item.mass, 0.0) for item in ends) if ends else None
+        return sum(item.left for item in ends) if ends else None
 
     @property
     def needle_times(self) -> LiftTimes:

@@ -244,7 +244,8 @@ def _unfinished(chosen: Sequence[ChosenMeasure], run: StrokeOfPoint) -> Iterator
     """Doubts about what measures of flows count: it still flows at the end."""
     found = [item.part(run) for item in chosen if item.of == "delivery"]
     if any(item.name == "delivered_mass" for item in chosen):
-        found += [item for item in run.variant.deliveries.values() if item.leads_out]
+        whole = (item for item in run.variant.deliveries.values() if not item.pulse)
+        found += [item for item in whole if item.leads_out]
     for item in found:
         if item is not None and item.flows_on:
             yield (
