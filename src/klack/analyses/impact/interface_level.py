@@ -162,18 +162,18 @@ def build_interface(
         )
     model = interface_model(bodies, contacts)
     if not problem.case.motion.is_straight:
-        model = _turning(problem, model)
+        model = _turning(problem, model, here)
     return replace(model, limit=limit if smooth else None, layer=pair.layer)
 
 
-def _turning(problem: ContactProblem, model: InterfaceModel) -> InterfaceModel:
+def _turning(problem: ContactProblem, model: InterfaceModel, space: ContactSpace) -> InterfaceModel:
     """The model with the gaps of a body that turns about its centre, at the points of the other.
 
     Where a body turns its face slides along itself, and the contact stays below the centre of a
     sphere; points that turn with the body would carry the contact aside, and its force would brake
     the spin.
     """
-    gaps, mine = exact_gaps(problem), (model.owner == 0) & (model.omega == 0.0)
+    gaps, mine = exact_gaps(problem, space), (model.owner == 0) & (model.omega == 0.0)
     turns = np.zeros((3, 6))
     turns[:, 3:] = _TURN * np.eye(3)
     motions = model.rigid[:, mine]
@@ -274,8 +274,10 @@ def _sides(problem: ContactProblem) -> list[tuple[ElasticBody, Flexibility]]:
     return sides
 
 
-def exact_gaps(problem: ContactProblem) -> PlacedGaps:
+def exact_gaps(problem: ContactProblem, space: ContactSpace | None = None) -> PlacedGaps:
     """Gaps of all contact points on the curved faces, at any rigid placement of the moving body.
+
+    ``space``: other points of the lower contact than those of the static one.
 
     InputError for axisymmetric bodies.
     """
@@ -283,7 +285,7 @@ def exact_gaps(problem: ContactProblem) -> PlacedGaps:
     centre = pair.upper.centre_of_mass
     here = (pair.upper.mesh, pair.upper_surface)
     below = (pair.lower.mesh, pair.lower_surface)
-    seat = RigidGaps.of(problem.space, *here, *below, centre=centre, form=pair.form)
+    seat = RigidGaps.of(space or problem.space, *here, *below, centre=centre, form=pair.form)
     if above is None:
         return PlacedGaps((seat,), (ABOVE,))
     there = (above.body.mesh, above.surface)
