@@ -189,6 +189,42 @@ def test_an_impact_from_end_to_end(tmp_path):
     assert abs(study.contact.stuck.coupling) < 1e-3 * study.contact.stuck.normal
 
 
+def test_a_curved_lower_face_is_doubted_by_as_much_as_it_is_wrong():
+    """Two rigid spheres on Hertz's law, mu = 0.05, by LSODA: 0.0432 and 0.920; klack 0.0568, 1.080.
+
+    Over a flat face nothing is doubted, however fast.
+    """
+    ball = BODY.format(
+        name="ball",
+        start="[0, -4]",
+        edges="{arc: [2, -2], centre: [0, -2], name: foot}, {arc: [0, 0], centre: [0, -2], "
+        "name: face}",
+        size=0.04,
+    )
+    text = (
+        TEXT.replace(PLATE, ball)
+        .replace("0.2 m/s", "3 m/s")
+        .replace("friction: 0.1", "friction: 0.05")
+    )
+    case = read_case(text, Path("spheres.yaml"))
+    level = run_impact(case, levels=["interface"], certify=False).levels["interface"]
+    told = next(doubt for doubt in level.doubts if "curved lower face" in doubt)
+    tilt, other = map(float, re.findall(r"by about ([\d.]+) .* by ([\d.]+)\. Try", told)[0])
+    assert level.oblique is not None
+    assert level.oblique.impulse_ratio - 0.0432 == pytest.approx(tilt, rel=0.05)
+    assert level.measures.restitution - 0.920 == pytest.approx(other, rel=0.05)
+    assert not hit(3.0, mu=0.05).doubts
+
+
+def test_a_fast_spin_reaches_further_than_the_static_contact():
+    """Points that are added have the gaps of a body that turns, too; the turn is doubted."""
+    problem, _ = bodies()
+    case = moving(spin=(0.0, 1e5, 0.0))
+    level = run_impact(case, levels=["interface"], certify=False).levels["interface"]
+    assert problem.space.count < len(level.pressure.area)
+    assert "the body turns by" in level.doubts[0]
+
+
 @pytest.mark.parametrize(
     ("new", "says"),
     [

@@ -24,6 +24,7 @@ from klack.case.schema import Case
 from klack.contact.history import ImpactHistory
 from klack.contact.laws import ContactLaw, HuntCrossley, LinearLaw, gonthier_coefficient
 from klack.contact.restitution import Deviation, measure_impact
+from klack.contact.statics import ring_radius
 from klack.contact.submodel import LocalStiffness
 from klack.errors import AccuracyWarning, InputError
 from klack.simulation.bodies import fixed_body, rigid_mass_body
@@ -180,6 +181,8 @@ def with_oblique(
 
 
 _LARGEST_TURN = np.radians(5.0)
+_TILTED, _OTHER_RESTITUTION = 0.02, 0.01  # of the impulse ratio, of the restitution
+_SMOOTH = 0.01  # impulse ratio below which that of friction is none
 _CARRIED = 0.02  # share of the moment of friction that contact points take with them
 _NO_FRICTION = (
     "the faces are without friction: motion.sideways_speed and motion.spin change nothing on a "
@@ -195,16 +198,8 @@ def oblique_doubts(problem: ContactProblem, level: LevelResult) -> Iterator[str]
     if problem.case.contact.faces.is_none:
         warnings.warn(_NO_FRICTION, AccuracyWarning, stacklevel=2)
     time = measures.total_contact_time
-    speed = 0.5 * sum(np.hypot(*v[:2]) for v in (motion.velocity_before, motion.velocity_after))
     spin = 0.5 * (motion.spin_before + motion.spin_after)
-    width = problem.static.half_width_at(min(measures.peak_force, problem.static.max_force))
-    if speed * time > width:
-        yield (
-            f"the body moves {format_si(speed * time, 'm', 3)} sideways while it touches, more "
-            f"than the half width of the contact, {format_si(width, 'm', 3)}: the faces keep the "
-            "normals of their first touch, which holds for a flat lower face. Try: less "
-            "motion.sideways_speed."
-        )
+    yield from _slide_doubts(problem, level, motion)
     angle = float(np.linalg.norm(spin)) * time
     if angle > _LARGEST_TURN:
         yield (
@@ -217,6 +212,46 @@ def oblique_doubts(problem: ContactProblem, level: LevelResult) -> Iterator[str]
         yield (
             "contact points of the full order turn with the body, which brakes its spin by about "
             f"{100 * carried:.1f} %. Try: level interface, whose contact stays below the centre."
+        )
+
+
+def _slide_doubts(
+    problem: ContactProblem, level: LevelResult, motion: ObliqueMotion
+) -> Iterator[str]:
+    """Doubts about a body whose contact slides over a lower face, with the normals kept.
+
+    A body that moves by *s* past a lower face of radius R takes the normals of the lower points
+    with it, to the wrong side: the force is tilted wrongly by s/(2 R) on the mean.
+    """
+    measures, static = level.measures, problem.static
+    lost = motion.velocity_after[:2] - motion.velocity_before[:2]
+    slid = motion.velocity_before[:2] + 0.5 * (1.0 + motion.mass_ratio) * lost
+    speed = float(np.hypot(*slid))
+    way, force = speed * measures.total_contact_time, min(measures.peak_force, static.max_force)
+    space, pattern = static.space, static.pattern_at(force)
+    if space.dimension == 2 or ring_radius(space, pattern) is not None:
+        width = static.half_width_at(force)
+        if way > width:
+            yield (
+                f"the body moves {format_si(way, 'm', 3)} sideways while it touches, more than the "
+                f"half width of its ring of contact, {format_si(width, 'm', 3)}: the faces keep "
+                "the normals of their first touch. Try: less motion.sideways_speed."
+            )
+        return
+    if speed == 0.0:
+        return
+    moved = np.zeros(space.G_a.shape[1])
+    moved[0::3], moved[1::3] = slid / speed
+    place = space.points[:, :2] @ slid / speed
+    curvature = abs(float(np.polyfit(place, space.G_a @ moved, 1, w=np.sqrt(pattern))[0]))
+    tilt = 0.5 * way * curvature
+    other = 2.0 * tilt * speed / measures.approach_speed
+    if tilt > _TILTED * max(motion.impulse_ratio, _SMOOTH) or other > _OTHER_RESTITUTION:
+        yield (
+            f"the body moves {format_si(way, 'm', 3)} sideways over a curved lower face while it "
+            "touches, and the faces keep the normals of their first touch: the impulse across the "
+            f"axis is wrong by about {tilt:.2g} of that along it, the restitution by {other:.2g}. "
+            "Try: less motion.sideways_speed, or a flat lower face."
         )
 
 
