@@ -114,9 +114,9 @@ def check_yield(
         warnings.warn(
             f"contact {surfaces} yields before the {format_si(force, 'N', 3)} of this impact: "
             f"{' and '.join(told)}. Elastic levels are too hard there: the first impact on new "
-            "faces is softer and returns less. What has yield: the levels reduced, in the meridian "
-            "plane, and interface of klack impact, klack shots, and the stops of klack stroke along "
-            "the axis; bodies of three dimensions have to be drawn as profiles.",
+            "faces is softer and returns less. What has yield: the levels reduced, in the "
+            "meridian plane, and interface of klack impact, klack shots, and the stops of klack "
+            "stroke along the axis; bodies of three dimensions have to be drawn as profiles.",
             AccuracyWarning,
             stacklevel=2,
         )
