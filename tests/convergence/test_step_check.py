@@ -363,7 +363,7 @@ def test_a_stroke_tells_its_changes_after_storing(tmp_path):
     (change,) = made.reference.changes
     assert loaded.reference.changes == made.reference.changes
     assert loaded.reference.halvings == made.reference.halvings == 6
-    assert "50 ns; all of them halved 6 times" in steps_told(loaded.reference)
+    assert "50 ns; halved, since impacts depended on them: 6 times" in steps_told(loaded.reference)
     (event,) = STROKE.to_json(loaded)["events"]
     assert event["doubled_steps"]["peak_force_change"] == change.peak_force
     assert event["doubled_steps"]["promised"]

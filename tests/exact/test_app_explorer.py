@@ -51,7 +51,7 @@ def test_a_move_is_the_impact_of_the_case_with_these_values(explorer):
     values = {"motion.speed": 0.45, "motion.force": 20.0, "bodies.needle.damping.modal": 0.01}
     answer = explorer.move(values)
     text = explorer.text_at(values)
-    assert "speed: 450 mm/s" in text
+    assert "speed: 0.45 m/s" in text
     assert "# meet the air" in text  # comments stay
 
     with threadpool_limits(1):  # as the moves: sums of several threads have another order
