@@ -222,9 +222,9 @@ def test_gas_between_given_pressures_alone_is_not_computed():
 # ---- numbers of one flow, given as records ------------------------------------------------------
 
 
-def flow_of(values, step, starts=(), component="nozzle"):
+def flow_of(values, step, starts=(), component="nozzle", begin=0.0):
     """Deliveries of a given flow [kg/s], constant in each record."""
-    time = step * np.arange(len(values) + 1)
+    time = begin + step * np.arange(len(values) + 1)
     channel = ChannelData(unit="kg/s", values=np.concatenate([[0.0], values]))
     pressure = ChannelData(unit="Pa", values=1e5 + 1e9 * time)
     result = SimpleNamespace(
@@ -305,6 +305,21 @@ def test_a_flow_under_way_has_an_end_but_no_beginning():
     assert (third.first_flow, third.flows_on) == (None, False)
     assert third.last_flow == pytest.approx(7.99e-4, rel=1e-9)
     assert found["nozzle"].last_flow == pytest.approx(7.99e-4, rel=1e-9)
+
+
+@pytest.mark.parametrize("late", [0.0, 9e-7, 4.5e-6])  # the last after several runs
+def test_a_run_that_goes_on_has_the_command_at_its_seam(late):
+    """A run lasts up to a record longer than asked: both parts together have each command once."""
+    pulse = np.interp(1e-6 * (np.arange(1000) + 0.5), [1e-4, 2e-4, 6e-4, 7e-4], [0, 1e-3, 1e-3, 0])
+    starts = (0.0, 1e-3 - late, 2e-3 - late)
+    first = flow_of(pulse, 1e-6, starts=starts)
+    second = flow_of(pulse, 1e-6, starts=starts, begin=1e-3)
+
+    assert list(first) == ["nozzle", "nozzle.1"]
+    assert list(second) == ["nozzle", "nozzle.2"]
+    for found in (second["nozzle"], second["nozzle.2"]):
+        assert found.mass == pytest.approx(first["nozzle.1"].mass, rel=1e-9)
+        assert found.flow_delay == pytest.approx(1.01e-4 + late, rel=1e-9)
 
 
 def test_mirrored_ports_mirror_every_number():

@@ -41,6 +41,7 @@ _OPEN = 0.5  # of the largest flow: where a steady flow is sought
 _STEADY, _MOSTLY = 0.05, 0.5  # off the median by so much at most, for so much of that time
 _NOTHING = 1e-6  # of the largest flow of all restrictions: no flow, but round-off and trembling
 _MOST = 100  # commands with numbers of their own: more are no injections
+_SEAM, _PART = 10.0, 0.01  # records, of the run: a command so near its end is of the next run
 _SLIVER = 1e-6  # of a record: a shorter piece of one has no mean
 
 
@@ -237,18 +238,22 @@ def deliveries(restrictions: Sequence[Restriction], result: NetworkResult) -> It
     passed = [passed_mass(item, result) for item in restrictions]
     largest = [float(np.max(np.abs(np.diff(mass) / np.diff(time)))) for mass in passed]
     least = _NOTHING * max(largest, default=0.0)
+    begin, seam = float(time[0]), _seam(time)
     for item, mass in zip(restrictions, passed, strict=True):
-        known = [(k, start) for k, start in enumerate(item.starts, start=1) if start >= time[0]]
-        yield _delivery(
-            item,
-            result,
-            mass,
-            least,
-            (0, float(time[0]), item.until),
-            known[0][1] if known else None,
-        )
-        for (k, start), (_, end) in pairwise([*known, (0, item.until)][: _MOST + 1]):
-            yield _delivery(item, result, mass, least, (k, start, end), start)
+        commands = [
+            (k, start)
+            for k, start in enumerate(item.starts, start=1)
+            if begin - seam <= start < item.until - seam
+        ]
+        yield _delivery(item, result, mass, least, (0, begin, item.until), None)
+        for (k, start), (_, end) in pairwise([*commands, (0, item.until)][: _MOST + 1]):
+            yield _delivery(item, result, mass, least, (k, max(start, begin), end), start)
+
+
+def _seam(time: Vector) -> float:
+    """What belongs to the run behind [s]: each lasts up to a record longer than asked."""
+    record = float(time[1] - time[0])
+    return max(record, min(_SEAM * record, _PART * float(time[-1] - time[0])))
 
 
 def passed_mass(item: Restriction, result: NetworkResult) -> Vector:
@@ -269,6 +274,7 @@ def _delivery(
     span: tuple[int, float, float],
     command: float | None,
 ) -> Delivery:
+    """``command`` [s]: None for the whole run."""
     (pulse, begin, end), time = span, result.time
     sliver = _SLIVER * float(time[1] - time[0])
     if end > time[-1]:  # as derivatives move it: the last flow lasts
@@ -280,6 +286,8 @@ def _delivery(
     mass = float(np.sum(pieces))
     way = -1.0 if mass < 0.0 else 1.0
     first, last, flows_on = _times(middle, way * flow, least)
+    if command is None and first is not None:
+        command = _command(item.starts, begin, first)
 
     def drop(moment: float | None) -> float | None:
         return None if moment is None else way * _drop(item, result, moment)
@@ -304,6 +312,15 @@ def _delivery(
         opening_pressure=drop(first),
         closing_pressure=drop(last),
     )
+
+
+def _command(starts: Sequence[float], begin: float, first: float) -> float | None:
+    """The first command of a run; where it flows before that, the last one before the flow."""
+    within = next((start for start in starts if start >= begin), None)
+    if within is not None and within <= first:
+        return within
+    before = [start for start in starts if start <= first]
+    return before[-1] if before and len(before) <= _MOST else None
 
 
 def _times(middle: Vector, flow: Vector, least: float) -> tuple[float | None, float | None, bool]:

@@ -426,7 +426,7 @@ DELIVERY_MEASURES: tuple[Measure[Delivery], ...] = described_in(
         symbol="t_d",
         unit="s",
         definition="From the start of the command of the nearest driver, in the whole run of the "
-        "first one, to the first flow.",
+        "first one (of one before the run if it flows earlier), to the first flow.",
         column=Column("us", 1e6, ".5g", "delay"),
         page=True,
     ),
