@@ -14,7 +14,13 @@ import pytest
 from pages import HOW_TO
 from scipy.integrate import solve_ivp
 
-from klack.analyses.stroke.delivery import Restriction, deliveries, restrictions_of, starts_of
+from klack.analyses.stroke.delivery import (
+    Restriction,
+    deliveries,
+    restrictions_of,
+    starts_of,
+    unfinished,
+)
 from klack.analyses.stroke.stairs import LineEnd, stairs
 from klack.case.any_case import load_valve_case
 from klack.hydraulics.chamber import Chamber
@@ -301,6 +307,8 @@ def test_a_flow_under_way_has_an_end_but_no_beginning():
     found = flow_of(trapezoid(), 1e-6, starts=(5e-5, 2.8e-4, 5e-4))
     first, second, third = (found[f"nozzle.{k}"] for k in (1, 2, 3))
     assert first.flows_on
+    assert next(unfinished([first])).startswith("'nozzle.1' still passes mass at 280 us")
+    assert not list(unfinished([found["nozzle"], third]))
     assert (second.first_flow, second.last_flow, second.flows_on) == (None, None, True)
     assert (third.first_flow, third.flows_on) == (None, False)
     assert third.last_flow == pytest.approx(7.99e-4, rel=1e-9)

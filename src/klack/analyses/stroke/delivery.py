@@ -6,7 +6,7 @@ record, as a flow that turns round, is lost.
 """
 
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -23,6 +23,7 @@ from klack.network.port import FLUID_DOMAINS, Role
 from klack.network.rows import AMBIENT, Rows
 from klack.simulation.flow_channels import flow_label
 from klack.simulation.network_result import NetworkResult
+from klack.units import format_si
 
 __all__ = [
     "Delivery",
@@ -32,6 +33,7 @@ __all__ = [
     "restriction_names",
     "restrictions_of",
     "starts_of",
+    "unfinished",
 ]
 
 Vector = NDArray[np.float64]
@@ -248,6 +250,16 @@ def deliveries(restrictions: Sequence[Restriction], result: NetworkResult) -> It
         yield _delivery(item, result, mass, least, (0, begin, item.until), None)
         for (k, start), (_, end) in pairwise([*commands, (0, item.until)][: _MOST + 1]):
             yield _delivery(item, result, mass, least, (k, max(start, begin), end), start)
+
+
+def unfinished(found: Iterable[Delivery]) -> Iterator[str]:
+    """Doubts about what masses count: it still flows at the end."""
+    for item in found:
+        if item.flows_on:
+            yield (
+                f"'{item.name}' still passes mass at {format_si(item.end, 's')}, where its count "
+                "ends. Try: a longer run.duration, or commands further apart."
+            )
 
 
 def _seam(time: Vector) -> float:

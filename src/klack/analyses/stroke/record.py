@@ -222,8 +222,13 @@ class StrokeVariant:
     @property
     def delivered_mass(self) -> float | None:
         """Mass that leaves the valve through all restrictions that lead out [kg]."""
-        ends = [item for item in self.deliveries.values() if item.leads_out and not item.pulse]
-        return sum(item.left for item in ends) if ends else None
+        return sum(item.left for item in self.ways_out) if self.ways_out else None
+
+    @property
+    def ways_out(self) -> tuple[Delivery, ...]:
+        """Of the whole run, through restrictions that lead out."""
+        found = self.deliveries.values()
+        return tuple(item for item in found if item.leads_out and not item.pulse)
 
     @property
     def needle_times(self) -> LiftTimes:

@@ -14,6 +14,7 @@ from klack.analyses.noise.run import noise_design
 from klack.analyses.noise.source import stroke_sources
 from klack.analyses.shots.draw import drawn_face_friction, drawn_friction, drawn_position, polar
 from klack.analyses.stroke.analysis import first_impact
+from klack.analyses.stroke.delivery import unfinished
 from klack.analyses.stroke.missing import rest_note
 from klack.analyses.stroke.record import StopSummary, StrokeVariant
 from klack.analyses.stroke.run import VariantRun, one_variant, study_of_run
@@ -278,6 +279,7 @@ def run_one_stroke(setup: StrokeSetup, task: StrokeTask) -> StrokeOutcome:
     begun = result.start.notes if result.start is not None else ()
     rest = rest_note(task.variant, result, setup.roles.seat)
     unrest = "" if start.index == CENTRED else _unrest(setup, result, path)
+    flowing = unfinished(item for item in run.variant.ways_out if item.left > 0.0)
     return StrokeOutcome(
         variant=task.variant,
         label=run.variant.label,
@@ -287,7 +289,9 @@ def run_one_stroke(setup: StrokeSetup, task: StrokeTask) -> StrokeOutcome:
         lift=_lift(setup, result),
         end=path.position[-1],
         failure=" ".join(str(run.failure).split()) if run.failure is not None else "",
-        doubts=tuple(dict.fromkeys([*doubts, *notes, *begun, *filter(None, (rest, unrest))])),
+        doubts=tuple(
+            dict.fromkeys([*doubts, *notes, *begun, *filter(None, (rest, unrest)), *flowing])
+        ),
     )
 
 

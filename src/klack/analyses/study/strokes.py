@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from klack.analyses.noise.body import Transfers
 from klack.analyses.noise.source import NoiseSource, stroke_sources
+from klack.analyses.stroke.delivery import unfinished
 from klack.analyses.stroke.missing import rest_note
 from klack.analyses.stroke.record import StopSummary, StrokeVariant
 from klack.analyses.stroke.run import (
@@ -53,7 +54,6 @@ from klack.machine.stages import collected_warnings
 from klack.signals.sampled import TimeSeries
 from klack.simulation.network_recorder import recorded_columns
 from klack.simulation.network_run import has_python_steps
-from klack.units import format_si
 
 __all__ = ["STROKES"]
 
@@ -244,15 +244,8 @@ def _unfinished(chosen: Sequence[ChosenMeasure], run: StrokeOfPoint) -> Iterator
     """Doubts about what measures of flows count: it still flows at the end."""
     found = [item.part(run) for item in chosen if item.of == "delivery"]
     if any(item.name == "delivered_mass" for item in chosen):
-        whole = (item for item in run.variant.deliveries.values() if not item.pulse)
-        found += [item for item in whole if item.leads_out]
-    for item in found:
-        if item is not None and item.flows_on:
-            yield (
-                f"'{item.name}' still passes {format_si(1e3 * abs(item.final_flow), 'g/s', 3)} at "
-                f"{format_si(item.end, 's')}, where its mass ends. Try: a longer run.duration, or "
-                "commands further apart."
-            )
+        found += [item for item in run.variant.ways_out if item.left > 0.0]
+    return unfinished(item for item in found if item is not None)
 
 
 def _valve_at(asked: AskedPoints[ValveCase], built: _Built, i: int) -> Valve:
