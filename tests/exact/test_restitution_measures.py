@@ -20,6 +20,7 @@ Travel of one body between stops: the nearest stop. Truth: the linear programme,
 from dataclasses import replace
 from math import cos, exp, inf, pi
 from pathlib import Path
+from types import SimpleNamespace as Of
 
 import numpy as np
 import pytest
@@ -30,6 +31,7 @@ from klack.acoustics.comparison import compare_histories
 from klack.analyses.impact.levels import deviations, level_result
 from klack.analyses.impact.record import LevelResult
 from klack.analyses.impact.trust import best_level, trust_notes
+from klack.analyses.stroke.pairs import impacts_by_pair
 from klack.analyses.stroke.times import all_lift_times, lift_times
 from klack.case.any_case import read_valve_case
 from klack.case.valve_roles import find_roles
@@ -888,3 +890,26 @@ def test_a_body_between_moving_ones_is_left_to_the_programme():
 def test_a_body_without_stops_goes_anywhere():
     travel = Travel([StopBound("a", None, "needle", 1e-4)])
     assert travel.highest({"housing": 1.0}) == travel._of_a_chain({"housing": 1.0}) == (inf, ())
+
+
+def test_impacts_of_a_pair_lose_what_contact_and_friction_of_its_faces_lose():
+    """Where several bodies meet point by point the balance has friction beside the contact."""
+    losses = {
+        "seat contact": 1.0,
+        "driver contact": 2.0,
+        "driver friction": 4.0,
+        "guide friction": 8.0,
+    }
+    acting = [("seat", "needle"), ("seat", ""), ("driver", "needle"), ("driver", "armature")]
+    variant = Of(
+        moving=[Of(body="needle"), Of(body="armature")],
+        acting=[Of(channel=f"{x} contact force", component=x, body=body) for x, body in acting],
+        result=Of(books=Of(losses=losses), interfaces={"seat": None, "driver": None}, events=()),
+    )
+    lost = {name: found.lost for name, found in impacts_by_pair(variant)}
+    assert lost == {
+        "seat: needle on ground": 1.0,
+        "driver: needle on armature": 6.0,
+        "all of needle": 7.0,
+        "all of armature": 6.0,
+    }

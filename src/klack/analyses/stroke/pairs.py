@@ -68,8 +68,9 @@ PAIR_MEASURES: tuple[Measure[ImpactsOf], ...] = described_in(
     Measure(
         key="lost_in_contacts",
         unit="J",
-        definition="Energy that the contacts turn into heat in the whole run, of the energy "
-        "balance: it counts where an impact alone has no energy loss, too.",
+        definition="Energy that the contacts turn into heat in the whole run, with friction of "
+        "their faces, of the energy balance: it counts where an impact alone has no energy loss, "
+        "too.",
         read=lambda of: of.lost,
         digits=3,
         column=Column("uJ", 1e6, ".4g"),
@@ -87,8 +88,10 @@ def impacts_by_pair(variant: StrokeVariant) -> tuple[tuple[str, ImpactsOf], ...]
     for force in variant.acting:
         if force.channel == f"{force.component} contact force":
             meeting.setdefault(force.component, []).append(force.body or "ground")
+    losses = variant.result.books.losses
     lost = {
-        stop: variant.result.books.losses.get(f"{stop} contact", 0.0)
+        # friction of the faces is in the law of a contact, point by point it is beside it
+        stop: sum(losses.get(f"{stop} {part}", 0.0) for part in ("contact", "friction"))
         for stop in meeting
         if stop in variant.result.interfaces
     }
