@@ -342,3 +342,21 @@ def test_derivatives_that_leave_the_motion_are_told():
     (told,) = _unbounded([Left()], space)
     assert "From 1.2 ms on derivatives with b grow without bound" in told
     assert "run.coarse: 16" in told
+
+
+INJECTOR = SMALL.with_name("injected_mass.yaml")
+
+
+@pytest.mark.parametrize("start", ["0.1 ms", "0.128 ms"])
+def test_a_driver_that_switches_on_the_edge_of_a_step_delays_all_that_follows(start):
+    """Before it everything rests, so the opening comes as much later; 0.128 ms are 100 steps."""
+    case = klack.load_case(INJECTOR).with_value("network.components.driver.start", start)
+    case = case.with_value("run.duration", "0.5 ms")
+
+    found = klack.sensitivities(
+        case,
+        parameters=["network.components.driver.start"],
+        measures=["opening_time"],
+        check=False,
+    )
+    assert found.measures[0].slopes[0] == pytest.approx(1.0, abs=3e-3)  # error of the steps

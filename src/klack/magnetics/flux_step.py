@@ -191,6 +191,11 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
                 mode, entered = par[path + 8], now
             else:
                 mode, entered, cycle = next_state(par, block, which, now, entered, cycle)
+                # nothing, but its derivative: on the edge of a step no piece ends at a timed switch
+                early = entered - now - constant(entered - now)
+                done += early
+                for j in range(loops):
+                    phi[j] += early * rate[j]
             last = 0.0  # the rates belong to the voltage before
             blocked = False
             events += 1
