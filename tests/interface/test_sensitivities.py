@@ -360,3 +360,20 @@ def test_a_driver_that_switches_on_the_edge_of_a_step_delays_all_that_follows(st
         check=False,
     )
     assert found.measures[0].slopes[0] == pytest.approx(1.0, abs=3e-3)  # error of the steps
+
+
+def test_the_edge_of_a_step_is_no_place_of_its_own_for_coupled_coils():
+    """A derivative there is that beside it, but for the error of the steps."""
+    found = []
+    for start in ("0.128 ms", "0.1281 ms"):
+        case = klack.load_case(SMALL.with_name("two_coils.yaml"))
+        case = case.with_value("network.components.boost.start", start)
+        record = klack.sensitivities(
+            case.with_value("run.duration", "0.6 ms"),
+            parameters=["network.components.boost.start"],
+            measures=["opening_time"],
+            check=False,
+        )
+        found.append(record.measures[0].slopes[0])
+    assert 0.9 < found[1] < 1.0  # the other coil pulls before
+    assert found[0] == pytest.approx(found[1], abs=1e-3)

@@ -129,6 +129,7 @@ def coupled_step(par, state, inp, out):  # type: ignore[no-untyped-def]
     while done < h:
         now = t + done
         switched = False
+        early = 0.0  # as in a solenoid alone, of the last of those that switch now
         for w in range(windings):
             row = winding_row(par, w)
             block = state_block(par, int(par[row + 2]), int(mode[w]))
@@ -137,6 +138,7 @@ def coupled_step(par, state, inp, out):  # type: ignore[no-untyped-def]
                 mode[w], entered[w], cycle[w] = next_state(
                     par, block, which, now, entered[w], cycle[w]
                 )
+                early = entered[w] - now - constant(entered[w] - now)
             elif par[row + 3] != 0.0:
                 path = winding_path(par, row, mode[w])
                 if held[int(par[row + 4])] > par[path + 7]:
@@ -150,6 +152,9 @@ def coupled_step(par, state, inp, out):  # type: ignore[no-untyped-def]
         if events > MOST_EVENTS * windings:
             return 2
         if switched:
+            done += early
+            for j in range(6 * magnets):
+                phi[j] += early * rate[j]
             last = 0.0  # the rates belong to the voltage before
             continue
         piece = h - done
