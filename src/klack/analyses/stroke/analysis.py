@@ -187,6 +187,7 @@ _DELIVERY = JsonForm(
     Key("component", str),
     Key("command", int, of="pulse"),
     Key("leads_out", bool, "To the surroundings, or to a given pressure.", "leads_out"),
+    Key("flows_on", bool, "At the end, which cuts the mass.", "flows_on"),
     *measured_keys(DELIVERY_MEASURES),
 )
 _STAIR = JsonForm(
