@@ -163,7 +163,17 @@ def test_doubts_and_a_gap_that_opens_the_other_way(pot, capsys, tmp_path):
     table = "{table: {flux_density: [0.4 T, 0.8 T], field_strength: [200 A/m, 500 A/m]}}"
     pot.write_text(few.replace("iron: X6Cr17", f"iron: {table}"), encoding="utf-8")
     assert main(["magnet", str(pot), "--no-report"]) == 0
-    assert "beyond the last measured point" in capsys.readouterr().out
+    said = " ".join(capsys.readouterr().out.split())
+    assert "beyond the last measured point" in said
+    # two currents on the knee: linkages give another force than the fields, and that is told
+    assert "a stroke takes the force from the linkages" in said
+    assert "Try: more currents there, or more gaps." in said
+
+    # iron far away, whose force is that of the mesh
+    far = few.replace("[[0, -3], [7, 0]]", "[[0, -703], [7, -700]]")
+    pot.write_text(far, encoding="utf-8")
+    assert main(["magnet", str(pot), "--no-report"]) == 2
+    assert "no more than its error" in capsys.readouterr().err
 
     # the plate as drawn far below the pot, and said to rise as its gap opens
     wrong = few.replace("[[0, -3], [7, 0]]", "[[0, -4], [7, -1]]")

@@ -80,7 +80,9 @@ class ForceComparison:
                     f"on the whole it is {self.ratio:.3g} times as large: a part of a model? From "
                     f"a file: force_factor: {words}."
                 )
-        return "more gaps in the table, and force and linkage from the same computation."
+        return (
+            "more gaps and currents in the table, and force and linkage from the same computation."
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -229,7 +231,7 @@ class FluxMap:
                 "falls as the linkage rises, "
                 f"near {format_si(self.linkage[k], 'Wb', 3)}",
                 expected="linkages that change smoothly with the gap",
-                hint="put more gaps into the table there, or smooth its noise.",
+                hint="put more gaps or currents into the table there, or smooth its noise.",
             )
 
     def compare_force(

@@ -30,9 +30,9 @@ from klack.analyses.store import RecordFormat
 from klack.case.placed_errors import tells_place
 from klack.errors import InputError
 from klack.machine.progress import Progress, silent
-from klack.machine.stages import StageClock, collected_warnings
+from klack.machine.stages import StageClock
 from klack.magnetics.drawn_magnet import FieldMap
-from klack.magnetics.flux_map import FluxMap
+from klack.magnetics.flux_map import FluxMap, ForceComparison
 from klack.mesh.profile import Profile
 from klack.report.chart import AxisSpec, Chart, Curve, Panel
 from klack.report.looks import LOOKS, OTHER
@@ -48,6 +48,7 @@ Vector = NDArray[np.float64]
 
 MAP_NAME = "map.csv"
 _DOUBTFUL = 0.02  # error of a map, of its largest value
+_FEW_POINTS = 0.05  # force by virtual work, of the largest one
 _SATURATED = 1e-3  # share of a volume beyond the last point of its curve
 _CURVES = 6  # of a chart
 
@@ -163,6 +164,14 @@ def run_magnet(case: MagnetCase, *, progress: Progress = silent) -> MagnetRecord
     found = drawing.magnet.field_map(
         drawing.current, drawing.gap, mesh_size=drawing.mesh_size, progress=clock
     )
+    strongest = float(np.max(np.abs(found.force)))
+    if strongest <= np.max(found.force_error):
+        raise InputError(
+            "magnet.moving",
+            got=f"a force of {format_si(strongest, 'N', 2)} at most, no more than its error",
+            expected="iron that the coil pulls",
+            hint="correct its place, or that of the coil, in the drawing.",
+        )
     if np.all(found.force[-1] >= 0.0):
         other = "downward" if drawing.opens == "upward" else "upward"
         raise InputError(
@@ -171,11 +180,19 @@ def run_magnet(case: MagnetCase, *, progress: Progress = silent) -> MagnetRecord
             expected="one that closes it",
             hint=f"opens: {other}, where the gap opens the other way, or correct the drawing.",
         )
-    with collected_warnings() as warned:
-        made = FluxMap.of(
-            current=found.current, gap=found.gap, linkage=found.linkage, force=found.force
-        )
-    compared = made.compare_force(found.current, found.linkage, found.force)
+    try:
+        made = FluxMap.of(current=found.current, gap=found.gap, linkage=found.linkage, force=None)
+    except InputError as error:
+        raise InputError(
+            "magnet.current",
+            got=error.got,
+            expected=error.expected,
+            hint="more currents where the iron begins to saturate, or more gaps.",
+        ) from None
+    table = [found.current, found.linkage, found.force]
+    if found.current[0] > 0.0:  # no field without a current
+        table = [np.append(0.0, table[0]), *(np.pad(v, ((1, 0), (0, 0))) for v in table[1:])]
+    compared = made.compare_force(*table)
     beyond = float(np.max(found.beyond))
     return MagnetRecord(
         **case_fields(case),
@@ -191,7 +208,7 @@ def run_magnet(case: MagnetCase, *, progress: Progress = silent) -> MagnetRecord
         virtual_work=compared.share,
         beyond=beyond,
         outlines=_outlines(case),
-        warnings=(*warned, *_doubts(found, beyond)),
+        warnings=(*_doubts(found, beyond), *_work_doubts(compared)),
     )
 
 
@@ -206,6 +223,18 @@ def _doubts(found: FieldMap, beyond: float) -> Iterator[str]:
             f"{share(beyond)} of the volume of a part lies beyond the last measured point of its "
             "magnetisation curve, where it is continued as saturated. Try: points up to a higher "
             "flux density, or smaller currents."
+        )
+
+
+def _work_doubts(compared: ForceComparison) -> Iterator[str]:
+    if compared.share > _FEW_POINTS:
+        low, high, gap = compared.step
+        yield (
+            f"a stroke takes the force from the linkages: at {compared.current:.4g} A and a gap of "
+            f"{format_si(compared.gap, 'm')} that is {compared.derived:.4g} N, where the fields "
+            f"have {compared.given:.4g} N ({share(compared.share)} of the largest force). The "
+            f"points are too far apart, most of all from {low:.4g} A to {high:.4g} A at "
+            f"{format_si(gap, 'm')}. Try: more currents there, or more gaps."
         )
 
 
