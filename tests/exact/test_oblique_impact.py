@@ -234,8 +234,9 @@ def test_a_fast_spin_reaches_further_than_the_static_contact():
 )
 def test_levels_along_the_axis_are_refused(new, says):
     case = read_case(TEXT.replace("sideways_speed: 0.2 m/s", new), Path("sphere.yaml"))
-    with pytest.raises(InputError, match=re.escape(says)):
+    with pytest.raises(InputError, match=re.escape(says)) as refused:
         run_impact(case, levels=["reduced"])
+    assert "in a study: level: interface" in str(refused.value)
 
 
 @pytest.mark.parametrize(

@@ -77,7 +77,8 @@ class Case(ImpactSections):
             f"{self._path or 'case'}: motion.{key}",
             got=f"{what} of a body with {format_si(value, 'm/s' if key != 'spin' else 'rad/s')}",
             expected=f"klack impact with {levels}, whose bodies move in every way",
-            hint="take that, or remove motion.sideways_speed and motion.spin.",
+            hint="take that (in a study: level: interface), or remove motion.sideways_speed and "
+            "motion.spin.",
         )
 
     def _off_axis(self, what: str) -> InputError:
