@@ -80,6 +80,8 @@ def run(problem, law: Friction | float | None, **options) -> FullOrderResult:
         law = law if isinstance(law, Friction) else Friction.coulomb(law)
         friction = FaceFriction(law=law, T_a=T_a, T_b=T_b)
     given = {"speed": 0.3, "duration": 25e-6, "step": 100e-9, "energy_interval": 1} | options
+    if "across" in given:
+        given["across"] = np.array(given["across"])
     return simulate_full_order(a, b, space, friction=friction, **given)
 
 
@@ -87,10 +89,7 @@ def oblique(law, **options) -> FullOrderResult:
     return run(
         balls,
         law,
-        **(
-            {"across": np.array([0.3, 0.2, 0.0, 0.0, 0.0, 0.0]), "duration": 15e-6, "step": 200e-9}
-            | options
-        ),
+        **({"across": (0.3, 0.2, 0.0, 0.0, 0.0, 0.0), "duration": 15e-6, "step": 200e-9} | options),
     )
 
 
@@ -205,7 +204,7 @@ def test_a_ball_that_slides_gains_mu_times_the_impulse():
 
 def test_direction_of_the_motion_does_not_matter():
     """Bodies swept in 8 layers: a turn by a quarter is a symmetry of both."""
-    first, turned = oblique(0.1), oblique(0.1, across=np.array([-0.2, 0.3, 0.0, 0.0, 0.0, 0.0]))
+    first, turned = oblique(0.1), oblique(0.1, across=(-0.2, 0.3, 0.0, 0.0, 0.0, 0.0))
     assert turned.energy.friction[-1] == pytest.approx(first.energy.friction[-1], rel=1e-6)
     scale = first.history.force.max()
     np.testing.assert_allclose(turned.history.force, first.history.force, atol=1e-6 * scale)
@@ -222,7 +221,7 @@ def test_static_coefficient_holds_until_the_first_slip():
 
 def test_sideways_motion_of_an_axisymmetric_body_is_refused():
     with pytest.raises(InputError, match="axisymmetric"):
-        run(seat, None, across=np.array([0.1, 0.0, 0.0, 0.0, 0.0, 0.0]))
+        run(seat, None, across=(0.1, 0.0, 0.0, 0.0, 0.0, 0.0))
 
 
 def test_foreign_rows_are_refused():
