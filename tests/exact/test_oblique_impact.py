@@ -216,6 +216,28 @@ def test_a_curved_lower_face_is_doubted_by_as_much_as_it_is_wrong():
     assert not hit(3.0, mu=0.05).doubts
 
 
+def test_a_flight_before_the_impact_changes_nothing():
+    """The plate is the same everywhere: only the phase of the step is another, 1e-4 of it.
+
+    Slip at the distance of the drawn bodies would make the impulse ratio of 0.02 m/s twice as much.
+    """
+    for speed in (0.2, 0.02):
+        text = TEXT.replace("0.2 m/s", f"{speed} m/s")
+        flown = text.replace("gap: 0 um", "gap: 100 um").replace("30 us", "240 us")
+        near, far = (
+            run_impact(read_case(one, Path("sphere.yaml")), levels=["interface"], certify=False)
+            for one in (text, flown)
+        )
+        unit = np.repeat([1.0, 1.0 / RADIUS], 3)  # of a velocity, of a spin
+        there, here = (after(one.levels["interface"]) / unit for one in (far, near))
+        np.testing.assert_allclose(there, here, rtol=1e-3, atol=1e-5)
+        assert near.contact.stuck is not None
+        assert far.contact.stuck is not None
+        assert far.contact.stuck.tangential == pytest.approx(
+            near.contact.stuck.tangential, rel=1e-6
+        )
+
+
 def test_a_fast_spin_reaches_further_than_the_static_contact():
     """Points that are added have the gaps of a body that turns, too; the turn is doubted."""
     problem, _ = bodies()

@@ -205,7 +205,7 @@ def _meeting(
     faces = None
     if friction is not None:
         surfaces = (pair.upper.mesh, pair.upper_surface, pair.lower.mesh, pair.lower_surface)
-        faces = RingFriction.on(friction, space.section, *surfaces)
+        faces = RingFriction.on(friction, space.section.shifted(-gap), *surfaces)
     ring = RingContact(
         name=contact.name,
         upper=pair.upper.name,

@@ -522,6 +522,12 @@ def _numbered(
     return other, 1.0 if space.slave == "a" else -1.0, parts
 
 
+def _gap_at_touch(part: _Facing, sign: float, space: ContactSpace) -> NDArray[np.float64]:
+    """Gap (f, q) [m] once the bodies touch, wherever their meshes are drawn along z."""
+    flight = space.clearance if np.isfinite(space.clearance) else 0.0
+    return part.gap + sign * flight * part.at.normal[..., -1]
+
+
 def tangent_rows(
     space: ContactSpace, mesh_a: Mesh, surface_a: Surface, mesh_b: Mesh, surface_b: Surface
 ) -> tuple[csr_array, csr_array]:
@@ -531,7 +537,8 @@ def tangent_rows(
         \mp g \, n \cdot \partial u_s / \partial t] \, dA = T_a u_a + T_b u_b
 
     so that tangential forces :math:`T_a^T \lambda_t`, :math:`T_b^T \lambda_t` on the bodies
-    cancel, and so do their moments: across a gap *g* (that of the meshes) the normal of the slave
+    cancel, and so do their moments: across a gap *g* (that of the meshes
+    once they touch) the normal of the slave
     side *s* (-: a, +: b) turns with its surface, and both bodies turned as one do not slip.
     Axisymmetric bodies have one direction *t*, along the meridian and away from the axis of motion
     (along it on walls); solids have a second one round it (the first is along x where hats
@@ -552,12 +559,12 @@ def tangent_rows(
         at, share, nodes = part.at, part.share, part.faces.connectivity[:, None]
         q, d = at.position.shape[1:]
         N, dN = shape_functions(part.faces.family, part.piece.xi)
-        base = _dual_tangents(mesh, part.faces, dN)
+        base, gap = _dual_tangents(mesh, part.faces, dN), _gap_at_touch(part, sign, space)
         towards = _away_from_axis(at.position[:, :, None], central[rows][:, None])
         for way, t in enumerate(_tangents(at.normal[:, :, None], towards)):
             value = sign * np.einsum("fqk,qn,fqkd->fknd", share, N, t)
             turned = np.einsum("qni,fqid,fqkd->fqkn", dN, base, t)
-            value -= sign * np.einsum("fqk,fq,fqkn,fqd->fknd", share, part.gap, turned, at.normal)
+            value -= sign * np.einsum("fqk,fq,fqkn,fqd->fknd", share, gap, turned, at.normal)
             own = np.where(rows < 0, -1, rows + way * space.count)
             _store(entries[space.slave], d, own[:, :, None], nodes, value)
             own, flat = np.repeat(own, q, axis=0), -sign * share.reshape(-1, share.shape[2])
@@ -598,7 +605,9 @@ def around_rows(
         at, share, nodes = part.at, part.share, part.faces.connectivity[:, None]
         q, d = at.position.shape[1:]
         N, _ = shape_functions(part.faces.family, part.piece.xi)
-        bend = part.gap / np.maximum(at.position[..., 0], np.finfo(float).tiny)
+        bend = _gap_at_touch(part, sign, space) / np.maximum(
+            at.position[..., 0], np.finfo(float).tiny
+        )
         away = np.broadcast_to(np.eye(d)[0], at.normal.shape)
         (first,) = _tangents(at.normal, away)
         # normal x first, as of a solid: along +theta or against it
