@@ -175,7 +175,7 @@ ANGULAR_VELOCITY = Kind(
     "rad/s",
     "100 rad/s",
     ("rad/s",),
-    {"rad/s": 1.0},
+    _with_prefixes("rad/s"),
     largest=1e9,
 )
 AREA = Kind("an area", "m^2", "12 mm^2", ("m^2", "cm^2", "mm^2", "um^2"), smallest=1e-24)

@@ -163,13 +163,14 @@ def test_a_film_tilts_as_the_needle_does_also_over_the_edge_of_a_face():
     moving = valve.spatial.of(compile_network(rows, sizes), sizes)
     faces = valve.spatial.model
     first, last = next(contact[1:] for contact in faces.contacts if contact[0] == "opening")
-    shapes = faces.rigid[:, : moving.rigid_count]
+    needle = faces.moving[0]
+    own = faces.rigid_of(needle.number)
     slid = 0
     for turn in np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False):
         placement = np.zeros(6)
         placement[:2] = 5e-6 * np.cos(turn), 5e-6 * np.sin(turn)
         placement[3:5] = -8e-4 * np.sin(turn), 8e-4 * np.cos(turn)
-        moving.q[: moving.rigid_count] = rigid_coordinates(shapes, placement)
+        moving.q[own] = rigid_coordinates(needle.rigid[:, own], placement)
         moving.take_gaps()
         slid += np.count_nonzero(moving.gap0[first:last] > 1e-3)
         lift, *tilts = film_state(moving.films, 0, moving.q)

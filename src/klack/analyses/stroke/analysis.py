@@ -361,10 +361,6 @@ def stroke_measured(study: StrokeStudy) -> Iterator[Measured]:
     """Every variant and impact with its measures."""
     for name, variant in study.variants.items():
         yield name, variant, VARIANT_MEASURES
-        for restriction, found in variant.deliveries.items():
-            yield f"{name}, {restriction}", found, DELIVERY_MEASURES
-        for stair in variant.stairs:
-            yield f"{name}, {stair.name}", stair, STAIR_MEASURES
         counts, called = Counter[str](), list[str]()
         for event in variant.result.events:
             counts[event.stop] += 1
@@ -374,6 +370,10 @@ def stroke_measured(study: StrokeStudy) -> Iterator[Measured]:
             yield f"{name}, {pair}", impacts, PAIR_MEASURES
         for impact, change in zip(called, variant.changes, strict=False):
             yield f"{impact}, steps doubled", change, CHANGE_MEASURES
+        for restriction, found in variant.deliveries.items():
+            yield f"{name}, {restriction}", found, DELIVERY_MEASURES
+        for stair in variant.stairs:
+            yield f"{name}, {stair.name}", stair, STAIR_MEASURES
 
 
 def time_rows(study: StrokeStudy) -> tuple[tuple[str, ...], ...]:
