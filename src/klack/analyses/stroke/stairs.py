@@ -235,7 +235,7 @@ STAIR_MEASURES: tuple[Measure[Stair], ...] = described_in(
         symbol="dp",
         unit="Pa",
         definition="Mean pressure of the stair behind the edge less that of the stair before.",
-        column=Column("bar", 1e-5, "+.3f"),
+        column=Column("bar", 1e-5, "+.3f", "dp"),
         page=True,
     ),
     Measure(
@@ -243,7 +243,7 @@ STAIR_MEASURES: tuple[Measure[Stair], ...] = described_in(
         symbol="A dp",
         unit="N",
         definition="Pressure step times the area of the body that it pushes, along +z.",
-        column=Column("N", 1.0, "+.3f", "area times step"),
+        column=Column("N", 1.0, "+.3f", "A dp"),
         page=True,
     ),
     Measure(
@@ -252,7 +252,7 @@ STAIR_MEASURES: tuple[Measure[Stair], ...] = described_in(
         unit="N",
         definition="Mass of the body times the change of the slope of its velocity, read from the "
         "velocity alone; all forces that change are in it.",
-        column=Column("N", 1.0, "+.3f", "from the velocity"),
+        column=Column("N", 1.0, "+.3f", "by velocity"),
         page=True,
         title="force from the velocity",
     ),
@@ -261,7 +261,7 @@ STAIR_MEASURES: tuple[Measure[Stair], ...] = described_in(
         symbol="dv",
         unit="m/s",
         definition="Change of that slope over one echo time: the height of the stair.",
-        column=Column("m/s", 1.0, "+.4f"),
+        column=Column("m/s", 1.0, "+.4f", "dv"),
         page=True,
     ),
     Measure(
@@ -271,7 +271,7 @@ STAIR_MEASURES: tuple[Measure[Stair], ...] = described_in(
         definition="By how much the lift leaves its former parabola within half a stair: a lift "
         "sensor whose noise is larger does not show it.",
         digits=3,
-        column=Column("um", 1e6, ".3g", "in the lift"),
+        column=Column("um", 1e6, ".3g", "lift"),
         page=True,
         title="in the lift",
     ),
@@ -282,11 +282,11 @@ STAIR_MEASURES: tuple[Measure[Stair], ...] = described_in(
         definition="Standard deviation of the velocity about the straight lines of both stairs.",
         digits=2,
         column=Column("m/s", 1.0, ".1e"),
-        remark=lambda stair: f" (lost in the {stair.hidden_by})" if stair.hidden_by else "",
+        remark=lambda stair: f" ({stair.hidden_by})" if stair.hidden_by else "",
         page=True,
-        note="A step of less than three times that is lost in the vibration of the body; lost in "
-        "the sensor is one of less than the resolution of the lift sensor of the case, or with "
-        "stairs shorter than its rise time, 0.35 over its bandwidth.",
+        note="Vibration: the step is less than three times that. Sensor: the step in the lift is "
+        "less than the resolution of the lift sensor of the case, or the stairs are shorter than "
+        "its rise time, 0.35 over its bandwidth.",
     ),
 )
 """Of one edge of the stairs after an impact."""
