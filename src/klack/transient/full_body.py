@@ -42,9 +42,7 @@ from klack.bodies.elasticity.factorization import (
 )
 from klack.errors import InputError
 from klack.transient.body_damping import BodyDamping, DampingMatrix, LowRankSolve, sparse_damping
-from klack.transient.interface_model import rigid_motion
 from klack.transient.interface_solve import InterfaceSolve, interface_solve
-from klack.transient.placed_bodies import rigid_coordinates
 
 __all__ = [
     "FullBody",
@@ -388,16 +386,22 @@ class FullBody:
                 expected="none for an axisymmetric body, or one that is held sideways",
                 hint="model a solid that is free to move across the axis.",
             )
-        own = rigid_coordinates(rigid_motion(self.body), velocity)
-        return np.asarray(self.body.rigid_modes[self.free] @ own)
+        arm = self.body.mesh.points - self.body.centre_of_mass
+        field = velocity[:3] + np.cross(velocity[3:], arm)
+        return np.asarray(field.ravel()[self.free])
 
     def rigid_velocity(self, field: NDArray[np.float64]) -> NDArray[np.float64]:
         """Rigid motion (6,) [m/s], [rad/s] with the momenta of a whole field."""
-        body = self.body
-        if body.dimension == 1:
-            along = float(body.nodal_mass @ field) / body.mass
-            return np.array([0.0, 0.0, along, 0.0, 0.0, 0.0])
-        return rigid_motion(body) @ (body.rigid_modes.T @ (self.whole_mass @ field))
+        body, d = self.body, self.dimension
+        momentum = (self.whole_mass @ field).reshape(-1, d)
+        out = np.zeros(6)
+        if d < 3:
+            out[2] = momentum[:, -1].sum() / body.mass
+        else:
+            out[:3] = momentum.sum(axis=0) / body.mass
+            turning = np.cross(body.mesh.points - body.centre_of_mass, momentum).sum(axis=0)
+            out[3:] = np.linalg.lstsq(body.inertia, turning, rcond=None)[0]  # of a point: none
+        return out
 
     def refresh(self) -> None:
         """Recompute K u and K v, which every step only adds to."""
