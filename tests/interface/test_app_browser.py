@@ -192,7 +192,7 @@ def test_a_run_from_the_editor_is_that_of_the_text_on_the_page(page, server, fol
 
     page.wait_for_selector("text=klack impact valve/edited.yaml")
     assert page.url == f"{server.base}/"
-    page.wait_for_selector("text=done, ")
+    page.wait_for_selector("text=done in ")
     out = folder / "klack-results" / jobs.all()[0].out.rpartition("/")[2]
     assert analysis_in(out).load(out).speed == 0.4
     require_within(page)
@@ -379,7 +379,7 @@ def test_a_run_goes_on_without_the_server_and_its_results_compare(page, server, 
         other.kill()
 
     page.goto(f"{server.base}/")
-    page.locator(".k-row", has_text="klack impact valve/one.yaml").get_by_text("done, ").wait_for()
+    page.locator(".k-row", has_text="klack impact valve/one.yaml").get_by_text("done in ").wait_for()
     shutil.copytree(folder / "klack-results" / "one", folder / "klack-results" / "two")
     page.reload()
     page.locator(".k-row", has_text="klack-results/one").get_by_role("checkbox").wait_for()

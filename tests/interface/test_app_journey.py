@@ -235,7 +235,7 @@ def run_cancel_and_read(walk: Walk, folder: Path) -> None:
     walk.finds(not (folder / "klack-results/valve/result.zarr").exists(), "nothing half written")
     walk.presses("Dismiss klack-results/valve", f"impact, {COPY}")
     walk.no_longer_sees("cancelled, ")
-    walk.presses(f"Run {COPY}", f"klack impact {COPY}", "done, ")
+    walk.presses(f"Run {COPY}", f"klack impact {COPY}", "done in ")
     walk.sees("klack impact · klack-results/case-2", "peak force")
     shown = walk.row("klack-results/case-2").locator("b").first.inner_text()
     peak = peak_of(folder / "klack-results/case-2")
@@ -344,7 +344,7 @@ def kill_in_the_middle(walk: Walk, folder: Path, serve: Callable[[Path], Served]
     walk.sees(f"klack impact {COPY}", "edited, not saved")
     walk.goes("/case?path=valve/case-3.yaml", "valid impact, not saved")
     walk.finds(area.input_value() == mine, "the text that was not saved is there")
-    walk.goes("/", "done, ")
+    walk.goes("/", "done in ")
     walk.no_longer_sees("since ")  # the last run, not that of the morning
     walk.finds(peak_of(folder / "klack-results/case-2") > 0, "the run has written its result")
 
