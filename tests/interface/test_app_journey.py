@@ -241,7 +241,7 @@ def run_cancel_and_read(walk: Walk, folder: Path) -> None:
     peak = peak_of(folder / "klack-results/case-2")
     walk.finds(shown == f"{peak:.4g} N", f"{shown} is the peak of the result, {peak}")
     with walk.context.expect_page() as opened:
-        walk.page.get_by_role("link", name="Report klack-results/case-2").click()
+        walk.page.get_by_role("link", name="Report klack-results/case-2").first.click()
     report = opened.value
     report.set_default_timeout(LONG)
     report.wait_for_selector(".main-svg")
