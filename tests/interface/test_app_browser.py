@@ -379,7 +379,9 @@ def test_a_run_goes_on_without_the_server_and_its_results_compare(page, server, 
         other.kill()
 
     page.goto(f"{server.base}/")
-    page.locator(".k-row", has_text="klack impact valve/one.yaml").get_by_text("done in ").wait_for()
+    page.locator(".k-row", has_text="klack impact valve/one.yaml").get_by_text(
+        "done in "
+    ).wait_for()
     shutil.copytree(folder / "klack-results" / "one", folder / "klack-results" / "two")
     page.reload()
     page.locator(".k-row", has_text="klack-results/one").get_by_role("checkbox").wait_for()

@@ -339,7 +339,7 @@ def _times(middle: Vector, flow: Vector, least: float) -> tuple[float | None, fl
     """When a flow has risen, when it has fallen again, and whether it has not.
 
     Times lie between the middles of records.  A flow above half of the largest one is no leak: in
-    the first record it is under way, in the last one it goes on.
+    the first record it is under way, in the last one it continues.
     """
     top = float(flow.max())
     under_way = float(flow[0]) > max(_OPEN * top, least)
