@@ -6,12 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from klack.analyses.impact.gauges import FullGauges
-from klack.analyses.impact.levels import (
-    level_result,
-    oblique_doubts,
-    pressure_record,
-    with_oblique,
-)
+from klack.analyses.impact.levels import level_result, pressure_record
+from klack.analyses.impact.oblique import oblique_doubts, with_oblique
 from klack.analyses.impact.record import FrictionRecord, LevelResult
 from klack.assembling.modes import damping_of, is_damped
 from klack.assembling.problem import ContactProblem

@@ -9,12 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.analyses.impact.gauges import interface_gauges
-from klack.analyses.impact.levels import (
-    level_result,
-    oblique_doubts,
-    pressure_record,
-    with_oblique,
-)
+from klack.analyses.impact.levels import level_result, pressure_record
+from klack.analyses.impact.oblique import oblique_doubts, with_oblique
 from klack.analyses.impact.record import FrictionRecord, LevelResult
 from klack.assembling.bodies import BodyPair
 from klack.assembling.modes import damping_of, selection_of
