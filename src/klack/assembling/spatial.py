@@ -399,7 +399,7 @@ def build_spatial(
             name,
             guide,
             sections(name, guide.surface, guide),
-            None if on is None else sections(on.body, on.surface, guide),
+            None if on is None else (on.body, sections(on.body, on.surface, guide)),
         )
         for name, guide, on in movers.guided()
     }
@@ -413,15 +413,15 @@ def body_guide(
     name: str,
     guide: ValveGuide,
     sections: Sequence[ShaftSection],
-    inside: Sequence[ShaftSection] | None,
+    on: tuple[str, Sequence[ShaftSection]] | None,
 ) -> Guide:
-    """Guide of a body at its sections; ``inside``: those of the body on which it slides."""
-    law, on = guide.law, getattr(guide, "on", None)
+    """Guide of a body at its sections; ``on``: the body on which it slides, and its sections."""
+    law = guide.law
     return guide_at_sections(
         model,
         name,
         sections,
-        on=None if on is None or inside is None else (on.body, inside),
+        on=on,
         clearance=guide.clearance,
         stiffness=law.stiffness if isinstance(law, LinearGuideLaw) else law.bore,
         friction=guide.friction,

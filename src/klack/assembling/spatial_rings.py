@@ -133,7 +133,7 @@ def build_spatial_rings(
                 name,
                 guide,
                 at_sections(name, name, guide),
-                None if on is None else at_sections(on.body, name, guide),
+                None if on is None else (on.body, at_sections(on.body, name, guide)),
             )
             for name, guide, on in movers.guided()
         },
