@@ -5,20 +5,20 @@ in the case; energy; first order in a small coefficient; the words of a mistake.
 """
 
 import json
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from same_shots import ROUND_OFF, columns_of, same
 from scipy import stats
 
 from klack.analyses.shots.analysis import SHOTS, shots_to_json
 from klack.analyses.shots.content import shots_content
 from klack.analyses.shots.draw import centric_draw, draw_shot
 from klack.analyses.shots.model import build_shots
-from klack.analyses.shots.one_shot import ShotOutcome, run_shot, shot_log, simulate_shot
+from klack.analyses.shots.one_shot import run_shot, shot_log, simulate_shot
 from klack.analyses.shots.record import RESULTS
-from klack.analyses.shots.record import ShotColumns as Shots
 from klack.analyses.shots.run import run_shots, run_shots_on
 from klack.case import read_case
 from klack.case.distribution import Distribution
@@ -54,21 +54,6 @@ def rubbing():
 @pytest.fixture(scope="module")
 def study():
     return run_shots(case(UNIFORM), workers=1, threads=1)
-
-
-def columns_of(outcomes: list[ShotOutcome]) -> Shots:
-    return Shots.of([outcome.numbers for outcome in outcomes])
-
-
-ROUND_OFF = 1e-12
-"""Of a time, a speed, an energy: a process may round differently where it chooses its BLAS."""
-
-
-def same(one: Shots, other: Shots, error: float = 0.0) -> None:
-    for field in fields(Shots):
-        np.testing.assert_allclose(
-            getattr(one, field.name), getattr(other, field.name), rtol=error, atol=error
-        )
 
 
 # --------------------------------------------------------------------------- draws

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from energy_ledger import allowed
+from same_shots import ROUND_OFF, columns_of, same
 
 from klack.analyses.impact.interface_level import build_guide, build_interface
 from klack.analyses.shots import one_shot
@@ -21,7 +22,6 @@ from klack.analyses.shots.draw import centric_draw, draw_shot
 from klack.analyses.shots.model import build_shots
 from klack.analyses.shots.one_shot import (
     SHOT_LOG,
-    ShotOutcome,
     run_shot,
     shot_log,
     shots_mark,
@@ -83,21 +83,6 @@ def study(tmp_path_factory):
     return done
 
 
-def columns_of(outcomes: list[ShotOutcome]) -> ShotColumns:
-    return ShotColumns.of([outcome.numbers for outcome in outcomes])
-
-
-ROUND_OFF = 1e-12
-"""Of a time, a speed, an energy: a process may round differently where it chooses its BLAS."""
-
-
-def same(one: ShotColumns, other: ShotColumns, error: float = 0.0) -> None:
-    for field in fields(ShotColumns):
-        np.testing.assert_allclose(
-            getattr(one, field.name), getattr(other, field.name), rtol=error, atol=error
-        )
-
-
 def test_a_centred_rebound_is_a_throw(model, centred):
     """Height v^2 m / (2 F) and time 2 v m / F after the impact; the body still rings a little."""
     numbers = centred.numbers
@@ -156,7 +141,7 @@ def test_two_processes_give_the_same_numbers(model, draws, alone):
     for draw, outcome in zip(draws, alone, strict=True):
         scale = np.abs(outcome.height).max()
         np.testing.assert_allclose(
-            log.done[draw.index].height / scale, outcome.height / scale, atol=1e-6
+            log.done[draw.index].height / scale, outcome.height / scale, rtol=0, atol=1.2e-7
         )
 
 
