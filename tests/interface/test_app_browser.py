@@ -395,6 +395,8 @@ def test_a_run_goes_on_without_the_server_and_its_results_compare(page, server, 
 
 
 LATE = """
+const every = window.setInterval;  // its clocks stand still while it is paused
+window.setInterval = (tick, rest) => every(() => window.paused || tick(), rest);
 window.WebSocket = class extends WebSocket {  // hears nothing until it is released
   set onmessage(hear) {
     super.onmessage = (message) =>
@@ -406,15 +408,36 @@ window.release = () => { const all = window.heard; window.heard = null; all.forE
 """
 
 
-def test_what_is_pressed_before_the_server_listens_is_done_once_it_does(page, server):
+def test_what_is_pressed_before_the_server_listens_is_done_once_it_does(page, server, folder):
     page.add_init_script(LATE)
     page.goto(f"{server.base}/case?path={CASE}")
-    page.get_by_label("case file, YAML").fill("klack: 1\ntitle: early\n")
+    area = page.get_by_label("case file, YAML")
+    area.fill("klack: 1\ntitle: early\n")
     page.wait_for_selector("#k-link >> text=connecting")
     assert not page.evaluate("window.did_handshake")
     page.evaluate("window.release()")
 
     page.wait_for_selector("text=not valid, not saved")
-    assert page.locator("#k-link").inner_text() == ""
+    page.wait_for_function("document.getElementById('k-link').textContent === ''")
     page.get_by_role("button", name="Discard changes").click()
     page.wait_for_selector("text=valid impact, saved")
+    assert area.input_value() == (folder / CASE).read_text("utf-8")
+
+
+def test_text_discarded_at_once_stays_discarded(page, server, folder):
+    """It was typed while the server did not listen; the page looks at the clock only later."""
+    page.add_init_script(LATE)
+    page.goto(f"{server.base}/case?path={CASE}")
+    area = page.get_by_label("case file, YAML")
+    area.fill("klack: 1\ntitle: early\n")
+    page.wait_for_selector("#k-link >> text=connecting")
+    page.evaluate("window.paused = true; window.release()")
+    page.wait_for_selector("text=not valid, not saved")
+    page.get_by_role("button", name="Discard changes").click()
+    page.wait_for_selector("text=valid impact, saved")
+
+    page.evaluate("window.paused = false")
+    page.wait_for_function("!Object.keys(sessionStorage).some(key => key.startsWith('klack-text'))")
+    page.wait_for_timeout(200)
+    assert area.input_value() == (folder / CASE).read_text("utf-8")
+    assert page.locator(".k-badge").inner_text() == "valid impact, saved"

@@ -147,14 +147,15 @@ document.addEventListener("keydown", (event) => {
   const to = !dialog.contains(now) ? first : event.shiftKey && !found.slice(1).includes(now) ? last : !event.shiftKey && now === last ? first : null;
   if (to) { event.preventDefault(); to.focus(); }
 });
-// Without the server: what is typed into the text of a case is kept in this tab, until a page of it is connected again.
+// Without the server: what is typed into the text of a case is kept in this tab, for a page that comes in place of this one.
 (() => {
   const key = () => `klack-text:${location.pathname}${location.search}`;
+  const stored = (act) => { try { return act(sessionStorage, key()); } catch { return null; } };  // no room: it stays in the page
   const area = () => document.getElementById("k-yaml");
   const connected = () => window.socket?.connected && window.did_handshake;
+  let left = stored((store, name) => store.getItem(name));  // by the page before this one
   document.addEventListener("input", (event) => {
-    if (event.target !== area() || connected()) return;
-    try { sessionStorage.setItem(key(), event.target.value); } catch { /* no room: it stays in the page */ }
+    if (event.target === area() && !connected()) stored((store, name) => store.setItem(name, event.target.value));
   });
   const words = () => {
     const spans = document.querySelectorAll("#popup > span");
@@ -166,11 +167,13 @@ document.addEventListener("keydown", (event) => {
   document.addEventListener("DOMContentLoaded", words);
   setInterval(() => {
     const found = area();
-    if (!found || !connected()) return;
-    let kept = null;
-    try { kept = sessionStorage.getItem(key()); sessionStorage.removeItem(key()); } catch { return; }
-    if (kept === null || kept === found.value) return;
-    found.value = kept;
-    found.dispatchEvent(new Event("input", { bubbles: true }));
-  }, 500);
+    if (!found) return;
+    const text = left;
+    left = null;  // once: what is typed on this page reaches the server by itself
+    if (text !== null && text !== found.value) {
+      found.value = text;
+      found.dispatchEvent(new Event("input", { bubbles: true }));
+    }
+    if (connected()) stored((store, name) => store.removeItem(name));
+  }, 100);
 })();
