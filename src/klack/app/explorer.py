@@ -644,7 +644,7 @@ class _Strokes:
             numbers=stroke_numbers(found, study.channels),
             doubts=(
                 *missing_notes(of_run, (), run.failure),
-                *stroke_notes(case, of_run, roles.seat, warned),
+                *stroke_notes(case, of_run, roles, warned),
                 *study.warnings,  # of the text of the case
                 *map(contact_doubt, self._stops),
                 *source.notes,

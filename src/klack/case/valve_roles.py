@@ -41,12 +41,15 @@ class ValveRoles:
         Moving component, and its point of the lift.
     seat, opening_stop
         End stops down and up, perhaps of a body that it pushes or rests on, or empty.
+    own_seat
+        Nearest end stop below that it touches itself, or empty.
     """
 
     needle: str
     point: str
     seat: str
     opening_stop: str
+    own_seat: str
 
 
 def find_meetings(network: Network) -> dict[str, Meeting]:
@@ -89,7 +92,21 @@ def find_roles(case: ValveSections, network: Network | None = None) -> ValveRole
     opening = next(iter(travel.highest({needle: 1.0})[1]), nearest_above)
     if case.run.lift is not None:
         point = case.run.lift.surface
-    return ValveRoles(needle=needle, point=point, seat=seat, opening_stop=opening)
+    named = case.run.seat
+    if named is not None and named not in below:
+        raise CaseProblem(
+            ("run", "seat"),
+            got=f"'{named}'",
+            expected=f"an end stop below '{needle}': {one_of(below)}",
+            hint=nearest(named, below, "connect its port 'upper' to a point of that body."),
+        )
+    return ValveRoles(
+        needle=needle,
+        point=point,
+        seat=named or seat,
+        opening_stop=opening,
+        own_seat=named or nearest_below,
+    )
 
 
 def travel_of(case: ValveSections, network: Network, meetings: Mapping[str, Meeting]) -> Travel:

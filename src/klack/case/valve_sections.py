@@ -140,6 +140,11 @@ class StrokeRun(Section):
         description="Point of a body whose displacement is the lift, as component.point; "
         "default the point of the needle at the seat.",
     )
+    seat: Name | None = Field(
+        default=None,
+        description="End stop that the body of the lift closes; default the one that ends its "
+        "travel. Where it closes on a body that stays in place, as an insert, name that stop.",
+    )
 
     @model_validator(mode="after")
     def _sizes(self) -> Self:

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from klack.analyses.stroke.record import StrokeVariant
+from klack.case.valve_roles import ValveRoles
 from klack.simulation.network_result import NetworkResult
 from klack.units import format_si
 
@@ -51,17 +52,27 @@ def _line(text: object) -> str:
     return " ".join(str(text).split())
 
 
-def rest_note(variant: str, result: NetworkResult, seat: str) -> str:
+def rest_note(variant: str, result: NetworkResult, roles: ValveRoles) -> str:
     """Note that the needle never left its seat; empty if it did.
 
-    It tells the smallest force on the seat, which was missing to lift it.
+    It tells the smallest force on the seat, which was missing to lift it; or, where the needle left
+    another body that stayed on the seat, that the seat may be another one.
     """
+    seat, own = roles.seat, roles.own_seat
     pressing = result.channels.get(f"{seat} contact force")
     if pressing is None or pressing.values.size < 2:
         return ""
     force = pressing.values
     if not np.all(force > 0.0):
         return ""
+    left = result.channels.get(f"{own} contact force")
+    if left is not None and not np.all(left.values > 0.0):
+        return (
+            f"'{variant}': '{roles.needle}' opened at '{own}', and the body below stayed on "
+            f"'{seat}', with {force.min():.3g} N or more. '{seat}' counts as the seat. If that "
+            f"body is to stay, as an insert, write 'run: {{seat: {own}}}'; if it is to "
+            "open, check the forces on it."
+        )
     return (
         f"'{variant}': the needle never left its seat. It was pressed on '{seat}' with "
         f"{force[0]:.3g} N at first, and {force.min():.3g} N were still missing to lift it at "

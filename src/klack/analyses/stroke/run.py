@@ -111,7 +111,7 @@ def run_stroke(
         run_fields(begin, clock),
         bodies=body_summaries(valve),
         stops=stops,
-        warnings=(*missing, *stroke_notes(case, results, roles.seat, notes)),
+        warnings=(*missing, *stroke_notes(case, results, roles, notes)),
         schematic=schematic_svg(case.network.network()),
     )
     if failure is not None:
@@ -120,7 +120,7 @@ def run_stroke(
 
 
 def stroke_notes(
-    case: ValveCase, variants: Mapping[str, StrokeVariant], seat: str, warned: Sequence[str]
+    case: ValveCase, variants: Mapping[str, StrokeVariant], roles: ValveRoles, warned: Sequence[str]
 ) -> tuple[str, ...]:
     """Notes on computed variants, and warnings on the way."""
     begun = [
@@ -129,7 +129,7 @@ def stroke_notes(
         for note in (variant.result.start.notes if variant.result.start else ())
         if not any(note in other for other in warned)  # a warning already
     ]
-    at_rest = [rest_note(name, variant.result, seat) for name, variant in variants.items()]
+    at_rest = [rest_note(name, variant.result, roles) for name, variant in variants.items()]
     moving = [moving_note(name, variant.result) for name, variant in variants.items()]
     return (
         *controller_notes(case),

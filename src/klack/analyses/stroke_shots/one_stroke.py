@@ -277,7 +277,7 @@ def run_one_stroke(setup: StrokeSetup, task: StrokeTask) -> StrokeOutcome:
         for stop, arm, pair in zip(spatial.stops, spatial.arms, spatial.pairings, strict=True)
     }
     begun = result.start.notes if result.start is not None else ()
-    rest = rest_note(task.variant, result, setup.roles.seat)
+    rest = rest_note(task.variant, result, setup.roles)
     unrest = "" if start.index == CENTRED else _unrest(setup, result, path)
     flowing = unfinished(item for item in run.variant.ways_out if item.left > 0.0)
     return StrokeOutcome(

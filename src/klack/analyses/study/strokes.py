@@ -222,7 +222,7 @@ class _Strokes(PointKind[ValveCase, _Built]):
         caught = taken()
         result = whole.variant.result
         begun = result.start.notes if result.start is not None else ()
-        rest = rest_note(whole.variant.name, result, roles.seat)
+        rest = rest_note(whole.variant.name, result, roles)
         notes = [*built.notes, *doubts_in(caught), *whole.noise.notes]
         notes += [note for note in begun if not any(note in other for other in notes)]
         notes += [rest] if rest else []
