@@ -21,6 +21,7 @@ def test_a_clamped_insert_moves_as_the_page_says(row):
     """One unit of the last digit; the energy of all three bodies balances."""
     clamp, touch, speed, peak, least, largest = map(float, row)
     case = klack.load_case(CASE).with_value("network.components.sleeve.preload", f"{clamp} N")
+    assert find_roles(case.checked).seat == "seat"
     record = klack.run_stroke(case, ["dry"]).record
     result = record.reference.result
 
