@@ -128,7 +128,11 @@ def begin_with_an_empty_folder(walk: Walk, folder: Path) -> None:
     for _ in range(9):
         walk.keys("Tab")
         walk.finds(dialog.evaluate("e => e.contains(document.activeElement)"), "focus is kept in")
-    walk.page.get_by_label("Copy of").select_option("demo-valve-axisymmetric")
+    copied = walk.page.get_by_label("Copy of")
+    copied.select_option("free-travel")
+    told = copied.evaluate("e => e.selectedOptions[0].text")
+    walk.finds("armature travels freely" in told, "cases are listed with their titles")
+    copied.select_option("demo-valve-axisymmetric")
     walk.types("Name", "no/slash", "Copies a case", key="Tab")
     walk.presses("Make", "letters, digits, - and _")
     walk.types("Name", "valve", "Copies a case", key="Tab")

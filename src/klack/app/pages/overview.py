@@ -49,6 +49,7 @@ _Row = tuple[str, ui.element]
 _Told = TypeVar("_Told")
 _HEAD = 120  # characters of one that is folded
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,60}")
+_TITLE = re.compile(r"^title: *(.+)$", re.MULTILINE)
 _SHOWN = ("impact", "stroke")  # commands whose results have bodies, and cases sliders
 _WORDS = {
     "running": "runs",
@@ -301,6 +302,7 @@ class _Overview:
         from klack.case.reader import shipped_cases  # with all of the schema
 
         shipped = shipped_cases()
+        titles = {name: _TITLE.search(path.read_text("utf-8")) for name, path in shipped.items()}
         first = "demo-valve-axisymmetric"
 
         def make(source: str, name: str) -> None:
@@ -309,7 +311,7 @@ class _Overview:
         self._ask(
             "New case",
             "Copies a case that comes with klack into a folder of its own.",
-            tuple(shipped),
+            {name: f"{name}: {title[1]}" if title else name for name, title in titles.items()},
             first,
             f"{first}-copy" if self._state.folder.exists(first) else first,
             make,
@@ -329,7 +331,7 @@ class _Overview:
         self._ask(
             f"Duplicate {case}",
             "The copy is placed beside it, so the files that it names are found.",
-            (),
+            {},
             "",
             f"{path.stem}-2",
             make,
@@ -339,7 +341,7 @@ class _Overview:
         self,
         title: str,
         words: str,
-        sources: tuple[str, ...],
+        sources: Mapping[str, str],
         source: str,
         name: str,
         make: Callable[[str, str], None],
@@ -365,8 +367,7 @@ class _Overview:
         with asking(title, "Make", done) as dialog:
             plain(words, "p").classes("k-soft")
             if sources:
-                choices = {word: word for word in sources}
-                choice_field("Copy of", choices, source, lambda word: values.update(source=word))
+                choice_field("Copy of", sources, source, lambda word: values.update(source=word))
             with ui.element("label"):
                 plain("Name").classes("k-soft")
                 entry_box(name, lambda text: values.update(name=text), maxlength="80")
