@@ -205,7 +205,9 @@ def made_folder(folder: Path) -> Path:
 
 
 def _run(main: Callable[[list[str]], int | None], words: list[str]) -> None:
-    assert os.environ.get("OMP_NUM_THREADS") == "1"
+    assert os.environ.get("OMP_NUM_THREADS") == "1", (
+        "without workers: OMP_NUM_THREADS=1 pytest -n 0"
+    )
     code = main(words)
     assert not code, f"klack {' '.join(words)} ended with {code}"
 
