@@ -8,6 +8,7 @@ import numpy as np
 
 from klack.analyses.valve_inspection import valve_rows
 from klack.assembling.assembled_bodies import assembled_body
+from klack.assembling.fits import press_fits
 from klack.assembling.given_bodies import reduced_from_file
 from klack.bodies.model_files.matrices import MATRIX_FORMATS, read_matrix
 from klack.bodies.model_files.system_matrix import SystemMatrix, WhichMatrixError
@@ -175,6 +176,9 @@ def _drawn_rows(case: CaseFile, name: str, drawn: ProfileGeometry) -> Iterator[R
         yield "surface", edge, f"z {_range(points[:, 1])}, r {_range(points[:, 0])}"
     yield _mass(case, name, {solid: profile.volume for solid, profile in profiles.items()})
     yield from _drawn_inertia(case, name, profiles)
+    for fit in press_fits(case, name):
+        yield from (("press fit", fit.joint, f"{what}: {text}") for what, text in fit.rows())
+        yield from (("doubt", fit.joint, doubt) for doubt in fit.doubts)
 
 
 def _drawn_inertia(case: CaseFile, name: str, profiles: Mapping[str, Profile]) -> Iterator[Row]:

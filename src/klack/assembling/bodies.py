@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from klack.assembling.assembled_bodies import assembled_from_matrices, node_mesh
 from klack.assembling.face_form import form_of_faces, layer_of_faces
+from klack.assembling.fits import press_fits
 from klack.assembling.gauges import place_gauges
 from klack.assembling.generated_mesh import (
     coarsest_sound,
@@ -300,7 +301,8 @@ def assemble_body(case: CaseFile, name: str, mesh: Mesh) -> ElasticBody:
     Warns
     -----
     AccuracyWarning
-        Of materials that no solid has (:attr:`klack.materials.material.Material.question`).
+        Of materials that no solid has (:attr:`klack.materials.material.Material.question`), and of
+        press fits (:attr:`klack.assembling.fits.PressFit.doubts`).
     """
     body = case.bodies[name]
     if body.matrices is not None:
@@ -309,6 +311,9 @@ def assemble_body(case: CaseFile, name: str, mesh: Mesh) -> ElasticBody:
     for material in materials.values():
         if material.question is not None:
             warnings.warn(material.question, AccuracyWarning, stacklevel=2)
+    for fit in press_fits(case, name):
+        for doubt in fit.doubts:
+            warnings.warn(doubt, AccuracyWarning, stacklevel=2)
     return elastic_body(name, mesh, materials, fixed_nodes=held_nodes(body, mesh))
 
 

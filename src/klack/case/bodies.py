@@ -31,7 +31,8 @@ from klack.materials.hardening import (
 )
 from klack.materials.library import MATERIALS, find_material
 from klack.materials.material import Material
-from klack.units import Density, Frequency, Modulus, Rate, Ratio, Time, format_si
+from klack.mesh.joint import cylinder_joint
+from klack.units import Density, Frequency, Length, Modulus, Rate, Ratio, Time, format_si
 
 __all__ = [
     "BodyDamping",
@@ -39,6 +40,7 @@ __all__ = [
     "CaseBody",
     "CaseFile",
     "CaseMaterial",
+    "Fit",
     "HardeningSlopes",
     "Hardness",
     "ModeChoice",
@@ -232,6 +234,20 @@ class BodyDamping(Section):
         return self
 
 
+class Fit(Section):
+    """A part pressed on another one: their overlap, and the friction that holds it."""
+
+    interference: Length = Field(
+        ge=0,
+        examples=["8 um"],
+        description="Overlap before joining, on the diameter: that of the inner part less the bore "
+        "of the outer one.",
+    )
+    friction: Ratio = Field(
+        ge=0, examples=[0.12], description="Coefficient of friction that holds force and torque."
+    )
+
+
 class CaseBody(Section):
     """An elastic body."""
 
@@ -261,6 +277,11 @@ class CaseBody(Section):
     damping: BodyDamping = Field(
         default=BodyDamping(loss_factor=0.0), description="Losses inside the body; none by default."
     )
+    fits: dict[Name, Fit] | None = Field(
+        default=None,
+        description="edge: press fit of the two parts of a profile that share it, a cylinder; "
+        "klack inspect and klack impact show its pressure. Other shared edges are glued.",
+    )
 
     @field_validator("material", mode="before")
     @classmethod
@@ -280,6 +301,7 @@ class CaseBody(Section):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
+        self._check_fits()
         if self.reduced is not None:
             self._refuse_with(
                 ("material", "mesh", "matrices", "fixed"),
@@ -332,6 +354,30 @@ class CaseBody(Section):
                         on_key=True,
                     )
         return self
+
+    def _check_fits(self) -> None:
+        """Reject fits of what is not drawn, and of edges that are no cylinder of two parts."""
+        profile = None if self.geometry.is_absent else self.geometry.profile
+        if self.fits and (profile is None or self.matrices is not None):
+            raise CaseProblem(
+                ("fits",),
+                got="a press fit of a body that is not drawn",
+                expected="geometry.profile with a part for either side of the joint",
+                hint="draw the parts, or remove 'fits': the solids are glued then.",
+                on_key=True,
+            )
+        for name in self.fits or ():
+            assert profile is not None
+            try:
+                cylinder_joint(profile.profiles(), name)
+            except InputError as error:
+                raise CaseProblem(
+                    ("fits", name),
+                    got=error.got,
+                    expected=error.expected,
+                    hint=error.hint,
+                    on_key=True,
+                ) from error
 
     @property
     def has_surfaces(self) -> bool:

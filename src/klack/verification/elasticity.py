@@ -1,6 +1,7 @@
 """Finite elements against exact elasticity: vibration, bending, tubes, rods, Fourier orders."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import brentq
@@ -12,9 +13,15 @@ from klack.bodies.elasticity.eigen import eigenmodes, rigid_frequencies
 from klack.bodies.elasticity.factorization import available_backends
 from klack.bodies.elasticity.fourier_body import FourierBody, fourier_body
 from klack.bodies.elasticity.loads import order_load, traction_load
+from klack.bodies.elasticity.press_fit import pressed_state
 from klack.bodies.elasticity.statics import Flexibility
+from klack.bodies.elasticity.stress import work_of_stress
 from klack.materials.material import Material
+from klack.mesh.joint import cylinder_joint
+from klack.mesh.meridian import mesh_meridian
 from klack.mesh.mesh import Mesh
+from klack.mesh.profile import Line, Profile
+from klack.mesh.sizing import MeshSizing
 from klack.verification.check import Check, ComparedCurve, check
 from klack.verification.lattice import STEEL, lattice_mesh
 
@@ -23,6 +30,7 @@ __all__ = ["checks", "free_bar_frequencies"]
 
 _BAR = Material(name="bar", young=210e9, poisson=0.0, density=7850.0)
 _RADIUS, _LENGTH = 2e-3, 30e-3
+_STRETCH = 1e-3
 
 _RITZ = (
     "exact 3-D elasticity by Ritz (Legendre in z, regular polynomials in r), converged to 1e-8; "
@@ -45,6 +53,7 @@ def checks() -> list[Check]:
         *_solid_cylinder(),
         *fourier_checks(),
         *_thick_cylinder(),
+        *_press_fit(),
         *_free_rod(),
         *_bent_beam(),
         *_solvers(),
@@ -144,6 +153,44 @@ def _thick_cylinder() -> Iterator[Check]:
         )
 
 
+def _press_fit() -> Iterator[Check]:
+    """A hollow steel shaft in a ring of iron of the same length, 4 um on the diameter."""
+    inside, joint, outside, height, overlap = 1e-3, 2e-3, 4e-3, 3e-3, 2e-6
+
+    def drawn(a: float, b: float, inner: str, outer: str) -> Profile:
+        ends = ((b, 0.0, "bottom"), (b, height, outer), (a, height, "top"), (a, 0.0, inner))
+        return Profile((a, 0.0), tuple(Line((r, z), name) for r, z, name in ends))
+
+    profiles = {
+        "shaft": drawn(inside, joint, "bore", "joint"),
+        "ring": drawn(joint, outside, "joint", "rim"),
+    }
+    materials = {"shaft": STEEL, "ring": replace(_BAR, young=120e9, poisson=0.25)}
+    mesh = mesh_meridian(profiles, MeshSizing(size=0.15e-3))
+    state = pressed_state(mesh, materials, [cylinder_joint(profiles, "joint")], [overlap])
+    (found,) = state.joints
+    shaft, ring = materials["shaft"], materials["ring"]
+    wide = (outside**2 + joint**2) / (outside**2 - joint**2)
+    narrow = (joint**2 + inside**2) / (joint**2 - inside**2)
+    soft = (narrow - shaft.poisson) / shaft.young + (wide + ring.poisson) / ring.young
+    pressure = overlap / (joint * soft)
+    source = "Lame 1852, plane stress: p = overlap / (R (c_shaft + c_ring))"
+    yield check(
+        "press fit of two materials, mean pressure [Pa]",
+        expected=pressure,
+        computed=found.force / (2 * np.pi * joint * height),
+        tolerance=1e-5,
+        source=source,
+    )
+    yield check(
+        "press fit of two materials, largest equivalent stress of the ring [Pa]",
+        expected=pressure * np.sqrt(wide**2 + wide + 1),
+        computed=state.stress["ring"],
+        tolerance=1e-2,
+        source=f"{source}; hoop stress p (b^2 + R^2)/(b^2 - R^2), radial -p",
+    )
+
+
 def _free_rod() -> Iterator[Check]:
     radius = 0.3e-3
     mesh = lattice_mesh("quad8", [np.array([0.0, radius]), np.linspace(0.0, _LENGTH, 81)])
@@ -154,6 +201,15 @@ def _free_rod() -> Iterator[Check]:
     with Flexibility(body) as flexibility:
         static = float(unit @ flexibility.solve(unit))
         modes = eigenmodes(body, count=max(_RESIDUAL), flexibility=flexibility)
+    pulled = (mesh.points * [0.0, _STRETCH]).ravel()
+    shift = work_of_stress(mesh, {"solid": _BAR}, pulled, modes.shapes) / (2 * modes.omega**2)
+    yield check(
+        "free-free rod under tension, shift of its first frequency over strain [-]",
+        expected=0.5,
+        computed=float(shift[0]) / _STRETCH,
+        tolerance=1e-6,
+        source="a wave sees E + sigma: half of sigma / E to first order (Poisson's ratio 0)",
+    )
     yield check(
         "free-free rod, elastic static compliance of its end [L/(E A)]",
         expected=1 / 3,

@@ -118,6 +118,33 @@ _STUCK = JsonForm(
     Key("coupling_m_per_N", Real, "The same.", "coupling"),
     Key("force_N", Real, "Axial force of the static state.", "force"),
 )
+_FIT = JsonForm(
+    "PressFitJson",
+    "Two parts of a body pressed on each other, before the impact.",
+    Key("body", str),
+    Key("joint", str),
+    Key("inner", str),
+    Key("outer", str),
+    Key("interference_m", Real, "On the diameter.", "interference"),
+    Key("friction", Real),
+    Key("pressure_Pa", Real, "Mean over the joint.", "pressure"),
+    Key("least_pressure_Pa", Real, "Below zero: the joint opens.", "least_pressure"),
+    Key("largest_pressure_Pa", Real, "Away from sharp corners.", "largest_pressure"),
+    Key(
+        "stress_Pa",
+        dict[str, float],
+        "Largest equivalent one of each part, as the pressure.",
+        "stress",
+    ),
+    Key("yield_Pa", dict[str, float], "Of parts whose material yields.", "yield_stress"),
+    Key("axial_force_N", Real, "That friction holds.", "axial_force"),
+    Key("torque_Nm", Real, "That friction holds.", "torque"),
+    Key(
+        "stiffening",
+        Real,
+        "Largest relative shift of a frequency by the stress, left out of the impact.",
+    ),
+)
 STUDY = JsonForm(
     "ImpactJson",
     "``klack impact`` and ``klack demo``.",
@@ -158,6 +185,7 @@ STUDY = JsonForm(
         lambda study: study.contact.stuck,
     ),
     Key("running_in", (_RUNNING_IN, None), "Null for one impact, or elastic faces."),
+    Key("fits", [_FIT], "Press fits of both bodies."),
     Key("warnings", list[str]),
 )
 
@@ -184,6 +212,9 @@ def study_told(study: ImpactStudy) -> Iterator[TextTable | str]:
             columns=found.heads,
             rows=found.rows(format_si),
         )
+    for fit in study.fits:
+        heads = ("press fit", f"{fit.body}.{fit.joint}")
+        yield TextTable(title="Press fit", columns=heads, rows=fit.rows())
 
 
 def compliance_line(study: ImpactStudy) -> str:

@@ -230,7 +230,14 @@ def _computed(study: ImpactStudy) -> Section:
     facts.append(("local law", law.kind))
     return Section(
         title="Input",
-        tables=(body_table(study.bodies), Table(columns=("contact", ""), rows=tuple(facts))),
+        tables=(
+            body_table(study.bodies),
+            Table(columns=("contact", ""), rows=tuple(facts)),
+            *(
+                Table(columns=("press fit", f"{fit.body}.{fit.joint}"), rows=fit.rows())
+                for fit in study.fits
+            ),
+        ),
     )
 
 

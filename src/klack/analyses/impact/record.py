@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from klack.analyses.record import CaseRecord
 from klack.assembling.body_summary import BodySummary
+from klack.assembling.fits import PressFit
 from klack.bodies.gauges.gauge import GaugeRecord
 from klack.bodies.reduction.structure import Structure
 from klack.bodies.reduction.transfer import TransferComparison
@@ -440,6 +441,8 @@ class ImpactStudy(CaseRecord):
         Where faces yield and more than one impact was asked for.
     pictures
         Of both bodies; none in results of earlier versions.
+    fits
+        Press fits of both bodies.
     """
 
     speed: float
@@ -461,6 +464,7 @@ class ImpactStudy(CaseRecord):
     failures: Mapping[str, str] = field(default_factory=dict)
     running_in: RunningIn | None = None
     pictures: tuple[BodyPicture, ...] = ()
+    fits: tuple[PressFit, ...] = ()
 
     @property
     def estimates_settled(self) -> bool:

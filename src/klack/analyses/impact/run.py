@@ -61,6 +61,7 @@ from klack.analyses.impact.yielding_level import (
 from klack.analyses.incomplete import Attempts, IncompleteImpactError, failure_notes
 from klack.analyses.record import case_fields, run_fields
 from klack.assembling.body_summary import BodySummary, summarise_body
+from klack.assembling.fits import press_fits
 from klack.assembling.modes import (
     PARTICIPATION_POOL,
     kept_modes,
@@ -482,6 +483,7 @@ class _Work:
             transfer=self.transfer,
             sections=self.sections,
             pictures=self.pictures,
+            fits=tuple(fit for name in case.bodies for fit in press_fits(case, name)),
             warnings=(
                 *failure_notes(failures),
                 *dict.fromkeys([*self.bodies.notes, *notes]),

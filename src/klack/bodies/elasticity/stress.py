@@ -9,7 +9,7 @@ functions of the corners, and averaged over the elements of a solid that share a
 solids it may jump. A constant stress comes out exactly, with quadratic elements also a linear one.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +22,14 @@ from klack.errors import InputError
 from klack.materials.material import Material
 from klack.mesh.mesh import ElementBlock, Mesh
 
-__all__ = ["COMPONENTS", "StressField", "stress_points", "von_mises"]
+__all__ = [
+    "COMPONENTS",
+    "StressField",
+    "parts_apart",
+    "stress_points",
+    "von_mises",
+    "work_of_stress",
+]
 
 COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
 """Order of the stresses; of a body of revolution x is the radius and y the direction around."""
@@ -66,9 +73,12 @@ class StressField:
                     expected="one for every solid of the mesh",
                     hint="add it under that name.",
                 )
-        self.mesh, self.nodes = _apart_at_solids(mesh)
-        self._blocks = [_Block(self.mesh, block, materials[block.solid]) for block in
-                        self.mesh.blocks]  # fmt: skip
+        self.mesh, self.nodes = parts_apart(mesh, ([solid] for solid in mesh.solids))
+        self._blocks = [
+            (_to_nodes(block.family, xi), _Block(self.mesh, block, materials[block.solid], xi))
+            for block in self.mesh.blocks
+            for xi in [stress_points(block.family)]
+        ]
         rows = np.concatenate([block.connectivity.ravel() for block in self.mesh.blocks])
         shared = np.bincount(rows, minlength=self.mesh.node_count)
         self._mean = csr_array(
@@ -90,7 +100,7 @@ class StressField:
             In the order of :data:`COMPONENTS`, at the points of :attr:`mesh`.
         """
         u = np.asarray(displacement, dtype=float).reshape(-1, self.mesh.dimension)[self.nodes]
-        corners = [block.stress(u).reshape(-1, 6) for block in self._blocks]
+        corners = [(to_nodes @ b.stress(u)).reshape(-1, 6) for to_nodes, b in self._blocks]
         return np.asarray(self._mean @ np.concatenate(corners))
 
 
@@ -116,38 +126,79 @@ def von_mises(stress: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(np.sqrt(direct + 3.0 * (xy**2 + yz**2 + xz**2)))
 
 
-class _Block:
-    """Gradients of the shape functions of one block at its stress points."""
+def work_of_stress(
+    mesh: Mesh,
+    materials: Mapping[str, Material],
+    displacement: NDArray[np.float64],
+    shapes: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    r"""Stiffness that an initial stress gives to each shape, shape (m,) [N m].
 
-    def __init__(self, mesh: Mesh, block: ElementBlock, material: Material) -> None:
+    .. math:: \varphi^T K_\sigma \varphi = \int \sigma_{ij}\, \varphi_{k,i}\, \varphi_{k,j}\, dV
+
+    (Bathe 1996, ch. 6): twice the work of the stress on the strains of second order. Half of it
+    over omega^2 is the relative shift of the frequency of a mode, to first order.
+
+    Parameters
+    ----------
+    displacement, shapes (n_dof,), (n_dof, m) [m]
+        Of the given mesh, which holds the stress of the displacement.
+    """
+    d = mesh.dimension
+    u = displacement.reshape(-1, d)
+    work = np.zeros(shapes.shape[1])
+    for each in mesh.blocks:
+        xi, w = quadrature(each.family, "stiffness")
+        block = _Block(mesh, each, materials[each.solid], xi)
+        stress = block.stress(u) * (block.volume * w)[..., None]
+        for m, shape in enumerate(shapes.T):
+            H = block.gradient(shape.reshape(-1, d))
+            second = np.einsum("eqka,eqkb->eqab", H, H)
+            for i, (a, b) in enumerate(_PAIRS):
+                work[m] += (1 + (a != b)) * np.sum(stress[..., i] * second[..., a, b])
+    return work
+
+
+_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
+
+
+class _Block:
+    """Gradients of the shape functions of one block at some points of its elements."""
+
+    def __init__(
+        self, mesh: Mesh, block: ElementBlock, material: Material, xi: NDArray[np.float64]
+    ) -> None:
         self.connectivity, self.material = block.connectivity, material
         self.axisymmetric = mesh.dimension == 2
-        xi = stress_points(block.family)
         N, dN = shape_functions(block.family, xi)
         x = mesh.points[block.connectivity]
         J = np.einsum("ena,qnb->eqab", x, dN)
         self.gradients = np.einsum("qnb,eqba->eqna", dN, np.linalg.inv(J))
+        self.volume = np.linalg.det(J)  # over the weight of a point
         if self.axisymmetric:
-            self.over_radius = N / np.einsum("qn,en->eq", N, x[..., 0])[..., None]
-        self.to_nodes = _to_nodes(block.family, xi)
+            radius = np.einsum("qn,en->eq", N, x[..., 0])
+            self.over_radius = N / radius[..., None]
+            self.volume *= 2.0 * np.pi * radius
 
-    def stress(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Stress at the nodes, shape (n_elements, n_nodes, 6)."""
+    def gradient(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Displacement gradient u_i,a at the points, shape (n_elements, q, 3, 3)."""
         of_element = u[self.connectivity]
         H = np.einsum("eni,eqna->eqia", of_element, self.gradients, optimize=True)
-        strain = np.zeros((*H.shape[:2], 6))  # shear strains are halves, as in the tensor
-        if self.axisymmetric:
-            strain[..., 0], strain[..., 2] = H[..., 0, 0], H[..., 1, 1]
-            strain[..., 1] = np.einsum("en,eqn->eq", of_element[..., 0], self.over_radius)
-            strain[..., 5] = 0.5 * (H[..., 0, 1] + H[..., 1, 0])
-        else:
-            for i in range(3):
-                strain[..., i] = H[..., i, i]
-            for i, (a, b) in enumerate(((0, 1), (1, 2), (0, 2))):
-                strain[..., 3 + i] = 0.5 * (H[..., a, b] + H[..., b, a])
+        if not self.axisymmetric:
+            return np.asarray(H)
+        turned = np.zeros((*H.shape[:2], 3, 3))
+        turned[..., ::2, ::2] = H
+        turned[..., 1, 1] = np.einsum("en,eqn->eq", of_element[..., 0], self.over_radius)
+        return turned
+
+    def stress(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Stress at the points, shape (n_elements, q, 6)."""
+        H = self.gradient(u)
+        # shear strains are halves, as in the tensor
+        strain = np.stack([0.5 * (H[..., a, b] + H[..., b, a]) for a, b in _PAIRS], axis=-1)
         stress = 2.0 * self.material.shear_modulus * strain
         stress[..., :3] += self.material.lame_lambda * strain[..., :3].sum(axis=-1, keepdims=True)
-        return np.asarray(self.to_nodes @ stress)
+        return stress
 
 
 def stress_points(family: str) -> NDArray[np.float64]:
@@ -176,11 +227,17 @@ def _to_nodes(family: str, xi: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(np.linalg.solve(at_points.T, at_nodes.T).T)
 
 
-def _apart_at_solids(mesh: Mesh) -> tuple[Mesh, NDArray[np.int64]]:
-    """Mesh in which solids share no nodes, and the old number of each of its nodes."""
+def parts_apart(mesh: Mesh, parts: Iterable[Collection[str]]) -> tuple[Mesh, NDArray[np.int64]]:
+    """Mesh in which parts share no nodes, and the old number of each of its nodes.
+
+    Parameters
+    ----------
+    parts
+        Solids of each, all of the mesh; nodes are numbered part after part.
+    """
     nodes, blocks, first = [], [], 0
-    for solid in mesh.solids:
-        own = [block for block in mesh.blocks if block.solid == solid]
+    for part in parts:
+        own = [block for block in mesh.blocks if block.solid in part]
         used = np.unique(np.concatenate([block.connectivity.ravel() for block in own]))
         for block in own:
             blocks.append(

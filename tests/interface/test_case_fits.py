@@ -1,0 +1,129 @@
+"""Press fits in a case: what is refused, what is doubted, where they are shown.
+
+Truth: one clear error or doubt for each mistake; the numbers themselves are in
+``tests/exact/test_press_fit.py``.
+"""
+
+from pathlib import Path
+
+import pytest
+from draws import each
+from ruamel.yaml import YAML
+
+from klack.analyses.impact.analysis import IMPACT
+from klack.analyses.impact.content import report_content
+from klack.analyses.impact.run import run_impact
+from klack.analyses.inspection import inspect_case
+from klack.assembling.fits import press_fits
+from klack.case import load_case
+from klack.errors import InputError
+
+HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
+NEEDLE = ("bodies", "needle")
+FIT = (*NEEDLE, "fits", "joint")
+PARTS = (*NEEDLE, "geometry", "profile", "parts")
+
+
+def changed(folder, *changes, source="pressed_armature.yaml"):
+    """The case of the page with values in other places; None removes a key."""
+    yaml = YAML(typ="safe")
+    tree = yaml.load(HOW_TO / source)
+    for *path, key, value in changes:
+        place = tree
+        for step in path:
+            place = place[step]
+        if value is None:
+            del place[key]
+        else:
+            place[key] = value
+    with (folder / "case.yaml").open("w", encoding="utf-8") as stream:
+        yaml.dump(tree, stream)
+    return load_case(folder / "case.yaml")
+
+
+@each(
+    ("changes", "message"),
+    [
+        ([(*FIT, "interference", "-8 um")], r"fits\.joint\.interference: got .*-8 um"),
+        ([(*FIT, "friction", -0.1)], r"fits\.joint\.friction: got .*-0\.1"),
+        ([(*FIT, "friction", None)], r"fits\.joint: got no key 'friction'"),
+        ([(*FIT, "interference", "8 N")], r"fits\.joint\.interference: got"),
+        ([(*NEEDLE, "fits", {"joints": {"interference": "8 um", "friction": 0.1}})],
+         r"fits\.joints: .*of no part.*two parts share \(here: joint\)"),
+        ([(*NEEDLE, "fits", {"shaft": {"interference": "8 um", "friction": 0.1}})],
+         r"fits\.shaft: .*of 'needle'"),
+        ([(*PARTS, "armature", "edges", 3, {"line": [2.5, 15], "name": "bore"})],
+         r"fits\.joint: .*of 'needle'"),
+        # the armature ends below the needle
+        ([(*PARTS, "armature", "edges", 1, {"line": [5, 19], "name": "disc_rim"}),
+          (*PARTS, "armature", "edges", 2, {"line": [2.5, 19], "name": "disc_top"})],
+         r"fits\.joint: .*different ends.*same two ends"),
+        # a cone
+        ([(*PARTS, "needle", "edges", 3, {"line": [2.4, 19.4], "name": "joint"}),
+          (*PARTS, "armature", "edges", 2, {"line": [2.4, 19.4], "name": "disc_top"})],
+         r"fits\.joint: .*not parallel to the axis.*a cylinder"),
+        ([(*NEEDLE, "fits", {"axis": {"interference": "8 um", "friction": 0.1}}),
+          (*PARTS, "armature", "edges", 0, {"line": [5, 15], "name": "axis"})],
+         r"fits\.axis: .*an edge on the axis"),
+    ],
+)  # fmt: skip
+def test_a_mistake_in_a_fit_is_one_error_with_its_place(tmp_path, changes, message):
+    with pytest.raises(InputError, match=r"case\.yaml:\d+: bodies\.needle\." + message):
+        changed(tmp_path, *changes)
+
+
+def test_a_body_that_is_not_drawn_has_no_fits(tmp_path):
+    """A STEP file, and a mesh."""
+    for name in ("a.step", "a.inp"):
+        (tmp_path / name).write_text("")
+    for geometry in ({"step": {"file": "a.step"}}, {"mesh": {"file": "a.inp", "unit": "mm"}}):
+        with pytest.raises(InputError, match=r"bodies\.needle\.fits: got a press fit of a body "):
+            changed(tmp_path, (*NEEDLE, "geometry", geometry))
+
+
+def test_doubtful_fits_are_told(tmp_path):
+    """More than a thousandth of the diameter, and a part that yields; the drawn case has none."""
+    assert not [doubt for fit in press_fits(load_case(HOW_TO / "pressed_armature.yaml"), "needle")
+                for doubt in fit.doubts]  # fmt: skip
+
+    (fit,) = press_fits(changed(tmp_path, (*FIT, "interference", "8 um")), "needle")
+
+    large, soft = fit.doubts
+    assert "an interference of 8 um is more than a thousandth of the diameter, 5 mm" in large
+    assert "'armature' yields" in soft
+    assert "280 MPa" in soft
+
+
+def test_a_fit_stands_in_the_inspection():
+    rows = dict(inspect_case(load_case(HOW_TO / "pressed_armature.yaml")))["needle"]
+    told = [content for what, name, content in rows if (what, name) == ("press fit", "joint")]
+
+    (fit,) = press_fits(load_case(HOW_TO / "pressed_armature.yaml"), "needle")
+    assert told[0].startswith("joint: armature on needle, diameter 5 mm, length 4.4 mm")
+    assert told[1] == "interference on the diameter: 4 um"
+    assert [line.split(":")[0] for line in told[2:4]] == [
+        "mean pressure",
+        "least, largest pressure",
+    ]
+    assert fit.axial_force == pytest.approx(0.12 * fit.force, rel=1e-12)
+    assert fit.torque == pytest.approx(fit.axial_force * 2.5e-3, rel=1e-12)
+
+
+@pytest.mark.slow
+def test_an_impact_shows_its_fits_and_is_that_of_the_glued_body(tmp_path):
+    """To the bit: the stress of a fit is left out of the impact."""
+    fitted = run_impact(changed(tmp_path), levels=("reduced",), certify=False)
+    glued = run_impact(
+        changed(tmp_path, (*NEEDLE, "fits", None)), levels=("reduced",), certify=False
+    )
+
+    one, other = (study.levels["reduced"].history for study in (fitted, glued))
+    assert one.force.tobytes() == other.force.tobytes()
+    assert one.velocity_a.tobytes() == other.velocity_a.tobytes()
+    (told,) = IMPACT.to_json(fitted)["fits"]
+    assert told["joint"] == "joint"
+    assert told["interference_m"] == 4e-6
+    assert IMPACT.to_json(glued)["fits"] == []
+    heads = [table.columns for part in report_content(fitted).sections for table in part.tables]
+    assert ("press fit", "needle.joint") in heads
+    assert glued.warnings == fitted.warnings
