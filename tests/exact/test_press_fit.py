@@ -147,6 +147,16 @@ def test_two_joints_are_reciprocal_and_nothing_pulls_along_them():
     assert [joint.force for joint in both.joints] == pytest.approx(np.sum(forces, axis=0), rel=1e-9)
 
 
+def test_a_joint_that_a_sleeve_squeezes_opens_at_its_ends():
+    """A ring that is squeezed in its middle springs out beyond: without overlap the joint pulls."""
+    state, _, _ = pressed(stepped(), PARTS, {"first": 1e-7, "second": 1e-6}, 0.2e-3)
+
+    first, second = state.joints
+    assert first.height[first.pressure.argmin()] in (first.height[0], first.height[-1])
+    assert first.pressure.min() < 0.0 < first.force
+    assert second.pressure.min() > 0.0
+
+
 def test_a_fit_does_not_depend_on_where_it_is_drawn():
     """Truth: symmetry.  The mesher places other nodes, so 1e-3 of the pressure."""
     here, there = (
@@ -264,8 +274,8 @@ def test_a_bar_under_tension_vibrates_faster():
 
     work = work_of_stress(mesh, {"solid": BAR}, u, modes.shapes)
 
-    # r is still: phi_r of a bar without Poisson's ratio is round-off of the modes, 1e-6
-    assert work / (2 * modes.omega**2) == pytest.approx([strain / 2] * 3, rel=1e-6)
+    # r is still: phi_r of a bar without Poisson's ratio is round-off of the modes
+    assert work / (2 * modes.omega**2) == pytest.approx([strain / 2] * 3, rel=1e-9)
 
 
 def test_a_beam_under_tension_has_the_work_of_its_slope():
@@ -296,7 +306,7 @@ def test_a_ring_under_hoop_stress_has_the_work_of_its_growth():
 
     # u_r = 1 has no gradient in r: what is left is sigma / r^2, 2 pi h sigma ln(b/a)
     exact = 2 * np.pi * 1e-3 * BAR.young * 1e-3 * np.log(3.0)
-    assert work == pytest.approx(exact, rel=1e-4)  # 1/r by 9 points in 8 elements
+    assert work == pytest.approx(exact, rel=1e-6)  # 1/r by 3 points across 8 elements
 
 
 @pytest.mark.slow

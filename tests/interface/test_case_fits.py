@@ -4,10 +4,12 @@ Truth: one clear error or doubt for each mistake; the numbers themselves are in
 ``tests/exact/test_press_fit.py``.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from draws import each
+from pages import blocks, numbers
 from ruamel.yaml import YAML
 
 from klack.analyses.impact.analysis import IMPACT
@@ -92,6 +94,8 @@ def test_doubtful_fits_are_told(tmp_path):
     assert "an interference of 8 um is more than a thousandth of the diameter, 5 mm" in large
     assert "'armature' yields" in soft
     assert "280 MPa" in soft
+    (opens,) = replace(fit, interference=4e-6, least_pressure=-1e6, yield_stress={}).doubts
+    assert "the joint opens: its pressure would be -1 MPa at one place" in opens
 
 
 def test_a_fit_stands_in_the_inspection():
@@ -107,6 +111,19 @@ def test_a_fit_stands_in_the_inspection():
     ]
     assert fit.axial_force == pytest.approx(0.12 * fit.force, rel=1e-12)
     assert fit.torque == pytest.approx(fit.axial_force * 2.5e-3, rel=1e-12)
+
+
+def test_the_page_shows_what_the_case_has():
+    """Truth: the page; 0.5 % for versions of the mesher."""
+    page = (HOW_TO / "two-materials.md").read_text(encoding="utf-8")
+    (block,) = blocks(page, "yaml-part")
+    yaml = YAML(typ="safe")
+    case = yaml.load(HOW_TO / "pressed_armature.yaml")
+    (fit,) = press_fits(load_case(HOW_TO / "pressed_armature.yaml"), "needle")
+
+    assert yaml.load(block)["fits"] == case["bodies"]["needle"]["fits"]
+    shown = numbers(page, r"mean pressure: ([\d.]+) MPa.*holds, friction 0.12: ([\d.]+) N along")
+    assert shown == pytest.approx([fit.pressure / 1e6, fit.axial_force], rel=5e-3)
 
 
 @pytest.mark.slow

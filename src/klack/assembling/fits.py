@@ -1,6 +1,6 @@
 """Press fits of a case: pressure, stress, what they hold, and their doubts."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from math import pi
@@ -22,7 +22,7 @@ from klack.units import format_si
 
 __all__ = ["PressFit", "press_fits"]
 
-_ELEMENTS = 12  # along a joint
+_ELEMENTS = 24  # along a joint
 _MODES = 10
 _LARGE = 1e-3  # interference over diameter: 0.5 to 1 per mille is a heavy fit
 _STIFFENED = 1e-3  # shift of a frequency that is no longer small beside other errors
@@ -108,34 +108,34 @@ class PressFit:
             )
         return tuple(found)
 
-    def rows(self) -> tuple[tuple[str, str], ...]:
-        """A row for each quantity, as text."""
-
-        def limit(part: str) -> str:
-            given = self.yield_stress.get(part)
-            return "" if given is None else f", yield {format_si(given, 'Pa', 3)}"
-
-        least, largest = (
-            format_si(value, "Pa", 3) for value in (self.least_pressure, self.largest_pressure)
-        )
+    def rows(
+        self, told: Callable[[float, str, int], str] = format_si
+    ) -> tuple[tuple[str, str], ...]:
+        """A row for each quantity; ``told`` writes value, unit and digits."""
+        stresses = []
+        for part, stress in self.stress.items():
+            limit = self.yield_stress.get(part)
+            beside = "" if limit is None else f", yield {told(limit, 'Pa', 3)}"
+            stresses.append((f"largest stress of {part}", told(stress, "Pa", 3) + beside))
         return (
             (
                 "joint",
-                f"{self.outer} on {self.inner}, diameter {format_si(2 * self.radius, 'm', 5)}, "
-                f"length {format_si(self.length, 'm', 4)}",
+                f"{self.outer} on {self.inner}, diameter {told(2 * self.radius, 'm', 4)}, "
+                f"length {told(self.length, 'm', 4)}",
             ),
-            ("interference on the diameter", format_si(self.interference, "m", 3)),
-            ("mean pressure", format_si(self.pressure, "Pa", 3)),
-            ("least, largest pressure", f"{least}, {largest}"),
-            *(
-                (f"largest stress of {part}", format_si(stress, "Pa", 3) + limit(part))
-                for part, stress in self.stress.items()
+            ("interference on the diameter", told(self.interference, "m", 3)),
+            ("mean pressure", told(self.pressure, "Pa", 3)),
+            (
+                "least, largest pressure",
+                f"{told(self.least_pressure, 'Pa', 3)}, {told(self.largest_pressure, 'Pa', 3)}",
             ),
+            *stresses,
             (
                 f"holds, friction {self.friction:g}",
-                f"{format_si(self.axial_force, 'N', 3)}, {format_si(self.torque, 'N*m', 3)}",
+                f"{told(self.axial_force, 'N', 3)} along the axis or "
+                f"{told(self.torque, 'N*m', 3)} around it",
             ),
-            ("frequencies move by up to", f"{self.stiffening:.2g}"),
+            ("its stress moves frequencies by up to", f"{100 * self.stiffening:.2g} %"),
         )
 
 

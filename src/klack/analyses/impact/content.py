@@ -234,7 +234,7 @@ def _computed(study: ImpactStudy) -> Section:
             body_table(study.bodies),
             Table(columns=("contact", ""), rows=tuple(facts)),
             *(
-                Table(columns=("press fit", f"{fit.body}.{fit.joint}"), rows=fit.rows())
+                Table(columns=("press fit", f"{fit.body}.{fit.joint}"), rows=fit.rows(quantity))
                 for fit in study.fits
             ),
         ),

@@ -236,7 +236,7 @@ def _glued_parts(mesh: Mesh, joints: Sequence[Joint]) -> list[set[str]]:
                 f"fits.{joint.name}",
                 got=f"'{joint.inner}' and '{joint.outer}', glued to each other by other parts",
                 expected="parts that only the fit holds together",
-                hint="give the other joints between them a fit too, of 0 um for one that is loose.",
+                hint="leave out the part that joins them: a later weld leaves the fit as it is.",
             )
     return parts
 
@@ -266,6 +266,5 @@ def _away(
     """Which points are farther from all corners; all where none is."""
     if not len(corners):
         return np.ones(len(points), dtype=bool)
-    near, _ = cKDTree(corners).query(points)
-    away = near > radius
+    away = np.asarray(cKDTree(corners).query(points)[0]) > radius
     return away if away.any() else np.ones(len(points), dtype=bool)
