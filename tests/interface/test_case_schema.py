@@ -97,7 +97,7 @@ KEYS = sorted(
 def test_each_key_is_described(section, key):
     node = (SCHEMA if section == "Case" else SCHEMA["$defs"][section])["properties"][key]
     pages = ROOT / "docs" / "reference"
-    page = (pages / "case.md").read_text(encoding="utf-8")
+    page = "".join((pages / f"{name}.md").read_text("utf-8") for name in ("case", "case-noise"))
     # the study is that of a valve, as the page says
     page += (pages / "valve-case.md").read_text(encoding="utf-8").partition("## `study`")[2]
 

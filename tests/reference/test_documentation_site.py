@@ -192,3 +192,17 @@ def test_links_of_the_pages_work_in_the_repository_too():
             if not is_external(target) and not (file.parent / target).exists():
                 broken.append((file.name, target))
     assert broken == []
+
+
+def test_a_page_that_people_write_has_one_purpose():
+    """Measured by its length, 5000 words; generated pages are looked up, not read."""
+    long = {
+        file.relative_to(DOCS).as_posix(): len(text.split())
+        for file in DOCS.rglob("*.md")
+        if "_build" not in file.parts
+        and not re.search(
+            r"<!-- written by docs/|^Made by `docs/", text := file.read_text("utf-8"), re.MULTILINE
+        )
+        and len(text.split()) > 5000
+    }
+    assert long == {}
