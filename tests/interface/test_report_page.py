@@ -8,6 +8,7 @@ from contextlib import suppress
 from dataclasses import replace
 from importlib.resources import files
 from io import BytesIO
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,7 +20,16 @@ from klack.analyses.impact.content import report_content
 from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.stroke.content import NEXT_STEPS
 from klack.cli.commands import parser
-from klack.report.chart import AxisSpec, Chart, Curve, Mark, Panel
+from klack.report.chart import (
+    AxisSpec,
+    Band,
+    Chart,
+    Curve,
+    Mark,
+    Panel,
+    ParallelAxis,
+    ParallelChart,
+)
 from klack.report.html import render_html
 from klack.report.interactive import figure_of
 from klack.report.page import Content, NextStep, Section, Table
@@ -94,12 +104,66 @@ def one_chart_each(count: int, panels: int = 2) -> Content:
     return replace(_EMPTY, sections=count * (Section(title="One", charts=(chart,)),))
 
 
-def pages_of(paper: bytes) -> int:
+def unpacked(paper: bytes) -> bytes:
     plain = paper
     for packed in re.findall(rb"stream\r?\n(.*?)\r?\nendstream", paper, re.DOTALL):
         with suppress(zlib.error):
             plain += zlib.decompress(packed)
-    return len(re.findall(rb"/MediaBox", plain))
+    return plain
+
+
+def pages_of(paper: bytes) -> int:
+    return len(re.findall(rb"/MediaBox", unpacked(paper)))
+
+
+def letters_of(paper: bytes) -> set[float]:
+    """Sizes [pt] of all texts; nothing else scales them in what typst writes."""
+    return {float(size) for size in re.findall(rb"/\w+ ([\d.]+) Tf", unpacked(paper))}
+
+
+def table_of(columns: int, rows: int, cell: str = "1234.5 mm/s") -> Table:
+    return Table(
+        columns=tuple(f"head {k}\nwith its unit" for k in range(columns)),
+        rows=tuple((f"row {i}\nand more", *((columns - 1) * (cell,))) for i in range(rows)),
+    )
+
+
+@pytest.mark.parametrize(("columns", "rows"), [(2, 5), (9, 30), (20, 12), (20, 60), (2, 150)])
+def test_no_table_is_set_below_eight_points(columns: int, rows: int, impact_content: Content):
+    """However wide or long it is; the rest of the report with it."""
+    content = replace(impact_content, numbers=table_of(columns, rows))
+
+    assert min(letters_of(render_pdf(content))) >= 8.0
+
+
+def test_a_list_that_is_long_and_narrow_stands_in_several_columns():
+    """150 rows: four pages in one column of 40 rows, one page in three or more."""
+    long = replace(_EMPTY, numbers=table_of(2, 150, "1"))
+
+    assert pages_of(render_pdf(long)) == 2  # one of rows, one of the words at the end
+
+
+def test_a_section_that_fits_fills_the_page_before_a_tall_figure():
+    """The figure of 204 mm has no room below the head, the table of 8 rows has."""
+    tall = one_chart_each(2, panels=4)
+    short = Section(title="Short", tables=(table_of(3, 8),))
+    content = replace(tall, sections=(*tall.sections, short, short))
+
+    assert pages_of(render_pdf(content)) == pages_of(render_pdf(tall))
+
+
+def test_pictures_leave_the_size_of_their_letters_to_the_style():
+    """A size of its own would be too small on paper, and is not measured by the test of STYLE."""
+    root = Path(str(files("klack")))
+    found = [
+        f"{path.name}: {line.strip()}"
+        for folder in ("analyses", "report")
+        for path in (root / folder).rglob("*.py")
+        for line in path.read_text("utf-8").splitlines()
+        if "fontsize=" in line
+    ]
+
+    assert found == []
 
 
 def test_figures_that_nearly_fit_are_drawn_smaller_instead_of_leaving_half_a_page():
@@ -175,6 +239,28 @@ def marked(at: float) -> Chart:
     return Chart(name="marked", title="marked", x=AxisSpec(label="x"), panels=(panel,))
 
 
+def test_the_label_of_a_band_that_begins_before_the_axis_is_seen_whole():
+    """It would begin outside and be cut; on paper and on the screen."""
+    x = np.linspace(0.0, 4.0, 5)
+    panel = Panel(
+        y=AxisSpec(label="y"),
+        curves=(Curve(x=x, y=x, label="line"),),
+        bands=(Band(low=0.0, high=3.0, label="closing"),),
+    )
+    axis = AxisSpec(label="x", range=(2.0, 4.0))
+    chart = Chart(name="banded", title="banded", x=axis, panels=(panel,))
+    (label,) = figure_of(chart)["layout"]["annotations"]
+    axes = shown_chart(chart)
+    axes.figure.draw_without_rendering()
+    (text,) = axes.texts
+    frame, box = axes.get_window_extent(), text.get_window_extent()
+    pyplot.close(axes.figure)
+
+    assert label["x"] == 2.0
+    assert frame.x0 <= box.x0 + 0.01  # pixels, rounded
+    assert box.x1 <= frame.x1
+
+
 @pytest.mark.parametrize("at", [0.0, 0.3, 0.7, 1.0])
 def test_a_label_stays_within_its_plot(at: float):
     """At the left end right of its line, at the right end left of it; drawn and measured."""
@@ -205,6 +291,39 @@ def test_a_table_that_goes_on_shows_it(browser):
 
     assert seen["fits"] > 0.995
     assert seen["wide"] < 0.97
+
+
+_DRAWN = "[...document.querySelectorAll('.plot')].every(plot => plot.firstChild)"
+
+
+def test_buttons_of_a_chart_do_not_cover_its_legend(browser):
+    """Legends of eight curves fill the width; measured as drawn."""
+    x = np.linspace(0.0, 1.0, 5)
+    curves = tuple(Curve(x=x, y=k * x, label=f"a curve with number {k}") for k in range(8))
+    panel = Panel(y=AxisSpec(label="y"), curves=curves)
+    chart = Chart(name="c", title="c", x=AxisSpec(label="x"), panels=(panel,))
+    page = browser.new_page(viewport={"width": 1000, "height": 900})
+    page.set_content(render_html(replace(_EMPTY, sections=(Section(title="s", charts=(chart,)),))))
+    page.wait_for_function(f"{_DRAWN} && document.querySelector('.legend')")
+    buttons = page.locator(".modebar").bounding_box()
+    legend = page.locator(".legend").bounding_box()
+    page.close()
+
+    assert buttons["y"] + buttons["height"] <= legend["y"] + 1.0
+
+
+def test_values_on_parallel_axes_are_readable_in_the_dark(browser):
+    """The ground of their letters is the paper of the page: nothing large is white."""
+    values = np.linspace(0.0, 1.0, 3)
+    axes = tuple(ParallelAxis(spec=AxisSpec(label=name), values=values) for name in "abc")
+    chart = ParallelChart(name="p", title="p", axes=axes, coloured=0)
+    page = browser.new_page(viewport={"width": 1000, "height": 900}, color_scheme="dark")
+    page.set_content(render_html(replace(_EMPTY, sections=(Section(title="s", charts=(chart,)),))))
+    page.wait_for_function(_DRAWN)
+    image = plt_image(page.locator("canvas").screenshot())
+    page.close()
+
+    assert float((image.min(axis=2) > 0.75).mean()) < 0.01
 
 
 def plt_image(png: bytes) -> np.ndarray:

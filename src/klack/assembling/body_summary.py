@@ -84,7 +84,7 @@ def _material(case: CaseFile, body: ElasticBody) -> str:
         return "; ".join(
             dict.fromkeys(
                 f"{m.name} (E {m.young / 1e9:.4g} GPa, nu {m.poisson:.3g}, rho {m.density:.5g} "
-                "kg/m3)"
+                "kg/m^3)"
                 for m in materials.values()
             )
         )

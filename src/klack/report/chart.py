@@ -267,6 +267,10 @@ class Chart:
             low, high, x = log10(low), log10(high), log10(x)
         return high > low and (x - low) / (high - low) > _TURNING
 
+    def label_place(self, band: Band) -> float:
+        """Where the label of a band stands: at its left end, as far as the axis shows it."""
+        return max(band.low, self._ends[0])
+
     @property
     def _ends(self) -> tuple[float, float]:
         """Lowest and highest value of the x axis."""

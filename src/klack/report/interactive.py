@@ -360,7 +360,9 @@ def _add_marks(layout: dict[str, Any], chart: Chart, index: int) -> None:
             }
         )
         if band.label:
-            layout["annotations"].append(_label(chart, band.label, band.low, 0.02, y_axis))
+            layout["annotations"].append(
+                _label(chart, band.label, chart.label_place(band), 0.02, y_axis)
+            )
     upright = [mark for mark in panel.marks if mark.label and mark.axis == "x"]
     for mark in panel.marks:
         across = mark.axis == "y"

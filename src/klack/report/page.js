@@ -6,7 +6,9 @@ const colour = name => getComputedStyle(document.documentElement).getPropertyVal
 // Labels of bars take half of a narrow screen: there they stand above their bars.
 function narrowed(figure) {
   const layout = figure.layout;
-  Object.assign(layout, {font: {...layout.font, size: 11}, margin: {l: 52, r: 8, t: 8, b: 44}});
+  const listed = figure.data.filter(trace => trace.showlegend !== false).length;  // one below the other
+  Object.assign(layout, {font: {...layout.font, size: 11}, margin: {l: 52, r: 8, t: 8, b: 44},
+    height: layout.height + 18 * Math.max(0, listed - 2)});
   if (!figure.data.some(trace => trace.orientation === "h")) return;
   const rows = figure.data[0].y;
   layout.margin.l = 8;

@@ -63,8 +63,10 @@ function drawParallel(place, chart) {
       const words = axis.words.length ? axis.words.map((word, i) => [share(k, i), word])
         : [0, 0.5, 1].map(part => [part, number(axis.low + part * (axis.high - axis.low))]);
       for (const [part, word] of words) {
-        pen.fillStyle = "rgba(255,255,255,0.8)";
+        pen.globalAlpha = 0.8;
+        pen.fillStyle = colour("--paper");
         pen.fillRect(x(k) + 3, y(part) - 8, pen.measureText(word).width + 4, 15);
+        pen.globalAlpha = 1;
         pen.fillStyle = colour("--ink");
         pen.fillText(word, x(k) + 5, y(part) + 4);
       }
@@ -116,5 +118,6 @@ function drawParallel(place, chart) {
     paint();
   });
   window.addEventListener("resize", paint);
+  window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", paint);
   paint();
 }

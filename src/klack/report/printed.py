@@ -6,6 +6,7 @@ SVG has letters as outlines.
 from collections.abc import Callable, Iterable
 from io import BytesIO
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -121,6 +122,12 @@ _LINE = 0.1
 _WIDTH = 6.7
 """Text width of an A4 page [in]."""
 
+_BESIDE_BAR = 26
+"""Letters of a line beside a scale of colours as high as parallel axes."""
+
+_BEHIND = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 0.6}
+"""What keeps letters on curves readable."""
+
 STYLE: dict[str, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": LETTERS,
@@ -225,7 +232,7 @@ def _parallel(chart: ParallelChart, width: float, blank: Blank) -> Figure:
                 span = ends[k, 1] - ends[k, 0]
                 marks = [((i - ends[k, 0]) / span, word) for i, word in enumerate(axis.words)]
             for height, text in marks:
-                axes.text(k, height, f" {plain(text)}", ha="left", va="center")
+                axes.text(k, height, f" {plain(text)}", ha="left", va="center", bbox=_BEHIND)
         axes.set_xlim(-0.1, len(chart.axes) - 0.6)
         axes.set_ylim(-0.04, 1.04)
         texts = [plain(axis.spec.text) for axis in chart.axes]
@@ -233,7 +240,7 @@ def _parallel(chart: ParallelChart, width: float, blank: Blank) -> Figure:
         axes.set_yticks([])
         axes.set_frame_on(False)
         bar = figure.colorbar(shown, ax=axes, pad=0.01)
-        bar.set_label(plain(chart.axes[chart.coloured].spec.text))
+        bar.set_label(fill(plain(chart.axes[chart.coloured].spec.text), _BESIDE_BAR))
         return figure
 
 
@@ -291,7 +298,8 @@ def _draw_panel(axes: Any, panel: Panel, chart: Chart) -> None:
     for band in panel.bands:
         axes.axvspan(band.low, band.high, color="#dbe9f6", alpha=0.45, linewidth=0, zorder=0)
         if band.label:
-            _note(axes, band.low, 0.02, band.label, "bottom", turned=chart.turns(band.low))
+            place = chart.label_place(band)
+            _note(axes, place, 0.02, band.label, "bottom", turned=chart.turns(place))
     for mark in panel.marks:
         draw = axes.axvline if mark.axis == "x" else axes.axhline
         draw(mark.value, color="#5b626b", linewidth=0.7, dashes=(3, 3), zorder=1)
@@ -339,7 +347,7 @@ def _note(axes: Any, x: float, y: float, text: str, height: str, *, turned: bool
         va=height,
         color="#444a52",
         clip_on=True,
-        bbox={"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 0.6},
+        bbox=_BEHIND,
     )
 
 

@@ -37,6 +37,7 @@ _MICRO = re.compile(
 )
 _POWER = re.compile(r"(\b(?:[mcuµkn]?m|s|N|A|Pa))\^(-?[1-9])\b")
 _EXPONENT = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?)e([+\-\u2212]?\d+)(?!\w|\.\d)")
+_NEGATIVE = re.compile(r"(?<![^\s(\[])-(?=\d)")
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _THIN, _FIXED = "\N{NARROW NO-BREAK SPACE}", "\N{NO-BREAK SPACE}"
 
@@ -194,7 +195,7 @@ def power(value: float) -> str:
 
 
 def spelled(text: str) -> str:
-    r"""Words of klack as a page spells units and powers: one micro, one way of exponents.
+    r"""Words of klack as a page spells units and powers: one micro, minus and way of exponents.
 
     Braces hold keys of a case, to be copied as they are.
 
@@ -202,12 +203,14 @@ def spelled(text: str) -> str:
     '12 µs on 5 N/µm, 47.2 mm³ {volume: 47.2 mm^3}'
     >>> spelled("5.7e−15, at 2e+04 1/s: 0.0e+00."), spelled("stop 1e5b and 'us'")
     ('5.7·10⁻¹⁵, at 2·10⁴ 1/s: 0.', "stop 1e5b and 'us'")
+    >>> spelled("-0.34 % off, -30 to (-5) in steel-1 of 2026-11-29")
+    '−0.34 % off, −30 to (−5) in steel-1 of 2026-11-29'
     """
     parts = _BRACES.split(text)
     for k in range(0, len(parts), 2):
         plain = _MICRO.sub("µ", parts[k])
         plain = _POWER.sub(lambda found: found[1] + found[2].translate(_RAISED), plain)
-        parts[k] = _EXPONENT.sub(_power_of_ten, plain)
+        parts[k] = _NEGATIVE.sub(_MINUS, _EXPONENT.sub(_power_of_ten, plain))
     return "".join(parts)
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from math import isfinite
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -38,6 +39,10 @@ __all__ = ["calibration_content", "stroke_chart"]
 
 _WIDTH = 6.7  # [in], text of an A4 page
 
+_SIDE_BY_SIDE = 6
+"""Parameters of two matrices whose numbers fit beside each other."""
+_TITLE_LETTERS = 36
+
 
 def correlation_figure(
     names: Sequence[str],
@@ -46,12 +51,15 @@ def correlation_figure(
 ) -> Picture:
     """Draw correlation matrices (p, p) side by side; every field carries its number."""
     count = len(names)
-    height = 0.9 + min(0.42 * count, 2.8)
+    stacked = count > _SIDE_BY_SIDE
+    height = (0.9 + min(0.42 * count, 2.8)) * (len(matrices) if stacked else 1)
     with rc_context(STYLE | {"axes.grid": False}):
         figure = Figure(figsize=(_WIDTH, height), layout="constrained")
-        grid = figure.subplots(1, len(matrices), squeeze=False)[0]
+        shape = (len(matrices), 1) if stacked else (1, len(matrices))
+        grid = figure.subplots(*shape, squeeze=False).ravel()
         for k, (axes, (title, matrix)) in enumerate(zip(grid, matrices, strict=True)):
-            _draw(axes, names if k == 0 else [""] * count, names, title, matrix)
+            named = stacked or k == 0
+            _draw(axes, names if named else [""] * count, names, title, matrix)
         return Picture(image=svg(figure), note=note)
 
 
@@ -63,7 +71,7 @@ def _draw(
     matrix: NDArray[np.float64],
 ) -> None:
     axes.imshow(matrix, cmap="RdBu_r", vmin=-1.0, vmax=1.0, aspect="auto")
-    axes.set_title(plain(title), fontsize=8)
+    axes.set_title(fill(plain(title), _TITLE_LETTERS))
     axes.set_yticks(range(len(rows)), [plain(name) for name in rows])
     axes.set_xticks(range(len(columns)), [plain(name) for name in columns], rotation=35, ha="right")
     axes.tick_params(length=0)
@@ -76,7 +84,6 @@ def _draw(
                 f"{value:+.2f}".replace("-", "\N{MINUS SIGN}") if i != j else "1",
                 ha="center",
                 va="center",
-                fontsize=7,
                 color="white" if abs(value) > 0.6 else "black",
                 fontweight="bold" if i != j and abs(value) > 0.95 else "normal",
             )

@@ -125,6 +125,6 @@ def _slide_doubts(
         yield (
             f"the body moves {format_si(way, 'm', 3)} sideways over a curved lower face while it "
             "touches, and the faces keep the normals of their first touch: the impulse across the "
-            f"axis is wrong by about {tilt:.2g} of that along it, the restitution by {other:.2g}. "
-            "Try: less motion.sideways_speed, or a flat lower face."
+            f"axis is wrong by about {tilt:.2g} of the one along it, the restitution by "
+            f"{other:.2g}. Try: less motion.sideways_speed, or a flat lower face."
         )

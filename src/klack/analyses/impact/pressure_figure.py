@@ -42,7 +42,7 @@ Floats = NDArray[np.float64]
 
 _MAP = "viridis"
 _INK = "#22262b"
-_TITLE_LETTERS = 84
+_TITLE_LETTERS = 68
 """Letters side by side above all columns together."""
 _NOTHING = 1e-9
 """Share of the highest value that counts as nothing (round-off)."""
@@ -66,10 +66,10 @@ def draw_pressure(views: Sequence[PressureView]) -> bytes:
         grid = grid.T if is_spot else grid
         longest = 1e6 * max(float(record_edges(view)[-1]) for view in views)
         for axes, view in zip(grid[0], views, strict=True):
-            axes.set_title(plain(fill(view.title, _TITLE_LETTERS // columns)), fontsize=8)
+            axes.set_title(plain(fill(view.title, _TITLE_LETTERS // columns)))
             axes.set_ylim(0.0, longest)
             axes.axhline(1e6 * view.time[view.peak], color=_INK, linewidth=0.7, dashes=(4, 3))
-            axes.set_ylabel("time since first touch [µs]")
+            axes.set_ylabel("time since\nfirst touch [µs]")
         if is_flat:
             _draw_profiles(figure, grid[0], views)
         else:
@@ -109,9 +109,9 @@ def _draw_unrolled(figure: Figure, grid: Any, views: Sequence[PressureView]) -> 
             if is_ring:
                 axes.set_xticks(range(0, 361, 90))
             axes.set_xlabel("angle round the axis [°]" if is_ring else "x [µm]")
-        lower.set_ylabel("distance across the ring [µm]" if is_ring else "y [µm]")
+        lower.set_ylabel("distance across\nthe ring [µm]" if is_ring else "y [µm]")
         lower.set_ylim(1e6 * cut.across[0], 1e6 * cut.across[-1])
-        lower.set_title(f"at peak force, after {1e6 * view.time[view.peak]:.3g} µs", fontsize=8)
+        lower.set_title(f"at peak force, after {1e6 * view.time[view.peak]:.3g} µs")
         if not is_ring:
             lower.set_aspect("equal")
     figure.colorbar(above, ax=grid[0], aspect=22).set_label("line load [N/mm]")
@@ -149,7 +149,7 @@ def friction_figure(views: Sequence[FrictionView]) -> Picture:
         for column, view in enumerate(views):
             axes = grid[0, column]
             title = fill(view.pressure.title, _TITLE_LETTERS // len(views))
-            axes.set_title(plain(title), fontsize=8)
+            axes.set_title(plain(title))
             if is_flat:
                 mesh = _across(axes, view, across_window([v.pressure for v in views]))
                 continue
@@ -165,12 +165,12 @@ def friction_figure(views: Sequence[FrictionView]) -> Picture:
         for axes in grid.ravel():
             axes.set_ylim(0.0, longest)
         for axes in grid[:, 0]:
-            axes.set_ylabel("time since first touch [µs]")
+            axes.set_ylabel("time since\nfirst touch [µs]")
         labels = ["friction, outwards"] if is_flat else ["friction, outwards", "friction, round"]
         if shape == "spot":
             labels = ["friction, along x", "friction, along y"]
         for row, label in zip(grid, labels, strict=True):
-            figure.colorbar(mesh, ax=row, aspect=22).set_label(f"{label} [of its limit]")
+            figure.colorbar(mesh, ax=row, aspect=22).set_label(f"{label}\n[of its limit]")
         first, second = (
             ("to +x or +y", "to -x or -y") if shape == "spot" else ("outwards", "inwards")
         )

@@ -56,7 +56,7 @@ def section_figure(study: ImpactStudy) -> Picture:
         margin = 0.04 * max(width, height)
         _frame(whole, (-width - margin, width + margin), (low[1] - margin, high[1] + margin))
         whole.axvline(0, color=_INK, linewidth=0.5, dashes=(8, 2, 2, 2))
-        whole.set_title(f"mesh  |  shape magnified {factor:g}×", fontsize=8)
+        whole.set_title(f"mesh  |  shape magnified {factor:g}×")
         _draw_zoom(zoom, pictures, spot, _reach(study, max(width, height)), top)
         bar = figure.colorbar(colours, ax=[whole, zoom], location="bottom", shrink=0.6, aspect=40)
         bar.set_label("magnitude of the displacement [µm]")
@@ -172,7 +172,7 @@ def _draw_zoom(
         _name(axes, near, spot, reach)
     left = max(spot[0] - reach, -0.1 * reach)
     _frame(axes, (left, left + 2 * reach), (spot[1] - reach, spot[1] + reach))
-    axes.set_title("contact zone, true scale", fontsize=8)
+    axes.set_title("contact zone, true scale")
 
 
 def _near(picture: SectionPicture, spot: Floats, reach: float) -> SectionPicture:
@@ -196,7 +196,6 @@ def _name(axes: Any, picture: SectionPicture, spot: Floats, reach: float) -> Non
         plain(picture.body),
         ha="center",
         va="center",
-        fontsize=8,
         bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.5},
     )
 

@@ -75,7 +75,7 @@ def solid_figure(study: ImpactStudy) -> Picture:
             _draw(axes, scene, window, quarter)
             _draw_touch(axes, touch, window)
             _draw_scale(axes, window)
-            axes.set_title(title, fontsize=8)
+            axes.set_title(title)
         _draw_axes(figure.axes[0], whole)
         _draw_frame(figure.axes[0], near, whole)
         _legend(figure, study, any(own.any() for own in touching))
@@ -282,7 +282,7 @@ def _draw_scale(axes: Any, window: Window) -> None:
     start = end - length / window.pixel
     axes.plot([start, end], [height] * 2, color=_INK, linewidth=2.0, solid_capstyle="butt")
     words = f"{1e3 * length:g} mm" if length >= 1e-4 else f"{1e6 * length:g} µm"
-    axes.text(0.5 * (start + end), height + 0.015 * window.rows, words, ha="center", fontsize=7.5)
+    axes.text(0.5 * (start + end), height + 0.015 * window.rows, words, ha="center")
 
 
 def _round_length(most: float) -> float:
@@ -300,7 +300,7 @@ def _draw_axes(axes: Any, window: Window) -> None:
             xytext=tuple(foot),
             arrowprops={"arrowstyle": "-|>", "color": _INK, "linewidth": 0.8, "shrinkA": 0},
         )
-        axes.text(*(foot + 1.3 * size * own), name, ha="center", va="center", fontsize=7.5)
+        axes.text(*(foot + 1.3 * size * own), name, ha="center", va="center")
 
 
 def _draw_frame(axes: Any, near: Window, whole: Window) -> None:

@@ -80,7 +80,7 @@ def _across(level: LevelResult) -> str:
         sideways = f"keeps {share(motion.tangential_restitution, 1)} of its sideways speed, leaves"
     return (
         f"It {sideways} with a spin of {hypot(*motion.spin_after):.4g} rad/s, and "
-        f"the impulse across the axis is {motion.impulse_ratio:.4f} of that along it. "
+        f"the impulse across the axis is {motion.impulse_ratio:.4f} of the one along it. "
     )
 
 

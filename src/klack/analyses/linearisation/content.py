@@ -138,7 +138,7 @@ Vector = NDArray[np.float64]
 def linear_charts(record: LinearModel) -> tuple[Chart, ...]:
     """Charts of responses, loops and eigenvalues."""
     return (
-        *(_response_chart(x) for x in record.responses),
+        *(_response_chart(x) for x in record.responses if not _is_silent(x)),
         *(_loop_chart(x) for x in record.loops),
         *(_sweep_chart(x) for x in record.sweeps),
         *_eigenvalue_charts(record),
@@ -158,6 +158,11 @@ def _phase(values: NDArray[np.complex128]) -> Vector:
     """Phase [degrees] without jumps, starting within 180."""
     turned = np.degrees(np.unwrap(np.angle(values)))
     return np.asarray(turned - 360.0 * np.round(turned[0] / 360.0))
+
+
+def _is_silent(response: Response) -> bool:
+    """Whether the output does not move at any frequency."""
+    return not (np.any(response.real) or np.any(response.imaginary))
 
 
 def _response_chart(response: Response) -> Chart:
@@ -318,7 +323,14 @@ def linear_model_content(record: LinearModel) -> Content:
         numbers=Table(columns=EIGENVALUE_HEADS, rows=tuple(eigenvalue_rows(record, 12))),
         sections=(
             Section(
-                title="Frequency response, loops and eigenvalues", charts=linear_charts(record)
+                title="Frequency response, loops and eigenvalues",
+                paragraphs=tuple(
+                    f"{x.target.name} does not respond to {x.source.name} at this operating point: "
+                    "its magnitude is zero at all frequencies."
+                    for x in record.responses
+                    if _is_silent(x)
+                ),
+                charts=linear_charts(record),
             ),
             Section(title="Stability margins", tables=_margins(record)),
             Section(

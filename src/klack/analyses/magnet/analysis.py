@@ -338,7 +338,8 @@ def _drawing(record: MagnetRecord) -> Picture:
             r, z = 1e3 * outline.points.T
             axes.fill(r, z, facecolor=_TINTS[outline.role], edgecolor="#22262b", linewidth=0.6)
             middle = 0.5 * (r.min() + r.max()), 0.5 * (z.min() + z.max())
-            axes.annotate(plain(outline.name), middle, ha="center", va="center", fontsize=6)
+            turned = 90 if np.ptp(z) > 2.0 * np.ptp(r) else 0
+            axes.annotate(plain(outline.name), middle, ha="center", va="center", rotation=turned)
         axes.axvline(0, color="#22262b", linewidth=0.5, dashes=(8, 2, 2, 2))
         axes.set_aspect("equal")
         axes.set_xlabel("distance from the axis [mm]")

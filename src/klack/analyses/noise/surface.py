@@ -74,7 +74,7 @@ def surface_figure(study: NoiseStudy) -> Picture | None:
         for (design, band), axes in zip(shown, grid.ravel(), strict=False):
             whose = f"{design.name}\n" if len(study.designs) > 1 else ""
             _draw(axes, design.bodies, band, scale)
-            axes.set_title(plain(f"{whose}{nominal_label(int(octaves.number[band]))}"), fontsize=8)
+            axes.set_title(plain(f"{whose}{nominal_label(int(octaves.number[band]))}"))
         _bar(figure, grid, scale)
         return Picture(svg(figure), _note(designs, octaves, bands))
 

@@ -3,6 +3,7 @@
 Long records are thinned to the smallest and the largest value of each pixel column.
 """
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from math import isfinite
@@ -12,7 +13,13 @@ from numpy.typing import NDArray
 
 from klack.analyses.stroke.analysis import first_impact
 from klack.analyses.stroke.delivery import passed_mass
-from klack.analyses.stroke.record import LineSummary, StopSummary, StrokeStudy, StrokeVariant
+from klack.analyses.stroke.record import (
+    LineSummary,
+    StopSummary,
+    StrokeChannels,
+    StrokeStudy,
+    StrokeVariant,
+)
 from klack.report.chart import AxisSpec, Band, BarChart, BarPart, Chart, Curve, Mark, Panel
 from klack.report.looks import OTHER, PART_LOOKS, Look, look_of, thinned
 from klack.report.wording import listed, quantity
@@ -57,7 +64,15 @@ _KINDS = {
 """Last word of an entry of the energy balance: its kind."""
 
 
+_INSIDE_LINE = re.compile(r" (?:before|behind) friction \d+ pressure$")
+
 # --------------------------------------------------------------------------- whole stroke
+
+
+def _drawn_pressures(channels: StrokeChannels) -> tuple[str, ...]:
+    """Pressures that differ in their looks: not those between the lumps of a line."""
+    outside = [name for name in channels.pressures if not _INSIDE_LINE.search(name)]
+    return tuple(outside[:_MOST_PARTS])
 
 
 def actuation_chart(study: StrokeStudy) -> Chart:
@@ -69,7 +84,7 @@ def actuation_chart(study: StrokeStudy) -> Chart:
             (channels.voltage, "voltage", "V", 1.0, 0.4),
             (channels.current, "current", "A", 1.0, 0.5),
             (channels.magnetic_force, "magnet", "N", 1.0, 0.5),
-            (channels.pressures, "pressure", "bar", 1e-5, 0.6),
+            (_drawn_pressures(channels), "pressure", "bar", 1e-5, 0.6),
             ((channels.lift,), "lift", "µm", 1e6, 0.6),
             ((channels.velocity,), "velocity", "m/s", 1.0, 0.6),
         )
@@ -85,7 +100,8 @@ def actuation_chart(study: StrokeStudy) -> Chart:
         x=_axis_over(variant),
         panels=tuple(shown),
         note=(
-            f"Reference variant '{variant.name}'. Pressures are absolute; forces and flows are "
+            f"Reference variant '{variant.name}'. Pressures are absolute, at most {_MOST_PARTS} "
+            "are drawn; forces and flows are "
             "means over a record. Lift is the displacement of "
             f"{channels.lift.removesuffix(' displacement')}, velocity that of the centre of mass "
             f"of the {study.needle}; both positive towards the opening stop."
@@ -373,7 +389,8 @@ def echo_chart(study: StrokeStudy, stop: str, line: LineSummary) -> Chart | None
             ),
         )
     )
-    pressures = drawn(((name, name, look_of(i)) for i, name in enumerate(channels.pressures)), 1e-5)
+    names = _drawn_pressures(channels)
+    pressures = drawn(((name, name, look_of(i)) for i, name in enumerate(names)), 1e-5)
     return Chart(
         name=f"echo-{stop}-{line.name}",
         title=f"After the first impact on '{stop}', echoes of the line '{line.name}'",

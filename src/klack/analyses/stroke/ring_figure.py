@@ -45,7 +45,7 @@ def _draw(figure: Figure, axes, number: int, event: ImpactEvent, record: Spatial
         time, angle, masked.T, cmap="viridis", vmin=0.0, vmax=float(load.max()), rasterized=True
     )
     title = f"{number}. '{event.stop}' at {quantity(event.time, 's', 4)}"
-    axes.set_title(plain(title), fontsize=8)
+    axes.set_title(plain(title))
     axes.set_xlabel("time since first touch [µs]")
     axes.set_ylabel("angle round the axis [°]")
     axes.set_yticks(range(0, 361, 90))

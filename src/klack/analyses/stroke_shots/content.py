@@ -1,6 +1,7 @@
 """Content and figures of a report of many strokes."""
 
 from math import ceil
+from textwrap import fill
 
 import numpy as np
 from matplotlib import rc_context
@@ -129,6 +130,7 @@ def lift_chart(study: StrokeShotsStudy) -> Chart:
 _SHOWN = ("peak_force", "contact_time", "rebound_height", "restitution")
 _OF_STROKE = ("closing_time", "injected_energy", "radiated_energy")
 _ACROSS = 3
+_TITLE_LETTERS = 26
 _LEVER = 3e-3  # [m] of the lines that show the tilt
 
 
@@ -179,7 +181,7 @@ def _histogram(axis, items: dict[str, Scattered]) -> None:  # type: ignore[no-un
         axis.stairs(counts, factor * edges, color=colour, linewidth=1.4)
         if np.isfinite(item.centric):
             axis.axvline(factor * item.centric, color=colour, linewidth=1.0, linestyle="--")
-    axis.set_title(first.name, fontsize=8.5, loc="left")
+    axis.set_title(fill(first.name, _TITLE_LETTERS), loc="left")
     axis.set_xlabel(unit and f"[{unit}]")
     axis.set_ylabel("strokes")
     axis.locator_params(axis="x", nbins=4)
@@ -252,7 +254,7 @@ def _touch_panel(axis, study: StrokeShotsStudy, stop: str) -> None:  # type: ign
     axis.set_aspect("equal")
     axis.set_xlim(-1.12 * farthest, 1.12 * farthest)
     axis.set_ylim(-1.12 * farthest, 1.12 * farthest)
-    axis.set_title(f"'{stop}'", fontsize=9.0, loc="left")
+    axis.set_title(f"'{stop}'", loc="left")
     axis.set_xlabel("x [µm]")
     axis.set_ylabel("y [µm]")
 
@@ -285,17 +287,7 @@ def stroke_shots_content(study: StrokeShotsStudy) -> Content:
             charts=tuple(chart for chart in charts if chart is not None),
         ),
         Section(title="Placement at touch", picture=touch_map(study)),
-        Section(
-            title="What the scatter goes with",
-            paragraphs=(
-                "Rank correlation over the strokes: +1 and \N{MINUS SIGN}1 for one that always "
-                "rises or falls with the other, about 0 without any connection, a dash where fewer "
-                "than five strokes have both values or one of them is constant. Measures of the "
-                "whole stroke are compared with the position at the first touch of "
-                f"'{stops[0]}'.",
-            ),
-            tables=tuple(_correlations(name, v) for name, v in study.variants.items()),
-        ),
+        _related(study, stops[0]),
         Section(title="Lift", charts=(lift_chart(study),)),
         schematic_section(study.schematic),
         _drawn(study),
@@ -331,6 +323,23 @@ def _wet_against_dry(study: StrokeShotsStudy) -> Section:
     rows = ratio_rows(study, _printed)
     table = Table(columns=RATIO_COLUMNS, rows=rows)
     return Section(title="Scatter wet against dry", tables=(table,) if rows else ())
+
+
+def _related(study: StrokeShotsStudy, stop: str) -> Section:
+    """Correlations; none of few strokes, which have dashes only."""
+    tables = [_correlations(name, shots) for name, shots in study.variants.items()]
+    if all(cell == "–" for table in tables for row in table.rows for cell in row[1:]):
+        return Section(title="")
+    return Section(
+        title="What the scatter goes with",
+        paragraphs=(
+            "Rank correlation over the strokes: +1 and \N{MINUS SIGN}1 for one that always "
+            "rises or falls with the other, about 0 without any connection, a dash where fewer "
+            "than five strokes have both values or one of them is constant. Measures of the "
+            f"whole stroke are compared with the position at the first touch of '{stop}'.",
+        ),
+        tables=tuple(tables),
+    )
 
 
 def _correlations(name: str, shots: VariantShots) -> Table:

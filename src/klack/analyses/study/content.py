@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from math import isfinite, nan
+from textwrap import shorten
 
 import numpy as np
 
@@ -42,12 +43,14 @@ from klack.analyses.study.wording import (
     variant_words,
 )
 from klack.report.page import Content, NextStep, Section, Sound, Table
-from klack.report.wording import count, signed
+from klack.report.wording import count, signed, typeset
 from klack.studies.fronts import spread_over
 
 __all__ = ["study_content"]
 
 _LISTED = 100
+_REMARK = 100
+"""Letters of a remark in the table of points."""
 _OF_FRONT = 24
 _MANY_ROWS = 1024
 _FEWEST = 8
@@ -187,7 +190,7 @@ def _optimum_sections(record: StudyRecord, labels: dict[str, str]) -> tuple[Sect
         return ()
     best = found.best
     rows = [
-        (item.name, on_page(item, item.today), on_page(item, value), change(item, value))
+        (item.name, on_page(item, item.today), on_page(item, value), typeset(change(item, value)))
         for item in record.designed
         for value in [float(item.values[best])]
     ]
@@ -206,7 +209,7 @@ def _optimum_sections(record: StudyRecord, labels: dict[str, str]) -> tuple[Sect
         )
     return (
         Section(
-            title="The recommended point and that of today",
+            title="The recommended point and today's case",
             paragraphs=tuple(told),
             tables=(Table(columns=("", "today", f"point {best}", "change"), rows=tuple(rows)),),
         ),
@@ -426,10 +429,11 @@ def _point_table(record: StudyRecord, labels: dict[str, str]) -> Table:
     rows = []
     for i in range(min(record.count, _LISTED)):
         cells = [on_page(item, float(item.values[i])) for item in shown]
-        remark = record.failures[i] or record.notes[i]
-        rows.append((str(i), *cells, remark.partition("\n")[0][:80]))
+        remark = (record.failures[i] or record.notes[i]).partition("\n")[0]
+        rows.append((str(i), *cells, shorten(remark, _REMARK, placeholder=" …")))
     columns = ("point", *(labels[item.name] for item in shown), "remark")
-    return Table(columns=columns, rows=tuple(rows))
+    last = None if any(row[-1] for row in rows) else -1
+    return Table(columns=columns[:last], rows=tuple(row[:last] for row in rows))
 
 
 def _left(record: StudyRecord) -> tuple[str, ...]:
