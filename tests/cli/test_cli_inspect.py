@@ -372,10 +372,9 @@ run: {duration: 1 ms, variants: [dry], lift: needle.tip}
 
 
 def test_a_valve_shows_travels_pairs_and_a_first_speed(tmp_path: Path, capsys):
-    """By hand: 25 N and 20 N/mm over 60 um, less 4 N and 3 N/mm that the coupling takes back.
+    """By hand: 25 N and 20 N/mm over 60 um, on the needle and the armature below its collar.
 
-    The coupling is compressed by up to 40 um, in proportion to both travels: 4 N and 1.5 N/mm 40 um
-    over 60 um.  (1.5 + 0.036 - 0.24 - 0.0036) mJ on 1.25 g are 1.438 m/s.
+    The coupling pushes both apart, and no other.  (1.5 + 0.036) mJ on 2.85 g are 1.038 m/s.
     """
     (tmp_path / "free.yaml").write_text(FREE_TRAVEL, encoding="utf-8")
 
@@ -386,4 +385,21 @@ def test_a_valve_shows_travels_pairs_and_a_first_speed(tmp_path: Path, capsys):
     assert "armature 1.6 g, travels from 0 m (seat and rest) to 100 um (pole)" in shown
     assert "carry needle.collar on armature.top: gap 40 um, opens to 40 um" in shown
     assert "rest armature.bottom on needle.ring: gap 0 m, opens to 40 um" in shown
-    assert "needle 1.44 m/s: springs 1.29 mJ, pressures 0 J on 1.25 g over 60 um" in shown
+    both = "springs 1.54 mJ, pressures 0 J on 2.85 g with armature over 60 um"
+    assert f"needle 1.04 m/s: {both}" in shown
+    assert "on 1.6 g over 100 um; faster, as needle pushes it at first" in shown
+
+
+def test_a_body_that_falls_faster_than_what_is_above_it_is_not_pushed(tmp_path: Path, capsys):
+    """By hand: the coupling of 60 N on the armature of 0.2 g; the needle closes with 25 N less it.
+
+    (1.5 + 0.036 - 0.24 * 15 - 0.0036) mJ are below zero.
+    """
+    text = FREE_TRAVEL.replace("preload: 4 N", "preload: 60 N")
+    (tmp_path / "free.yaml").write_text(text, encoding="utf-8")
+
+    assert main(["inspect", str(tmp_path / "free.yaml")]) == 0
+
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "needle does not close by itself: springs -2.07 mJ, pressures 0 J on 1.25 g" in shown
+    assert "at first" not in shown

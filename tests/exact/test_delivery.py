@@ -292,6 +292,9 @@ def test_a_flow_that_turns_round_and_one_that_goes_on():
     found = flow_of(values, 1e-6)["nozzle"]
     assert found.mass == pytest.approx(5e-7, rel=1e-12)
     assert found.back_mass == pytest.approx(2.5e-7, rel=1e-12)
+    back = flow_of(-values, 1e-6)["nozzle"]
+    assert back.mass == pytest.approx(-5e-7, rel=1e-12)
+    assert back.back_mass == pytest.approx(2.5e-7, rel=1e-12)
     rising = flow_of(np.linspace(0.0, 1e-3, 1000), 1e-6)["nozzle"]
     assert rising.flows_on
     assert rising.last_flow is None

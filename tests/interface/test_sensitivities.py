@@ -377,3 +377,43 @@ def test_the_edge_of_a_step_is_no_place_of_its_own_for_coupled_coils():
         found.append(record.measures[0].slopes[0])
     assert 0.9 < found[1] < 1.0  # the other coil pulls before
     assert found[0] == pytest.approx(found[1], abs=1e-3)
+
+
+@pytest.mark.parametrize("start", ["0.1 ms", "0.128 ms"])
+def test_coils_that_switch_at_one_instant_have_a_derivative_each(start):
+    """Truth: one of them 0.1 ns later, where they switch one after the other."""
+    names = [f"network.components.{name}.start" for name in ("boost", "battery")]
+    found = []
+    for late in ("", "0001"):
+        case = klack.load_case(SMALL.with_name("two_coils.yaml"))
+        for name, more in zip(names, ("", late), strict=True):
+            case = case.with_value(name, start.replace(" ms", f"{more} ms"))
+        record = klack.sensitivities(
+            case.with_value("run.duration", "0.6 ms"),
+            parameters=names,
+            measures=["opening_time"],
+            check=False,
+        )
+        found.append(record.measures[0].slopes)
+    # the opening coil counts; 1e-3 is the error of the steps, as above
+    assert found[0] == pytest.approx(found[1], abs=1e-3)
+    assert found[0][0] > 0.9 > 0.1 > found[0][1] > 5e-4
+
+
+@pytest.mark.parametrize("jump", ["0.1 ms", "0.128 ms"])
+def test_a_table_that_jumps_on_the_edge_of_a_step_delays_all_that_follows(tmp_path, jump):
+    """Before it everything rests, so the opening comes as much later; 0.128 ms are 100 steps."""
+    text = INJECTOR.read_text()
+    driver = text[text.index("    driver:") : text.index("    supply:")]
+    table = 'driver: {type: voltage-table, time: ["= t0", "= t0"], voltage: [0 V, 40 V]}'
+    text = text.replace(driver, f"    {table}\n").replace("duration: 5 ms", "duration: 0.5 ms")
+    given = text[text.index("  pulse:") : text.index("network:")]
+    (tmp_path / "table.yaml").write_text(text.replace(given, f"  t0: {jump}\n"))
+
+    found = klack.sensitivities(
+        tmp_path / "table.yaml",
+        parameters=["parameters.t0"],
+        measures=["opening_time"],
+        check=False,
+    )
+    assert found.measures[0].slopes[0] == pytest.approx(1.0, abs=1e-4)  # error of the steps

@@ -1,6 +1,6 @@
 """What a stroke of a valve will move: bodies, what meets at each stop, and a first speed."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from math import isfinite, sqrt
 
 from klack.case.valve import ValveCase
@@ -20,6 +20,8 @@ __all__ = ["valve_rows"]
 Row = tuple[str, str, str]
 Rows = Iterator[tuple[str, tuple[Row, ...]]]
 
+_CLOSED = 1e-9  # [m] of a gap between bodies at the ends of their travels, which are rounded
+
 
 def valve_rows(case: ValveCase) -> Rows:
     """Rows of bodies that move and of end stops, as of ``inspect_case``."""
@@ -36,7 +38,7 @@ def valve_rows(case: ValveCase) -> Rows:
     lifts = {name: travel.lift(name)[0] for name in bodies}
     yield "case: bodies that move", tuple(_moving(network, bodies, masses, travel))
     yield "case: end stops", tuple(_stops(network, meetings, travel))
-    if speeds := tuple(_speeds(network, masses, lifts)):
+    if speeds := tuple(_speeds(network, masses, lifts, meetings)):
         yield "case: first estimate of closing", speeds
 
 
@@ -85,14 +87,62 @@ def _stops(network: Network, meetings: Mapping[str, Meeting], travel: Travel) ->
 
 
 def _speeds(
-    network: Network, masses: Mapping[str, float], lifts: Mapping[str, tuple[float, float]]
+    network: Network,
+    masses: Mapping[str, float],
+    lifts: Mapping[str, tuple[float, float]],
+    meetings: Mapping[str, Meeting],
 ) -> Iterator[Row]:
     r"""Speed of each body at the end of its travel: ``v = sqrt(2 W / m)``, from rest at the other.
 
     ``W`` is the work of linear springs, of both ends in proportion to their travels, and of
-    pressures as they are stated, from the open end to the closed one.  Limits: magnets, flow,
-    friction, films and impacts on the way are left out, so that it is no bound.
+    pressures as they are stated, from the open end to the closed one.  Bodies below that it rests
+    on at the start and that would stay behind go with it, and count with their work and mass.
+    Limits: magnets, flow, friction, films and impacts on the way are left out, so that it is no
+    bound.
     """
+    at, pressure = _places(network)
+
+    def works(body: str, way: float, group: Container[str] = ()) -> tuple[float, float]:
+        """Of springs but those within a group, and of pressures, down from the open end [J]."""
+        springs, fluid, high = 0.0, 0.0, lifts[body][1]
+        for name, part in network.components.items():
+            if isinstance(part, Spring):
+                for port, sign, other in (("end", 1.0, "base"), ("base", -1.0, "end")):
+                    beside = at.get((name, other), "")
+                    if at.get((name, port)) == body and beside not in group:
+                        far = lifts.get(beside, (0.0, 0.0))
+                        reach = 2.0 * high - way - far[1] - far[0]
+                        if not isfinite(reach):
+                            reach = 2.0 * high - way
+                        springs += way * (sign * part.preload + 0.5 * part.stiffness * reach)
+            elif isinstance(part, PressureFace) and at.get((name, "body")) == body:
+                above = pressure.get((name, "fluid"), network.ambient.pressure)
+                fluid -= part.signed_area * (above - network.ambient.pressure) * way
+        return springs, fluid
+
+    ways = {body: high - low for body, (low, high) in lifts.items() if masses.get(body, 0.0) > 0.0}
+    ways = {body: way for body, way in ways.items() if isfinite(way) and way > 0.0}
+    pushes: dict[str, str] = {}
+    for body, way in ways.items():
+        for other in ways:
+            if _rests(network, meetings, body, other, lifts[body][1] - lifts[other][1]):
+                alone = [sum(works(name, way)) / masses[name] for name in (body, other)]
+                if alone[0] > alone[1]:
+                    pushes[other] = body
+    for body, way in ways.items():
+        group = [body, *(other for other, by in pushes.items() if by == body)]
+        springs, fluid = (sum(e) for e in zip(*(works(n, way, group) for n in group), strict=True))
+        mass, work = sum(masses[name] for name in group), springs + fluid
+        beside = f" with {' and '.join(group[1:])}" if group[1:] else ""
+        parts = f"springs {format_si(springs, 'J', 3)}, pressures {format_si(fluid, 'J', 3)}"
+        speed = f"{sqrt(2.0 * work / mass):.3g} m/s" if work > 0.0 else "does not close by itself"
+        on = f"{1e3 * mass:.4g} g{beside} over {format_si(way, 'm', 4)}"
+        first = f"; faster, as {pushes[body]} pushes it at first" if body in pushes else ""
+        yield "speed", body, f"{speed}: {parts} on {on}{first}"
+
+
+def _places(network: Network) -> tuple[dict[tuple[str, str], str], dict[tuple[str, str], float]]:
+    """Body, and stated pressure [Pa], at each port of a component."""
     at: dict[tuple[str, str], str] = {}
     pressure: dict[tuple[str, str], float] = {}
     for node in network.nodes:
@@ -108,24 +158,16 @@ def _speeds(
                 at[joint.component, joint.name] = bodies[0].component
             if stated:
                 pressure[joint.component, joint.name] = stated[0]
-    for body, (low, high) in lifts.items():
-        way, mass = high - low, masses.get(body, 0.0)
-        if not isfinite(way) or way <= 0.0 or mass <= 0.0:
-            continue
-        springs, fluid = 0.0, 0.0
-        for name, part in network.components.items():
-            if isinstance(part, Spring):
-                for port, sign, other in (("end", 1.0, "base"), ("base", -1.0, "end")):
-                    if at.get((name, port)) == body:
-                        far = lifts.get(at.get((name, other), ""), (0.0, 0.0))
-                        reach = high - far[1] + low - far[0]
-                        if not isfinite(reach):
-                            reach = high + low
-                        springs += way * (sign * part.preload + 0.5 * part.stiffness * reach)
-            elif isinstance(part, PressureFace) and at.get((name, "body")) == body:
-                above = pressure.get((name, "fluid"), network.ambient.pressure)
-                fluid -= part.signed_area * (above - network.ambient.pressure) * way
-        work = springs + fluid
-        parts = f"springs {format_si(springs, 'J', 3)}, pressures {format_si(fluid, 'J', 3)}"
-        speed = f"{sqrt(2.0 * work / mass):.3g} m/s" if work > 0.0 else "does not close by itself"
-        yield "speed", body, f"{speed}: {parts} on {1e3 * mass:.4g} g over {format_si(way, 'm', 4)}"
+    return at, pressure
+
+
+def _rests(
+    network: Network, meetings: Mapping[str, Meeting], upper: str, lower: str, apart: float
+) -> bool:
+    """Whether a body lies on another where they are so far ``apart`` [m] from the drawing."""
+    return any(
+        (met.upper or ("",))[0] == upper
+        and (met.lower or ("",))[0] == lower
+        and float(getattr(network.components[name], "gap", 0.0)) + apart <= _CLOSED
+        for name, met in meetings.items()
+    )

@@ -1,5 +1,6 @@
 """From a valve case to bodies that meet point by point, with a guide."""
 
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import cos, hypot, pi, sin
@@ -28,7 +29,7 @@ from klack.contact.gap_update import Pairing, PlacedGaps, RigidGaps, RingGaps
 from klack.contact.mortar import ContactSpace
 from klack.contact.rings import RingSpace
 from klack.contact.statics import contact_compliance, extended_compliance
-from klack.errors import InputError
+from klack.errors import AccuracyWarning, InputError
 from klack.hydraulics.film import ConeFilm, DiscFilm, FilmShape, RingFilm
 from klack.hydraulics.tilted_film import SectorFilm, sector_film
 from klack.mesh.rigid import rigid_placement, rotation_matrix
@@ -108,6 +109,8 @@ def _ring(inner: float, outer: float, sectors: int) -> SectorFilm:
 Vector = NDArray[np.float64]
 
 _DIRECTIONS = 8
+_NOMINAL = 1e-4  # of a radius: bore and shaft drawn with one size
+_AS_DRAWN = 0.1  # of a drawn gap that the clearance may be off by
 _IN_THE_WALL = 1e-3  # of the clearance: the axis of a meshed shaft is known as well
 
 
@@ -415,8 +418,14 @@ def body_guide(
     sections: Sequence[ShaftSection],
     on: tuple[str, Sequence[ShaftSection]] | None,
 ) -> Guide:
-    """Guide of a body at its sections; ``on``: the body on which it slides, and its sections."""
+    """Guide of a body at its sections; ``on``: the body on which it slides, and its sections.
+
+    Rejects a drawn bore that is narrower than the drawn shaft in it; warns where their gap is not
+    the clearance.
+    """
     law = guide.law
+    if on is not None:
+        _check_bore(name, guide, sections, on)
     return guide_at_sections(
         model,
         name,
@@ -427,6 +436,36 @@ def body_guide(
         friction=guide.friction,
         viscous=guide.viscous,
     )
+
+
+def _check_bore(
+    name: str,
+    guide: ValveGuide,
+    sections: Sequence[ShaftSection],
+    on: tuple[str, Sequence[ShaftSection]],
+) -> None:
+    """Compare the clearance with the drawing, in which bore and shaft may be of equal width."""
+    for bore, shaft in zip(sections, on[1], strict=True):
+        drawn, nominal = bore.radius - shaft.radius, _NOMINAL * shaft.radius
+        at = f"guides.{name} at z = {format_si(bore.centre[2], 'm')}"
+        radii = f"{format_si(bore.radius, 'm', 5)} and {format_si(shaft.radius, 'm', 5)}"
+        if drawn < -nominal:
+            raise InputError(
+                at,
+                got=f"radii of '{name}' and of '{on[0]}' in it of {radii}, as drawn",
+                expected="a bore that is wider than the shaft in it",
+                hint="check the surfaces in 'surface' and 'on', and the drawings.",
+            )
+        if drawn > nominal and abs(drawn - guide.clearance) > max(nominal, _AS_DRAWN * drawn):
+            warnings.warn(
+                f"{at}: the clearance is {format_si(guide.clearance, 'm')}, which is computed "
+                f"with, but {format_si(drawn, 'm', 3)} as '{name}' and '{on[0]}' are drawn, with "
+                f"radii of {radii}. Try: the drawn one for guides.{name}.clearance; or both drawn "
+                "with one radius.",
+                AccuracyWarning,
+                stacklevel=2,
+            )
+            return
 
 
 def valve_of_meetings(

@@ -148,7 +148,8 @@ def with_values(tree: CaseTree, values: Mapping[Key, str], header: str = "") -> 
 def merged(data: Any, key: Key, value: object, above: Key = ()) -> Any:
     """Copy of plain data with a value at a key; missing mappings are created.
 
-    Rejects a key below a single value, such as the name of a fluid.
+    Rejects a key below a single value, such as the name of a fluid, and an entry of a list that is
+    missing.
     """
     if not key:
         return value
@@ -161,6 +162,14 @@ def merged(data: Any, key: Key, value: object, above: Key = ()) -> Any:
             hint="write it out in the case: {key: value, ...}.",
         )
     head, rest = key[0], key[1:]
+    if data is None and isinstance(head, int):
+        place = ".".join(map(str, above))
+        raise CaseProblem(
+            (),
+            got=f"an entry of '{place}', a list that the case leaves out",
+            expected="a list in the case, of which entries change",
+            hint=f"write '{place}: [...]' there, with all its entries.",
+        )
     copy: Any = list(data) if isinstance(data, list) else dict(data or {})
     below = copy[head] if isinstance(data, list) else copy.get(head)
     copy[head] = merged(below, rest, value, (*above, head))

@@ -39,6 +39,7 @@ from klack.magnetics.flux_kernel import (
 from klack.magnetics.flux_pieces import KEPT
 from klack.magnetics.flux_table import MOST_TUBES
 from klack.magnetics.output_stage import recharged, stage_path, still_voltage
+from klack.magnetics.quiet_step import DIODE
 from klack.network.step_function import shift
 
 __all__ = [
@@ -47,6 +48,7 @@ __all__ = [
     "coupled_gaps",
     "coupled_linked",
     "coupled_locate",
+    "coupled_rates",
     "coupled_settle",
     "coupled_solve",
     "magnet_row",
@@ -239,6 +241,54 @@ def coupled_solve(
         if settled:
             return True
     return False
+
+
+@inner(error_model="numpy")
+def coupled_rates(
+    par: Any,
+    hints: Any,
+    phi: Any,
+    ends: Any,
+    size: float,
+    modes: Any,
+    cycles: Any,
+    now: float,
+    held: Any,
+    shut: Any,
+    rates: Any,
+) -> bool:
+    """Rates of all fluxes [Wb/s] at an instant, from a short piece after it; False on failure."""
+    middle, final, slope = stack(phi, 144), stack(phi, 144), stack(phi, 144)
+    charged, voltage = stack(phi, MOST_WINDINGS), stack(phi, MOST_WINDINGS)
+    mean, conducts = stack(phi, MOST_WINDINGS), stack(phi, MOST_WINDINGS)
+    fluxes, windings = 6 * int(par[0]), int(par[1])
+    coupled_gaps(par, hints, ends, size, middle, final, slope)
+    for c in range(int(par[2])):
+        charged[c] = recharged(par, int(par[6]) + CAPACITOR_ROW * c, held[c], 0.5 * size)
+    for w in range(windings):
+        row = winding_row(par, w)
+        at = now + 0.5 * size - cycles[w]
+        voltage[w] = winding_voltage(par, row, modes[w], charged, at)
+        diode = par[state_block(par, int(par[row + 2]), int(modes[w])) + 1]
+        conducts[w] = shut[w] if diode != 0.0 else 1.0
+    for _ in range(windings + 1):  # one that begins to conduct may let another begin
+        for j in range(fluxes):
+            rates[j] = 0.0
+        if not coupled_solve(
+            par, hints, phi, rates, middle, size, modes, charged, voltage, conducts, mean
+        ):
+            return False
+        starts = False
+        for w in range(windings):
+            through = coupled_linked(par, winding_row(par, w), rates)
+            if conducts[w] == 0.0 and voltage[w] > through / size + DIODE:
+                conducts[w] = 1.0
+                starts = True
+        if not starts:
+            break
+    for j in range(fluxes):
+        rates[j] /= size
+    return True
 
 
 @inner(error_model="numpy")

@@ -18,6 +18,7 @@ from klack.magnetics.coupled_piece import (
     coupled_gaps,
     coupled_linked,
     coupled_locate,
+    coupled_rates,
     coupled_settle,
     coupled_solve,
     magnet_row,
@@ -26,7 +27,7 @@ from klack.magnetics.coupled_piece import (
     winding_voltage,
 )
 from klack.magnetics.coupled_table import CAPACITOR_ROW, MOST_WINDINGS, PER_WINDING
-from klack.magnetics.drive_kernel import due_switch, next_time, state_block
+from klack.magnetics.drive_kernel import due_switch, jump_at, next_time, state_block
 from klack.magnetics.flux_kernel import (
     circuit_energy,
     circuit_flux,
@@ -76,7 +77,7 @@ def coupled_step(par, state, inp, out):  # type: ignore[no-untyped-def]
     clamp, opens = stack(out, MOST_WINDINGS), stack(out, MOST_WINDINGS)
     held, charged = stack(out, MOST_WINDINGS), stack(out, MOST_WINDINGS)
     after, gained = stack(out, MOST_WINDINGS), stack(out, MOST_WINDINGS)
-    phi, rate, bend = stack(out, 48), stack(out, 48), stack(out, 48)
+    phi, rate, bend, flow = stack(out, 48), stack(out, 48), stack(out, 48), stack(out, 48)
     change, told_of = stack(out, 48), stack(out, 48)
     settled, spread = stack(out, 48), stack(out, 6)
     hints = stack(out, 800)
@@ -126,19 +127,40 @@ def coupled_step(par, state, inp, out):  # type: ignore[no-untyped-def]
             heat[m] += warmed
             for j in range(int(par[int(par[magnet_row(par, m)])])):
                 phi[6 * m + j] += spread[j]
+        for w in range(windings):  # no piece ends at a jump on the edge of a step
+            block = state_block(par, int(par[winding_row(par, w) + 2]), int(mode[w]))
+            jump = cycle[w] + jump_at(par, block, t - cycle[w], close) - t
+            if jump <= close:
+                early = jump - constant(jump)
+                done += early
+                for j in range(6 * magnets):
+                    phi[j] += early * rate[j]
+                break
     while done < h:
         now = t + done
-        switched = False
-        early = 0.0  # as in a solenoid alone, of the last of those that switch now
+        switched = timed = False
+        early = 0.0  # as in a solenoid alone: derivatives of those that switch now, one by one
         for w in range(windings):
             row = winding_row(par, w)
             block = state_block(par, int(par[row + 2]), int(mode[w]))
             which = due_switch(par, block, now, entered[w], cycle[w], current[w], close)
             if which >= 0:
+                for j in range(6 * magnets):
+                    flow[j] = rate[j]
+                if timed:
+                    for m in range(magnets):
+                        ends[2 * m] = place[m] + ends[2 * m + 1] * done
+                    if not coupled_rates(
+                        par, hints, phi, ends, LEAST_PIECE * h, mode, cycle, now, held, shut, flow
+                    ):
+                        return 1
                 mode[w], entered[w], cycle[w] = next_state(
                     par, block, which, now, entered[w], cycle[w]
                 )
-                early = entered[w] - now - constant(entered[w] - now)
+                later = entered[w] - now - constant(entered[w] - now)
+                for j in range(6 * magnets):
+                    phi[j] += (later - early) * flow[j]
+                early, timed = later, True
             elif par[row + 3] != 0.0:
                 path = winding_path(par, row, mode[w])
                 if held[int(par[row + 4])] > par[path + 7]:
@@ -153,8 +175,6 @@ def coupled_step(par, state, inp, out):  # type: ignore[no-untyped-def]
             return 2
         if switched:
             done += early
-            for j in range(6 * magnets):
-                phi[j] += early * rate[j]
             last = 0.0  # the rates belong to the voltage before
             continue
         piece = h - done

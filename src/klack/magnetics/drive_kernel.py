@@ -8,6 +8,7 @@ __all__ = [
     "NEVER",
     "crossed_switch",
     "due_switch",
+    "jump_at",
     "next_time",
     "state_block",
     "state_voltage",
@@ -56,6 +57,23 @@ def state_voltage(par: Any, block: int, time: float) -> float:
     if par[block] == 1.0:
         return _value_at(par, source, time)
     return par[source]
+
+
+@inner(error_model="numpy")
+def jump_at(par: Any, block: int, time: float, close: float) -> float:
+    """Time of a jump of the course of a state, if it is within ``close`` [s]; else never.
+
+    Both count from the start of the cycle.
+    """
+    if par[block] != 1.0:
+        return NEVER
+    course = block + 3 + 4 * int(par[block + 2])
+    i = _point_after(par, course, time - close)
+    if i + 1 < int(par[course]):
+        first, second = par[course + 1 + i], par[course + 2 + i]
+        if second <= first and first <= time + close:
+            return 0.5 * (first + second)
+    return NEVER
 
 
 @inner(error_model="numpy", forceinline=True)

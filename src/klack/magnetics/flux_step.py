@@ -31,7 +31,7 @@ from numpy.typing import ArrayLike, NDArray
 from klack.errors import InputError, require_positive
 from klack.machine.compiling.constant import constant
 from klack.magnetics.circuit import MagneticCircuit
-from klack.magnetics.drive_kernel import due_switch, next_time, state_block
+from klack.magnetics.drive_kernel import due_switch, jump_at, next_time, state_block
 from klack.magnetics.driver import DriveProgram
 from klack.magnetics.flux_kernel import (
     circuit_energy,
@@ -178,6 +178,13 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
         hysteresis += heat
         for j in range(loops):
             phi[j] += spread[j]
+    if h > 0.0:  # as of a switch below: no piece ends at a jump on the edge of a step
+        jump = cycle + jump_at(par, state_block(par, drive, int(mode)), t - cycle, close) - t
+        if jump <= close:
+            early = jump - constant(jump)
+            done += early
+            for j in range(loops):
+                phi[j] += early * rate[j]
     while done < h:
         now = t + done
         block = state_block(par, drive, int(mode))

@@ -24,7 +24,7 @@ from klack.simulation.rest import (
     rest_time,
 )
 
-__all__ = ["ImpactFinder", "judged"]
+__all__ = ["ROTATION", "ImpactFinder", "judged"]
 
 
 _PAUSE_STEPS = 100  # a film is not recorded while its force passes through zero: so many fine steps
@@ -32,6 +32,10 @@ _PAUSE_SHARE = 0.04  # or this share of the time to rest, whichever is longer
 _BEND = 0.25  # of what other forces do between two records: more from one to the next is a jump
 
 _BESIDES = 0.01  # of the change of speed by an impact: more by another stop, and it is not its own
+_TURNED = 0.1  # of the energy of approach: more into or out of rotation, and a speed tells nothing
+
+ROTATION = "rotation"
+"""What acts besides where bodies turn."""
 
 _PART = ("impulse", "peak", "peak_time")
 _STATE = np.dtype(
@@ -209,13 +213,16 @@ def judged(
     interfaces: Mapping[str, InterfaceRecord],
     until: float,
     before: Vector,
+    turning: Mapping[str, tuple[Vector, Vector]],
 ) -> tuple[tuple[ImpactEvent, ...], Vector]:
-    r"""Impacts without restitution and energy loss where another stop acts on a body meanwhile.
+    r"""Impacts without restitution and energy loss where more than they change the motion.
 
     Both compare the motion of two bodies before and after their impact, and mean something where
     this impact alone changes it.  From first touch to the end of the last contact another stop
     changes the relative speed by :math:`J' \mu'`, of its impulse and the mobility of the body that
-    both share; 1 % of what the impact itself changes, :math:`J \mu`, is too much.
+    both share; 1 % of what the impact itself changes, :math:`J \mu`, is too much.  Bodies that turn
+    keep energy which the speeds of their centres do not show: a tenth of that of the approach is
+    too much.
 
     Limits: other forces (springs, pressures, magnets) count as part of the impact; where the fine
     record of a stop is full, what it does is not known, and nothing is blanked for it.
@@ -227,6 +234,8 @@ def judged(
     before (stops, 1 + stops)
         What the run before found of its last impact on each stop: its time, and the impulse of each
         stop since then; shape (0, 0) for none.
+    turning
+        Times [s] and energies of rotation [J], of components that may turn.
 
     Returns
     -------
@@ -237,8 +246,12 @@ def judged(
     owner = {handle: row for row in rows.bodies for handle in row.ports}
     stops = {row.component: c for c, row in enumerate(rows.interfaces)}
     share = np.zeros((len(stops), len(stops)))
+    meeting: list[set[str]] = []
+    masses = []
     for c, row in enumerate(rows.interfaces):
         sides = [owner.get(handle) for handle in (row.upper, row.lower)]
+        meeting.append({side.component for side in sides if side is not None})
+        masses.append(effective_mass(sides))
         own = mobility(row, sides)
         for k, other in enumerate(rows.interfaces):
             if k != c and own > 0.0:
@@ -268,6 +281,9 @@ def judged(
         after[c] = (event.time, *impulses)
         most = _BESIDES * abs(event.impulse)
         besides = [stop for stop, k in stops.items() if share[c, k] * abs(impulses[k]) > most]
+        turned = sum(_turned(*turning[name], event.time, end) for name in meeting[c] & set(turning))
+        if abs(turned) > _TURNED * 0.5 * masses[c] * event.approach_speed**2:
+            besides.append(ROTATION)
         if besides and isfinite(event.restitution):
             found.append(
                 replace(event, restitution=nan, energy_loss=nan, besides=", ".join(besides))
@@ -275,6 +291,13 @@ def judged(
         else:
             found.append(event)
     return tuple(found), after
+
+
+def _turned(time: Vector, energy: Vector, begin: float, end: float) -> float:
+    """Energy that the rotation of a body takes up between two times [J]."""
+    first = max(int(np.searchsorted(time, begin, side="right")) - 1, 0)
+    last = min(int(np.searchsorted(time, end)), len(time) - 1)
+    return float(energy[last] - energy[first])
 
 
 def _impulse(record: InterfaceRecord, begin: float, end: float) -> float:

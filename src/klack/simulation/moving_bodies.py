@@ -44,6 +44,9 @@ class MovingBodies(Protocol):
     ) -> int:
         """Advance by ``looks`` of ``look`` times ``block`` fine steps; a status."""
 
+    def turning(self) -> dict[str, tuple[Vector, Vector]]:
+        """Times [s] and energies of rotation [J] of each component that moves."""
+
     def changing(self) -> dict[str, Changing]:
         """All arrays that a step changes and the next one begins with."""
 

@@ -102,8 +102,9 @@ class ImpactEvent:
         Closing speed of the centres of mass at first touch, behind the film; nan in results of
         former versions.
     besides
-        Other stops that act on one of the bodies meanwhile, so much that this impact has no
-        restitution and no energy loss; see :func:`klack.simulation.impact_events.judged`.
+        Other stops that act on one of the bodies meanwhile, or its rotation, so much that this
+        impact has no restitution and no energy loss; see
+        :func:`klack.simulation.impact_events.judged`.
     """
 
     stop: str

@@ -256,6 +256,7 @@ def simulate_network(
         interfaces,
         float(time[-1]),
         np.asarray((state or {}).get(_SINCE, ())),
+        {} if network.moving is None else network.moving.turning(),
     )
     finder.told()
     if network.moving is not None:

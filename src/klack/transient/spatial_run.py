@@ -460,6 +460,16 @@ class _Moving:
                 told[f"{row.component} side {name}"] = ChannelData(unit=unit, values=values)
         return told
 
+    def turning(self) -> dict[str, tuple[Vector, Vector]]:
+        """Times [s] and energies of rotation [J] of each component that moves."""
+        found = {}
+        for body, path in zip(self.model.moving, self.paths, strict=True):
+            inertia = np.linalg.inv(body.rigid[3:] @ body.rigid[3:].T)
+            spin = path.velocity[:, 3:]
+            energy = 0.5 * np.einsum("ki,ij,kj->k", spin, inertia, spin)
+            found[self.valve.components[body.number]] = (path.time, energy)
+        return found
+
     def changing(self) -> dict[str, NDArray[np.generic]]:
         lifts = {} if self.films is None else {"lifts": self.films.offset}
         rubs = rubbing_arrays(self.state.rubbing) if self.model.ways else {}

@@ -133,7 +133,8 @@ _EVENT = JsonForm(
     Key(
         "besides",
         str | None,
-        "Other stops that act meanwhile: restitution and energy_loss_J are null.",
+        "Other stops that act meanwhile, or the rotation of a body: restitution and energy_loss_J "
+        "are null.",
         lambda of: of.event.besides or None,
     ),
     Key("axis", (_AXIS, None), "At first touch; null for a motion along the axis."),

@@ -74,7 +74,7 @@ def steps_told(variant: StrokeVariant) -> str:
 
 
 def _besides(event: ImpactEvent) -> str:
-    """Why an impact has no restitution: the stops that act as well."""
+    """Why an impact has no restitution: what acts as well."""
     return f"with {event.besides}" if event.besides else ""
 
 
@@ -156,8 +156,8 @@ EVENT_MEASURES: tuple[Measure[ImpactEvent], ...] = described_in(
         key="restitution",
         symbol="e",
         definition="Opening speed over approach speed of the centres of mass; missing without "
-        "separation, and where another stop changes that speed meanwhile by over 1 % of what "
-        "this impact does.",
+        "separation, where another stop changes that speed meanwhile by over 1 % of what this "
+        "impact does, and where rotation takes or gives over a tenth of the energy of approach.",
         note="It is a result of waves, fluid and films, never an input of the flexible "
         "variants; a body still vibrating from an earlier impact may "
         "rebound faster than it arrived.",
