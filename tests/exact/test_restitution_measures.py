@@ -811,6 +811,35 @@ def test_a_run_in_pieces_blanks_the_same_impacts(free_run):
         assert found == {(e.stop, e.time): e.besides for e in whole.events}
 
 
+@pytest.mark.parametrize("law", [{"kind": "linear", "stiffness": 3e8}, None])
+def test_a_body_that_hits_another_stop_within_a_microsecond_has_its_own_restitution(law):
+    """Conservation: without losses it leaves each stop as fast as it came, 4 m/s over 5 um.
+
+    Records are 1.28 us apart, so that the next contact lies in the first of them.  A step before
+    the touch, of 2.5 ns at least, is 0.1 % of the contact.
+    """
+    stop = law or {"kind": "hertz", "radius": 0.01, "modulus": 115e9}
+    parts = {
+        "needle": RigidMass(mass=1e-4, speed=4.0, points=("low", "high")),
+        "below": EndStop(gap=1e-6, law=stop),
+        "above": EndStop(gap=4e-6, law=stop),
+    }
+    links = [
+        ["needle.low", "below.upper"],
+        ["below.lower", "ground"],
+        ["needle.high", "above.lower"],
+        ["above.upper", "ground"],
+    ]
+    result = simulate_network(
+        Network(parts, links).rows(), duration=150e-6, step=5e-9, start="free"
+    )
+    found = [event for event in result.events if event.is_over]
+    assert len(found) > 10
+    for event in found:
+        assert event.approach_speed == pytest.approx(4.0, rel=3e-3)
+        assert event.restitution == pytest.approx(1.0, abs=3e-3)
+
+
 @pytest.mark.slow
 def test_the_first_impacts_of_a_chain_are_those_of_another_integration():
     """Elastic contacts, by Runge and Kutta with the touches as events (SciPy).

@@ -31,6 +31,7 @@ _PAUSE_STEPS = 100  # a film is not recorded while its force passes through zero
 _PAUSE_SHARE = 0.04  # or this share of the time to rest, whichever is longer
 _BEND = 0.25  # of what other forces do between two records: more from one to the next is a jump
 
+_KNOWN = 3.0  # of the records after a contact: none is needed
 _BESIDES = 0.01  # of the change of speed by an impact: more by another stop, and it is not its own
 _TURNED = 0.1  # of the energy of approach: more into or out of rotation, and a speed tells nothing
 
@@ -335,7 +336,7 @@ def _feed(
             _closed_step(s, rest, pause, t, h, contact + film, closing)
         else:
             if s.closed > 0.0:
-                count += _contact_over(s, period, mobility, t, out, count)
+                count += _contact_over(s, period, mobility, t, rows[i, 5], out, count)
             _open_step(s, period, pause, t, h, film, closing)
             s.carried += film * h
         s.row_end = t + h
@@ -440,8 +441,13 @@ def _closed_step(
 
 
 @inner
-def _contact_over(s: Any, period: float, mobility: float, t: float, out: Any, count: int) -> int:
-    """End the contact at ``t``: part of the impact so far, or the start of the next one."""
+def _contact_over(
+    s: Any, period: float, mobility: float, t: float, opening: float, out: Any, count: int
+) -> int:
+    """End the contact at ``t``: part of the impact so far, or the start of the next one.
+
+    Where the speed at that moment is not known it follows from two records after it.
+    """
     s.until = t
     emitted = 0
     if s.impact > 0.0 and not _joins(s, period, t - s.begin):
@@ -457,6 +463,8 @@ def _contact_over(s: Any, period: float, mobility: float, t: float, out: Any, co
     s.flight_impulse, s.flight_peak = 0.0, -np.inf
     s.between = s.between_earlier = s.candidate = s.fastest = -np.inf
     s.leaves = 0.0
+    if np.isfinite(opening):
+        s.leaves, s.leave_rate0 = _KNOWN, opening
     if s.time == t:
         _after_contact(s, period, mobility, t, s.rate)
     return emitted
@@ -555,7 +563,7 @@ def _emit(s: Any, out: Any, count: int) -> int:
         after = np.nan
         if s.leaves > 0.0:
             after = s.leave_rate0
-            if s.leaves > 1.0:
+            if s.leaves == 2.0:
                 slope = (s.leave_rate1 - s.leave_rate0) / (s.leave_time1 - s.leave_time0)
                 after += slope * (s.stop - s.leave_time0)
             after = max(after, s.fastest)
