@@ -21,10 +21,15 @@ from two_masses import (
     valve,
 )
 
+from klack.assembling.spatial import _check_bore
+from klack.case.bodies import BodySurface
+from klack.case.guide import BodyGuide
 from klack.contact.gap_update import Pairing
+from klack.errors import AccuracyWarning, InputError
 from klack.mechanics.force import ForceOverTime
 from klack.mechanics.spring import Spring
 from klack.mesh.rigid import rotation_matrix
+from klack.transient.guide import ShaftSection
 
 DRIVEN = {
     "needle.top": Spring(stiffness=10e3, preload=12.0),
@@ -92,6 +97,75 @@ def test_a_body_that_slides_on_another_gives_it_what_it_takes(friction):
         assert after[1, 2] > 0.0
         assert run.books.losses["guide friction"] > 1e-3 * run.books.scale
     assert abs(run.books.residual) < 1e-11 * run.books.scale
+
+
+@pytest.mark.parametrize(("spin", "turns"), [(0.0, False), (60.0, True)])
+def test_a_needle_that_turns_has_no_restitution_of_its_centre(spin, turns):
+    """Conservation: points are springs, so what the centre gains is what the rotation loses.
+
+    Upright it leaves as fast as it came, but for the steps.  Where it turns it leaves 6.1 times as
+    fast as it came.
+    """
+    speeds = np.array([[0.0, 0.0, -0.02, 0.0, spin, 0.0], np.zeros(6)])
+    given = speeds.copy()
+    given[:, 2] = 0.0
+    run, moving = moved(
+        rows({}, speeds=(-0.02, 0.0), apart=1e-6),
+        valve(apart=1e-6, velocity=given.ravel()),
+        90e-6,
+        start="free",
+    )
+
+    def energies(velocity):
+        v, turn = velocity[:3], velocity[3:]
+        return 0.5 * MASSES[0] * v @ v, 0.5 * INERTIAS[0] @ turn**2
+
+    before, after = energies(speeds[0]), energies(moving.paths[0].velocity[-1])
+    assert sum(after) == pytest.approx(sum(before), rel=1e-6)
+    event = run.events[0]
+    assert event.stop == "seat"
+    assert event.is_over
+    assert (event.besides, np.isnan(event.restitution)) == (
+        ("rotation", True) if turns else ("", False)
+    )
+    if turns:
+        assert after[0] == pytest.approx(6.1**2 * before[0], rel=2e-2)
+        assert np.isnan(event.energy_loss)
+    else:
+        assert event.restitution == pytest.approx(1.0, abs=2e-3)
+
+
+def sections(radius):
+    return [ShaftSection(np.zeros((6, 1)), np.array([0.0, 0.0, 2e-3]), radius, None)]
+
+
+def bore(on, clearance=10e-6):
+    """Compare a guide with its drawing, a shaft of 1.5 mm in a bore that is wider by ``on``."""
+    guide = BodyGuide(
+        surface="bore",
+        heights=(1e-3, 2e-3),
+        clearance=clearance,
+        on=BodySurface(body="needle", surface="shaft"),
+    )
+    _check_bore("armature", guide, sections(1.5e-3 + on), ("needle", sections(1.5e-3)))
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("on", [10e-6, 10.9e-6, 0.0, 1e-7, -1e-7])
+def test_a_bore_may_be_drawn_as_wide_as_it_is_or_as_its_shaft(on):
+    """To a tenth of the gap, or a ten thousandth of the radius, which meshes are off by."""
+    bore(on)
+
+
+def test_a_bore_that_is_narrower_than_its_shaft_is_refused():
+    with pytest.raises(InputError, match=r"1\.4 mm and 1\.5 mm, as drawn"):
+        bore(-0.1e-3)
+
+
+@pytest.mark.parametrize("on", [5e-6, 0.1e-3])
+def test_a_clearance_that_is_not_the_drawn_gap_is_told(on):
+    with pytest.warns(AccuracyWarning, match=r"clearance is 10 um, which .* as .* are drawn"):
+        bore(on)
 
 
 def moved(network, spatial, duration, **more):

@@ -44,6 +44,15 @@ class TestValues:
         same = [line for line in case.text.splitlines() if line in other.text.splitlines()]
         assert len(same) == len(case.text.splitlines()) - 1
 
+    def test_an_entry_of_a_list_that_is_not_written_is_refused(self):
+        """By a value on its own, and by the points of a study."""
+        case, told = klack.load_case("demo-valve-axisymmetric"), "'motion.spin', a list that"
+        with pytest.raises(InputError, match=told) as error:
+            case.with_value("motion.spin.2", "10 rad/s")
+        assert "write 'motion.spin: [...]' there" in str(error.value)
+        with pytest.raises(InputError, match=told):
+            klack.run_many(case, [{"motion.spin.2": "10 rad/s"}], ["peak_force"])
+
     def test_a_case_prints_as_one_line(self):
         case = klack.load_case("two-rods")
         assert repr(case) == f"two-rods: {case.title} (case.yaml)"
