@@ -14,11 +14,11 @@ from klack.magnetics.flux_step import flux_rows
 from klack.magnetics.insulation import InsulationClass
 from klack.magnetics.map_choice import MapFile
 from klack.magnetics.map_file import MapTable
-from klack.magnetics.winding import REFERENCE_TEMPERATURE, warm_resistance
+from klack.magnetics.winding import REFERENCE_TEMPERATURE, WindingTemperature, warm_resistance
 from klack.network.component import Component
 from klack.network.port import COIL, ELEMENT, Port
 from klack.network.rows import LimitRow, Rows
-from klack.units import Current, Flux, Force, Length, Resistance, Temperature
+from klack.units import Current, Flux, Force, Length, Resistance
 
 __all__ = ["ForceMapSolenoid"]
 
@@ -52,8 +52,8 @@ class ForceMapSolenoid(Component):
     }
 
     resistance: Resistance = Field(gt=0, description="Of coil and harness, at 20 degC.")
-    winding_temperature: Temperature = Field(
-        default=REFERENCE_TEMPERATURE, gt=0, description="Of the copper."
+    winding_temperature: WindingTemperature = Field(
+        default=REFERENCE_TEMPERATURE, description="Of the copper, -200 to 1085 degC."
     )
     insulation_class: InsulationClass = None
     gap: Length = Field(description="Gap at the start, as in the table.")

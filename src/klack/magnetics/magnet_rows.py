@@ -15,9 +15,9 @@ from klack.magnetics.gap_range import GapRange
 from klack.magnetics.insulation import InsulationClass
 from klack.magnetics.network_loops import loop_names
 from klack.magnetics.shared_capacitors import shared_capacitors
-from klack.magnetics.winding import REFERENCE_TEMPERATURE, warm_resistance
+from klack.magnetics.winding import REFERENCE_TEMPERATURE, WindingTemperature, warm_resistance
 from klack.network.rows import Channel, Rows
-from klack.units import Current, Resistance, Temperature
+from klack.units import Current, Resistance
 
 __all__ = ["CoilCircuit", "magnet_rows", "main_circuit"]
 
@@ -42,8 +42,8 @@ class CoilCircuit(Section):
     """Electric circuit of one or more coils of a magnet, with a driver of its own."""
 
     resistance: Resistance = Field(gt=0, description="Of its coils and harness, at 20 degC.")
-    winding_temperature: Temperature = Field(
-        default=REFERENCE_TEMPERATURE, gt=0, description="Of the copper."
+    winding_temperature: WindingTemperature = Field(
+        default=REFERENCE_TEMPERATURE, description="Of the copper, -200 to 1085 degC."
     )
     insulation_class: InsulationClass = None
     start_current: Current = Field(

@@ -16,11 +16,11 @@ from klack.magnetics.insulation import InsulationClass
 from klack.magnetics.magnet_rows import CoilCircuit, magnet_rows, main_circuit
 from klack.magnetics.network_elements import CoilElement, MovingGap, NetworkElement, WorkingGaps
 from klack.magnetics.network_loops import circuit_of_network
-from klack.magnetics.winding import REFERENCE_TEMPERATURE
+from klack.magnetics.winding import REFERENCE_TEMPERATURE, WindingTemperature
 from klack.network.component import Component
 from klack.network.port import COIL, ELEMENT, Port
 from klack.network.rows import Rows
-from klack.units import Current, Length, Resistance, Temperature
+from klack.units import Current, Length, Resistance
 
 __all__ = ["MagneticNetwork"]
 
@@ -62,8 +62,8 @@ class MagneticNetwork(Component):
         return {**self.ports, **dict.fromkeys(self.circuits, COIL)}
 
     resistance: Resistance = Field(gt=0, description="Of coils and harness, at 20 degC.")
-    winding_temperature: Temperature = Field(
-        default=REFERENCE_TEMPERATURE, gt=0, description="Of the copper."
+    winding_temperature: WindingTemperature = Field(
+        default=REFERENCE_TEMPERATURE, description="Of the copper, -200 to 1085 degC."
     )
     insulation_class: InsulationClass = None
     gap: Length = Field(gt=0, description="Working gap at the start, without residual gaps.")

@@ -26,12 +26,12 @@ from klack.magnetics.solenoid_parts import (
     PoleGap,
 )
 from klack.magnetics.tabulation import hermite_grid
-from klack.magnetics.winding import REFERENCE_TEMPERATURE
+from klack.magnetics.winding import REFERENCE_TEMPERATURE, WindingTemperature
 from klack.network.across import OffAxisPart
 from klack.network.component import Component
 from klack.network.port import COIL, ELEMENT, Port
 from klack.network.rows import Rows
-from klack.units import Current, Flux, Length, Permeance, Ratio, Resistance, Temperature
+from klack.units import Current, Flux, Length, Permeance, Ratio, Resistance
 
 __all__ = ["Solenoid"]
 
@@ -85,8 +85,8 @@ class Solenoid(Component):
 
     turns: Number = Field(gt=0, description="Turns of the coil.")
     resistance: Resistance = Field(gt=0, description="Of coil and harness, at 20 degC.")
-    winding_temperature: Temperature = Field(
-        default=REFERENCE_TEMPERATURE, gt=0, description="Of the copper."
+    winding_temperature: WindingTemperature = Field(
+        default=REFERENCE_TEMPERATURE, description="Of the copper, -200 to 1085 degC."
     )
     insulation_class: InsulationClass = None
     gap: Length = Field(gt=0, description="Working gap at the start, without the residual gap.")

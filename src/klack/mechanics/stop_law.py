@@ -1,12 +1,14 @@
 """Contact laws of an end stop as a case file writes them."""
 
 from math import log, sqrt
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from klack.contact.laws import HertzLaw, LinearLaw, TableLaw
+from klack.errors import InputError
+from klack.input.problem import CaseProblem
 from klack.input.section import Section
 from klack.units import Force, Length, Modulus, Stiffness
 
@@ -62,6 +64,16 @@ class TableStopLaw(Section):
     kind: Literal["table"] = Field(description="Which law: table.")
     indentation: tuple[Length, ...] = Field(min_length=1, description="Increasing, from touch on.")
     force: tuple[Force, ...] = Field(min_length=1, description="One force per indentation.")
+
+    @model_validator(mode="after")
+    def _is_a_law(self) -> Self:
+        try:
+            self.contact_law()
+        except InputError as error:
+            raise CaseProblem(
+                ("indentation",), got=error.got, expected=error.expected, hint=error.hint
+            ) from None
+        return self
 
     def contact_law(self) -> TableLaw:
         """Return the law."""
