@@ -309,3 +309,49 @@ def test_surroundings_that_boil_are_named_by_the_key_that_is_given(film, key):
     with pytest.raises(InputError) as caught:
         case.network.network().rows()
     assert caught.value.where == key
+
+
+SMALL = Path(__file__).parents[2] / "docs" / "how-to" / "two_coils.yaml"
+_STOP = "law: {kind: linear, stiffness: 1e9 N/m}, restitution: 0.5}\n    spring"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "where", "words"),
+    [
+        (
+            "resistance: 0.8 ohm",
+            "resistance: 0.8 ohm, winding_temperature: -235 degC",
+            "network.components.magnet.winding_temperature",
+            "-235 degC",
+        ),
+        (
+            "resistance: 9 ohm",
+            "resistance: 9 ohm, winding_temperature: 1100 degC",
+            "network.components.magnet.circuits.holding.winding_temperature",
+            "1100 degC",
+        ),
+        *(
+            (
+                _STOP,
+                _STOP.replace("linear, stiffness: 1e9 N/m", f"table, {table}"),
+                "network.components.stop.law.indentation",
+                words,
+            )
+            for table, words in (
+                ("indentation: [2 um, 1 um], force: [1 N, 2 N]", "to (1e-06 m, 2 N)"),
+                ("indentation: [1 um, 2 um], force: [1 N]", "2 indentations and 1 forces"),
+                ("indentation: [0 um], force: [0 N]", "from (0 m, 0 N) to (0 m, 0 N)"),
+            )
+        ),
+    ],
+)
+def test_what_no_winding_or_law_can_be_is_refused_at_its_key(old, new, where, words):
+    """Copper melts at 1084.62 degC (ITS-90); at -235 degC its coefficient leaves no resistance."""
+    text = SMALL.read_text(encoding="utf-8")
+    if old == "resistance: 0.8 ohm":
+        new = new.replace(", ", "\n      ")
+    assert text.count(old) == 1
+    with pytest.raises(InputError) as error:
+        read_valve_case(text.replace(old, new), SMALL)
+    assert where in str(error.value)
+    assert words in str(error.value)
