@@ -207,6 +207,8 @@ def test_a_text_of_another_page_is_not_overwritten(folder):
     assert notes.draft("a.yaml") == "one"
     assert notes.exchange_draft("a.yaml", "one", "one more")
     assert other.exchange_draft("a.yaml", "one more", None)
+    assert notes.exchange_draft("a.yaml", "one more", "one more")  # nothing new since it was kept
+    assert notes.draft("a.yaml") is None  # discarded it stays
     assert notes.draft("a.yaml") is None
 
 

@@ -155,11 +155,14 @@ class Notes:
     def exchange_draft(self, of: str, known: str | None, text: str | None) -> bool:
         """Keep a text that is not saved yet, unless another page has kept one since ``known``.
 
-        Returns False where the text of another page stays; ``text`` None: it is saved.
+        Returns False where the text of another page stays; ``text`` None: it is saved.  A text that
+        was kept already and has been discarded since, by a page that came after, stays so.
         """
-        if self.draft(of) not in (None, known, text):
+        now = self.draft(of)
+        if now not in (None, known, text):
             return False
-        self.set_draft(of, text)
+        if now is not None or text != known:
+            self.set_draft(of, text)
         return True
 
     @staticmethod
