@@ -292,6 +292,25 @@ def test_the_form_has_units_limits_and_words_of_the_schema():
     assert not [key for key in fields if "edges" in key]
 
 
+def test_a_magnet_is_a_case_of_its_own_and_an_oblique_impact_has_no_sliders():
+    """Truth: what ``klack magnet`` takes, and what an explorer refuses."""
+    path = Path("docs/how-to/lifting_magnet.yaml")
+    magnet = checked_text(path.read_text("utf-8"), str(path))
+    wrong = checked_text(path.read_text("utf-8").replace("turns: 957", "turns: -3"), str(path))
+    turned = exchanged_text(path.read_text("utf-8"), str(path), ("magnet", "coil", "turns"), "900")
+    path = Path("docs/how-to/oblique_impact.yaml")
+    oblique = path.read_text("utf-8")
+
+    assert (magnet.kind, magnet.error, magnet.ways) == ("magnet", "", {})
+    assert "magnet.coil.turns" in {item.key for item in magnet.fields}
+    assert "magnet.coil.turns" in wrong.error
+    assert "turns: 900" in turned
+    assert [*checked_text(TEXT, str(PATH)).ways] == ["Show", "Sliders", "New study"]
+    assert [*checked_text(oblique, str(path)).ways] == ["Show", "New study"]
+    with pytest.raises(InputError, match=r"motion\.sideways_speed"):
+        Explorer().open(oblique, str(path))
+
+
 def test_a_form_changes_one_value_and_nothing_else():
     text = exchanged_text(TEXT, str(PATH), ("motion", "speed"), "0.5 m/s")
 
@@ -321,8 +340,22 @@ def test_the_checker_names_the_line():
 
     assert "motion.speed" in found.error
     assert f"{PATH}:{line}: " in found.error
+    assert (found.line, found.column) == (line, 0)
     assert found.fields == ()
     assert Path(str(PATH)).read_text("utf-8") == TEXT
+
+
+def test_the_checker_names_the_column_of_bad_yaml_and_no_line_of_another_file(tmp_path):
+    path = tmp_path / "case.yaml"
+    bad = checked_text("klack: 1\nmotion: {speed: 1 m/s}}\n", str(path))
+    (tmp_path / "part.yaml").write_text("klack: 1\nfixed: 3\n")
+    of_part = checked_text(
+        "klack: 1\nnetwork: {}\ninclude: [{file: part.yaml, as: a}]\n", str(path)
+    )
+
+    assert (bad.line, bad.column) == (2, 23)
+    assert f"{tmp_path / 'part.yaml'}:" in of_part.error
+    assert (of_part.line, of_part.column) == (0, 0)
 
 
 @pytest.mark.slow

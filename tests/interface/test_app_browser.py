@@ -98,7 +98,7 @@ def test_a_run_that_is_done_leads_to_its_result(page, server, folder):
     (folder / "klack-results" / "done" / "report.html").write_text("<p>report</p>")
     page.goto(f"{server.base}/")
     row = page.locator(".k-row", has=page.get_by_role("button", name="Dismiss"))
-    row.wait_for()
+    row.get_by_role("link", name="Hear").wait_for()  # the case is read first
     ways = {link.inner_text(): link.get_attribute("href") for link in row.locator("a").all()}
 
     assert "done in 21 s" in row.inner_text()
@@ -106,6 +106,38 @@ def test_a_run_that_is_done_leads_to_its_result(page, server, folder):
     assert ways["Hear"].endswith("case.yaml#k-hear")
     shutil.rmtree(run)
     shutil.rmtree(folder / "klack-results" / "done")
+
+
+def test_a_magnet_is_run_and_an_oblique_impact_offers_no_sliders(page, server, folder):
+    text = Path("docs/how-to/lifting_magnet.yaml").read_text("utf-8")
+    for key, few in (("current", "[0.6 A, 1.2 A]"), ("gap", "[1 mm, 2 mm, 5 mm]")):
+        text, count = re.subn(rf"(\n  {key}: )\[.*\]", rf"\1{few}", text)
+        assert count == 1
+    (folder / "magnet.yaml").write_text(text, "utf-8")
+    shutil.copy("docs/how-to/oblique_impact.yaml", folder / "oblique.yaml")
+    page.goto(f"{server.base}/")
+    page.get_by_role("button", name=f"Note {CASE}").wait_for()  # the last of the list
+    page.get_by_role("button", name="Run magnet.yaml").click()
+    run = page.locator(".k-row", has_text="klack magnet magnet.yaml")
+    run.get_by_role("link", name="Report").wait_for()
+    ways = {
+        name: page.locator(".k-row", has=page.get_by_role("button", name=f"Note {name}"))
+        .locator("a")
+        .all_inner_texts()
+        for name in ("magnet.yaml", "oblique.yaml", CASE)
+    }
+
+    assert run.locator("a").all_inner_texts() == ["Report"]
+    assert ways == {
+        "magnet.yaml": ["Edit"],
+        "oblique.yaml": ["Show", "New study", "Edit"],
+        CASE: ["Show", "Sliders", "New study", "Edit"],
+    }
+    run.get_by_role("button", name="Dismiss").click()
+    run.wait_for(state="detached")
+    shutil.rmtree(folder / "klack-results" / "magnet")
+    for name in ("magnet.yaml", "oblique.yaml"):
+        (folder / name).unlink()
 
 
 def test_all_of_a_long_list_is_found_by_a_part_of_its_name(page, server, folder):

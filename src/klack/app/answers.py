@@ -328,17 +328,30 @@ class FormField:
 class Checked:
     """What the checker says of a text: an ``error``, empty for a valid one.
 
-    ``kind`` is ``"impact"``, ``"stroke"``, or ``"study"`` of a study in its own file, with the
-    ``case`` that it names; ``has_objectives`` if its study has something to search for.
+    ``line`` and ``column`` of an error count from 1; 0 where it names none of this text.  ``kind``
+    is ``"impact"``, ``"stroke"``, ``"magnet"``, or ``"study"`` of a study in its own file, with the
+    ``case`` that it names; ``has_objectives`` if its study has something to search for;
+    ``has_sliders`` if its numbers can be moved live.
     """
 
     error: str = ""
+    line: int = 0
+    column: int = 0
     title: str = ""
     kind: str = ""
     fields: tuple[FormField, ...] = ()
     has_study: bool = False
     has_objectives: bool = False
+    has_sliders: bool = False
     case: str = ""
+
+    @property
+    def ways(self) -> dict[str, str]:
+        """Pages of a valid case beside its editor, by the words of their links."""
+        if self.kind not in ("impact", "stroke"):
+            return {}
+        sliders = {"Sliders": "sliders"} if self.has_sliders else {}
+        return {"Show": "show", **sliders, "New study": "new-study"}
 
 
 @dataclass(frozen=True, kw_only=True)

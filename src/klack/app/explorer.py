@@ -68,6 +68,7 @@ __all__ = [
     "common_scale",
     "drawn",
     "force_levels",
+    "has_sliders",
     "impact_curves",
     "impact_numbers",
     "level_numbers",
@@ -550,6 +551,15 @@ class Explorer:
 
 
 # --------------------------------------------------------------------------- impacts
+
+
+def has_sliders(case: AnyCase) -> bool:
+    """Whether an explorer takes a case: impacts with surfaces, along the axis."""
+    if isinstance(case, ValveCase):
+        return True
+    with suppress(InputError):
+        return case.has_surfaces and bool(case.require_levels((_Impacts.run,)))
+    return False
 
 
 class _Impacts:

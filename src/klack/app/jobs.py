@@ -39,7 +39,7 @@ from klack.terminal.progress import PROGRESS_FILE
 __all__ = ["COMMANDS", "LIVE", "OF_STUDIES", "Job", "Jobs", "State"]
 
 State = Literal["running", "done", "failed", "cancelled", "lost"]
-COMMANDS = ("impact", "stroke", "noise", "shots", "study", "optimise")
+COMMANDS = ("impact", "stroke", "magnet", "noise", "shots", "study", "optimise")
 """Commands that the application starts."""
 OF_STUDIES = ("study", "optimise")
 """Those of them that are stopped and resumed."""

@@ -11,11 +11,12 @@ from typing import Any, Literal, get_args, get_origin
 from pydantic.fields import FieldInfo
 
 from klack import __version__
+from klack.analyses.magnet.case import MagnetCase
 from klack.analyses.study.goals import goals_of
 from klack.analyses.study.kinds import kind_of, measure_names
 from klack.analyses.study.run import asked_points
 from klack.app.answers import Checked, FormField, MeasureOffer, StudyChoice, StudyOffer, typed
-from klack.app.explorer import sliders_of
+from klack.app.explorer import has_sliders, sliders_of
 from klack.case.any_case import CaseTree, tree_of
 from klack.case.key_path import kind_at, node_at
 from klack.case.reader import parse, validated
@@ -284,16 +285,39 @@ def checked_text(text: str, path: str, has_form: bool = True) -> Checked:
         tree = tree_of(text, Path(path))
         if is_study(tree.data):
             return _checked_study(text, path)
+        if "magnet" in tree.data:
+            return _checked_magnet(tree, has_form)
         case = tree.any_case()
     except KlackError as error:
-        return Checked(error=str(error))
+        line, column = _place(error, path)
+        return Checked(error=str(error), line=line, column=column)
     return Checked(
         has_study=case.study is not None,
         has_objectives=case.study is not None and bool(case.study.objectives),
         title=case.title or case.name,
         kind="stroke" if "network" in tree.data else "impact",
         fields=tuple(form_of(case, tree)) if has_form else (),
+        has_sliders=has_sliders(case),
     )
+
+
+def _magnet_of(tree: CaseTree) -> MagnetCase:
+    return validated(MagnetCase, tree.text, tree.path, tree.data, tree.lines)
+
+
+def _checked_magnet(tree: CaseTree, has_form: bool) -> Checked:
+    case = _magnet_of(tree)
+    fields = tuple(form_of(case, tree)) if has_form else ()
+    return Checked(title=case.title or case.name, kind="magnet", fields=fields)
+
+
+def _place(error: KlackError, path: str) -> tuple[int, int]:
+    """Line and column that an error names in the text, from 1; 0 without one."""
+    if not isinstance(error, InputError):
+        return 0, 0
+    line = re.match(re.escape(path) + r":(\d+)(?!\d)", error.where)
+    column = re.match(r"text that is not YAML at column (\d+)", error.got)
+    return int(line[1]) if line else 0, int(column[1]) if line and column else 0
 
 
 def _checked_study(text: str, path: str) -> Checked:
@@ -414,10 +438,18 @@ def _shown(value: Any) -> str:
     return str(value)
 
 
+def _section_of(tree: CaseTree) -> Section:
+    if is_study(tree.data):
+        return study_source(tree.text, tree.path)[0]
+    if "magnet" in tree.data:
+        return _magnet_of(tree)
+    return tree.any_case()
+
+
 def _takes_text(tree: CaseTree, place: Key) -> bool:
     """Whether a key takes any text: a title of digits is no number."""
     try:
-        case = study_source(tree.text, tree.path)[0] if is_study(tree.data) else tree.any_case()
+        case = _section_of(tree)
         _, info = node_at(case, place)
     except (KlackError, CaseProblem):  # of a text that is not valid the kinds are not known
         return False

@@ -189,8 +189,15 @@ class _Overview:
             link("Report", report, new=True, of=job.out).classes("k-main-btn")
         if job.command in _SHOWN:
             link("Show", address("show", job.out), of=job.out)
-            link("Sliders", address("sliders", job.case), of=job.out)
-            link("Hear", f"{address('sliders', job.case)}#k-hear", of=job.out)
+            ui.timer(0.05, partial(self._show_sliders, job, ui.element("span")), once=True)
+
+    async def _show_sliders(self, job: Job, place: ui.element) -> None:
+        """Ways to what moves live, where the case can."""
+        checked = await self._checked(job.case)
+        if "Sliders" in checked.ways and not place.is_deleted:
+            with place.classes("k-tools"):
+                link("Sliders", address("sliders", job.case), of=job.out)
+                link("Hear", f"{address('sliders', job.case)}#k-hear", of=job.out)
 
     async def _forget(self, name: str) -> None:
         await is_done(self._state.jobs.forget, name)
@@ -287,9 +294,8 @@ class _Overview:
             is_study = checked.kind == "study"
             if not checked.error and not is_study:
                 button("Run", partial(self._run, case, checked.kind), of=case).props("data-once")
-                link("Show", address("show", case), of=case)
-                link("Sliders", address("sliders", case), of=case)
-                link("New study", address("new-study", case), of=case)
+                for words, page in checked.ways.items():
+                    link(words, address(page, case), of=case)
             link("Open" if is_study else "Edit", address("case", case), of=case)
             button("Duplicate", partial(self._ask_copy, case), of=case)
             button("Note", partial(self._ask_note, case), of=case)

@@ -84,7 +84,8 @@ async def showing_page(state: State, given: Mapping[str, str]) -> None:
         if not is_result:
             with ui.element("div").classes("k-head"):
                 link("Edit", address("case", path))
-                link("Sliders", address("sliders", path))
+                sliders = link("Sliders", address("sliders", path))
+                sliders.set_visibility(False)
                 if draft is not None:
                     plain("as edited, not saved", "span").classes("k-tag")
         told = ui.element("div")
@@ -98,6 +99,8 @@ async def showing_page(state: State, given: Mapping[str, str]) -> None:
             if is_result:
                 packed = await state.shapes.call("result_scene", place)
             else:
+                checked = await state.reader.call("check", draft or text, place, False)
+                sliders.set_visibility("Sliders" in checked.ways)
                 packed = await state.shapes.call("case_scene", draft or text, place)
         except KlackError as error:
             told.clear()
