@@ -194,3 +194,108 @@ def test_what_was_typed_at_the_moment_of_a_reload_is_there_again(editor):
     editor.reload()
     editor.wait_for_selector("text=valid impact, not saved")
     assert text_of(editor).endswith("# mine")
+
+
+# ----------------------------------------------------------------------- lines, colours, errors
+
+SAME = """() => {
+  const ink = document.getElementById("k-ink").textContent.slice(0, -1);
+  const first = parseInt(document.querySelector("#k-lines").textContent.replace("! ", ""));
+  const lines = document.getElementById("k-yaml").value.split("\\n");
+  return lines.slice(first - 1, first - 1 + ink.split("\\n").length).join("\\n") === ink;
+}"""
+WRONG = "[...document.querySelectorAll('#k-lines .k-wrong')].map(e => e.textContent).join()"
+
+
+def put(page: Any, text: str) -> None:
+    """Paste a long text: :meth:`fill` types each line."""
+    page.get_by_label("case file, YAML").evaluate(
+        "(e, text) => { e.value = text; e.dispatchEvent(new Event('input', {bubbles: true}));"
+        "e.focus(); }",
+        text,
+    )
+
+
+def line_of(text: str, words: str) -> int:
+    return text[: text.index(words)].count("\n") + 1
+
+
+def test_the_letters_over_the_text_are_those_of_the_text(editor):
+    """Truth: the text itself; the last line ends at the end of the text area, its padding left."""
+    editor.wait_for_selector("#k-ink .k-key")
+    editor.wait_for_function(SAME)
+    first = {
+        kind: editor.locator(f"#k-ink .{kind}").all_inner_texts() for kind in ("k-key", "k-number")
+    }
+    text = text_of(editor)
+    put(editor, text + "# x: 1\n" * 3000 + "last: 'it''s'  # here")
+    editor.keyboard.press("Control+End")
+    editor.wait_for_function("document.querySelector('#k-ink').textContent.includes('last: ')")
+    editor.wait_for_function(SAME)
+    ends = editor.evaluate(
+        "() => { const area = document.getElementById('k-yaml');"
+        "const edge = area.getBoundingClientRect().top + area.clientHeight - 12;"
+        "return ['k-ink', 'k-lines'].map(id => document.querySelector(`#${id} > div > div`)"
+        ".getBoundingClientRect().bottom - edge); }"
+    )
+
+    assert "young" in first["k-key"]
+    assert "210 GPa" in first["k-number"]
+    for kind, words in (("k-key", "last"), ("k-words", "'it''s'"), ("k-aside", "# here")):
+        assert editor.locator(f"#k-ink .{kind}").last.inner_text() == words
+    assert editor.locator("#k-lines").inner_text().split()[-1] == str(text.count("\n") + 3001)
+    assert max(map(abs, ends)) < 1.5  # [px]: browsers scroll by whole ones; a line has 21
+
+
+def test_the_line_of_an_error_is_marked_until_it_moves_and_the_cursor_goes_there(editor, server):
+    text = text_of(editor)
+    wrong = text.replace("0.3 m/s", "0.3 kg")
+    line = line_of(wrong, "0.3 kg")
+    area, go = editor.get_by_label("case file, YAML"), editor.get_by_role("button", name="Go to")
+    area.fill(wrong)
+    editor.wait_for_selector("#k-yaml[aria-invalid=true]")
+    assert go.inner_text() == f"Go to line {line}"
+    go.press("Enter")
+    editor.wait_for_function(f"{WRONG} === '! {line}'")
+    place = editor.evaluate(
+        "() => { const e = document.activeElement, at = e.selectionStart;"
+        "return [e.id, e.value.slice(0, at).split('\\n').length, e.selectionEnd - at]; }"
+    )
+    assert place == ["k-yaml", line, 0]
+    with slow(server, "reader:Reader"):
+        editor.keyboard.press("Control+Home")
+        editor.keyboard.type("# one more\n")
+        editor.wait_for_function(f"{WRONG} === ''")  # it may stand elsewhere
+    editor.get_by_role("button", name=f"Go to line {line + 1}").press("Enter")
+    editor.wait_for_function(f"{WRONG} === '! {line + 1}'")
+    area.fill(text)
+    editor.wait_for_selector("#k-yaml[aria-invalid=false]")
+    editor.wait_for_function(f"{WRONG} === ''")
+    editor.wait_for_selector("text=valid impact, saved")
+    assert not go.is_visible()
+
+
+def test_a_click_on_the_way_to_an_error_goes_to_its_column(editor):
+    area, go = editor.get_by_label("case file, YAML"), editor.get_by_role("button", name="Go to")
+    text = text_of(editor).replace("speed: 0.3 m/s}", "speed: 0.3 m/s}}")
+    assert "}}" in text
+    area.fill(text)
+    editor.wait_for_selector("#k-yaml[aria-invalid=true]")
+    go.click()
+    at = editor.evaluate("document.activeElement.selectionStart")
+    assert text[at - 1 : at + 1] == "}}"
+
+
+def test_a_long_text_is_drawn_where_it_is_seen_and_a_long_line_stays_plain(editor):
+    """Nodes do not grow with the text, so neither does the time of a key."""
+    area, text = editor.get_by_label("case file, YAML"), text_of(editor)
+    put(editor, text + "a: {b: 1}\n" * 90_000)
+    editor.keyboard.press("Control+End")
+    editor.wait_for_function(SAME)
+    last = text.count("\n") + 90_000
+    editor.wait_for_function(f"document.querySelector('#k-lines').textContent.includes('{last}')")
+    assert editor.evaluate("document.querySelectorAll('#k-ink *').length") < 2000
+    assert "k-drawn" in str(area.get_attribute("class"))
+    put(editor, text + "# " + "x" * 6000)
+    editor.wait_for_function("!document.getElementById('k-yaml').matches('.k-drawn')")
+    assert editor.locator("#k-ink").inner_text().strip() == ""

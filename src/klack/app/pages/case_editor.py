@@ -94,15 +94,15 @@ class _Editor:
             button("Discard changes", self._discard)
             self._of_case = ui.element("div").classes("k-tools")
             with self._of_case:
-                for words, page in (
-                    ("Show", "show"),
-                    ("New study", "new-study"),
-                    ("Sliders", "sliders"),
-                ):
-                    link(words, address(page, self._case))
+                every = Checked(kind="impact", has_sliders=True).ways
+                self._ways = {
+                    words: link(words, address(page, self._case)) for words, page in every.items()
+                }
                 button("Run", self._run).props("data-once")
             button("Save", self._save, main=True).props("id=k-save")
-        self._message = plain("", "p").classes("k-error").props("role=alert")
+        self._message = plain("", "p").classes("k-error").props("role=alert id=k-told")
+        self._go = button("").classes("k-go").on("click", js_handler="() => window.klackGo()")
+        self._go.set_visibility(False)
         with ui.element("div").classes("k-editor"):
             with ui.element("section"):
                 heading("Form").classes("k-sr")
@@ -114,10 +114,14 @@ class _Editor:
                         self._changed,
                         js_handler="(e) => window.klackChanged(e, emit)",
                     )
-            with ui.element("section").classes("k-sheet"):
+            with ui.element("section").classes("k-sheet k-text"):
                 heading("YAML").classes("k-sr")
-                self._area = plain(self._text, "textarea")
+                element("pre", id="k-lines", tabindex=-1, aria_hidden="true")
+                with ui.element("div"):
+                    element("pre", id="k-ink", tabindex=-1, aria_hidden="true")
+                    self._area = plain(self._text, "textarea")
                 self._area.props("id=k-yaml spellcheck=false autocomplete=off")
+                self._area.props("aria-describedby=k-told")
                 self._area.props["aria-label"] = "case file, YAML"
                 # not throttled: what was typed last comes before the click on Save or Discard
                 self._area.on(
@@ -125,6 +129,7 @@ class _Editor:
                     self._typed,
                     js_handler=f"(e) => emit(window.klackTyped(e.target, {_LONGEST}))",
                 )
+        ui.add_head_html('<script src="/static/editor.js" defer></script>')
         ui.timer(0.05, self._settle, once=True)
 
     # ----------------------------------------------------------------------- from the text
@@ -136,6 +141,7 @@ class _Editor:
             self._status.set_text("too long, not kept")
             self._status.classes(remove="good fair", add="out")
             self._message.set_text(_TOO_LONG)
+            self._go.set_visibility(False)
             return
         self._text = str(text)
         self._waiting = {key: value for key, (at, value) in self._values.items() if at > known}
@@ -196,6 +202,9 @@ class _Editor:
             return
         with self._form:
             self._message.set_text("\n".join(filter(None, (found.error, trouble))))
+            self._go.set_text(f"Go to line {found.line}")
+            self._go.set_visibility(found.line > 0)
+            self._tell("klackMarks", [(found.line, found.column)] if found.error else [])
             unsaved = "not saved" if text != self._saved else "saved"
             self._status.classes(remove="good fair out", add="out" if found.error else "good")
             valid = "not valid" if found.error else f"valid {found.kind}"
@@ -203,6 +212,8 @@ class _Editor:
             if not found.error:
                 self._show_form(found.fields)
                 self._of_case.set_visibility(found.kind != "study")
+                for words, way in self._ways.items():
+                    way.set_visibility(words in found.ways)
                 self._above.set_visibility(found.has_study)
         await self._panel.checked(text, found)
 
