@@ -11,10 +11,12 @@ import pytest
 from energy_ledger import allowed
 from spatial_needle import ABOVE, BELOW, INERTIA, MASS, Needle, move, ring
 
+from klack.contact.complementarity import solve_lcp
 from klack.errors import AccuracyWarning, InputError
 from klack.mechanics.force import ForceOverTime
 from klack.mechanics.spring import Spring
 from klack.transient.interface_run import simulate_interface
+from klack.transient.spatial_rest import _forces
 
 ROUND = Needle(seat=ring(8, 0.6e-3, BELOW), stop=ring(8, 2e-3, ABOVE))
 
@@ -232,3 +234,20 @@ def test_a_needle_that_nothing_holds_is_told():
     also = pytest.warns(AccuracyWarning, match="not quite at rest")
     with moves, also, allowed("simulate_network", inf):
         move(needle.rows({"load": pull(-5.0)}), needle.valve(), 5e-6)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_points_that_nobody_watched_close_as_well(seed):
+    """Against the problem of all points at once, which has one solution; round-off."""
+    rng = np.random.default_rng(seed)
+    rows, answer = rng.normal(size=(40, 6)), rng.uniform(0.1, 1.0, 6)
+    bed = rng.normal(size=(40, 40))
+    local, gap = bed @ bed.T + 4.0 * np.eye(40), rng.normal(size=40)
+    watched = gap < np.sort(gap)[3]
+
+    lam, push = _forces(rows, answer, local, gap, np.zeros(40, dtype=bool), watched)
+
+    wanted, _, _ = solve_lcp(local + (rows * answer) @ rows.T, gap)
+    assert np.any(wanted[~watched] > 0.0)
+    np.testing.assert_allclose(lam, wanted, atol=1e-12 * wanted.max())
+    np.testing.assert_allclose(push, rows.T @ wanted, atol=1e-11 * wanted.max())

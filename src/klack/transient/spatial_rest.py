@@ -33,6 +33,7 @@ from klack.transient.placed_bodies import rigid_coordinates, shaft_pressed
 __all__ = ["settle_at_rest"]
 
 
+_WATCHED = 1e-6  # [m] gaps of points that are looked at first
 _SOFTER = 1e4  # a proximal step than the contact points
 _MOST = 100
 _FOUND = 1e-12  # of the force on the bodies
@@ -90,6 +91,8 @@ def settle_at_rest(
         active = np.append(lam[:points] > 0.0, np.ones(len(walls.height), dtype=bool))
         walls = walls.with_present(bore, state.q)
         rows, gap, local = _rows(model, bore, gaps(), walls)
+        watched = gap + rows @ state.q < _WATCHED
+        watched[points:] = True
         active = np.append(active, np.zeros(len(rows) - len(active), dtype=bool))
         turned = np.zeros(len(rows))
         for spin in spins:
@@ -98,9 +101,7 @@ def settle_at_rest(
         given = soft * force + np.where(rigid, state.q + sigma * force, 0.0)
         seen = rows @ given + turned
         answer = soft + np.where(rigid, sigma, 0.0)
-        A = local + (rows * answer) @ rows.T
-        lam, _, _ = solve_lcp(0.5 * (A + A.T), gap + seen, active)
-        push = rows.T @ lam
+        lam, push = _forces(rows, answer, local, gap + seen, active, watched)
         state.q[:] = given + answer * push
         left = float(np.linalg.norm((force + push)[rigid])) / scale
         left = max(left, walls.missed(bore, state.q, lam[points:], rows[points:, rigid]) / scale)
@@ -121,6 +122,30 @@ def settle_at_rest(
         )
     state.books[:] = 0.0
     shaft_pressed(bore, state)
+
+
+def _forces(
+    rows: NDArray[np.float64],
+    answer: Vector,
+    local: NDArray[np.float64],
+    gap: Vector,
+    active: NDArray[np.bool_],
+    watched: NDArray[np.bool_],
+) -> tuple[Vector, Vector]:
+    """Contact forces, and the modal force that they make.
+
+    All but the watched rows stay open; those that would not are watched, too, and all begins anew.
+    """
+    lam, closes = np.zeros(len(rows)), watched | active
+    watched = np.zeros_like(closes)
+    while np.any(closes):
+        watched |= closes
+        w = np.flatnonzero(watched)
+        A = local[np.ix_(w, w)] + (rows[w] * answer) @ rows[w].T
+        lam[w], active[w], _ = solve_lcp(0.5 * (A + A.T), gap[w], active[w])
+        push = rows[w].T @ lam[w]
+        closes = ~watched & (gap + local[:, w] @ lam[w] + rows @ (answer * push) < 0.0)
+    return lam, rows.T @ lam
 
 
 def _spins(model: InterfaceModel) -> NDArray[np.float64]:
