@@ -65,6 +65,7 @@ def two_rings(radii, height):
     }
 
 
+@pytest.mark.slow
 @each(
     ("radii", "height"),
     [((0.0, 2e-3, 4e-3), 3e-3), ((1e-3, 2e-3, 2.6e-3), 1e-3), ((1.5e-3, 2e-3, 6e-3), 2e-3)],
@@ -199,6 +200,7 @@ def hub_on_shaft(low=2e-3, high=5e-3):
     }
 
 
+@pytest.mark.slow
 def test_the_sharp_ends_of_a_joint_are_left_out():
     """The shaft continues: the pressure there grows without limit as elements shrink.
 
