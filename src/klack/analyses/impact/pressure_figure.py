@@ -111,7 +111,8 @@ def _draw_unrolled(figure: Figure, grid: Any, views: Sequence[PressureView]) -> 
             axes.set_xlabel("angle round the axis [°]" if is_ring else "x [µm]")
         lower.set_ylabel("distance across\nthe ring [µm]" if is_ring else "y [µm]")
         lower.set_ylim(1e6 * cut.across[0], 1e6 * cut.across[-1])
-        lower.set_title(f"at peak force, after {1e6 * view.time[view.peak]:.3g} µs")
+        peak = f"at peak force, after {1e6 * view.time[view.peak]:.3g} µs"
+        lower.set_title(fill(peak, _TITLE_LETTERS // len(views)))
         if not is_ring:
             lower.set_aspect("equal")
     figure.colorbar(above, ax=grid[0], aspect=22).set_label("line load [N/mm]")
