@@ -713,10 +713,12 @@ def _within(force: float, after: float) -> float:
 def _with_releases(rows: Lanes) -> Lanes:
     """Let the first step after each contact begin when its gap opens, in the derivatives.
 
-    That time lies between the ends of two steps, on a straight line.
+    That time lies between the ends of two steps, on a straight line.  The speed at the start of
+    that step belongs to another time, so that records after it tell the opening speed.
     """
     contact = rows[:, 2, 0] > 0.0
     for k in np.flatnonzero(contact[:-1] & ~contact[1:]):
+        rows[k + 1, 5] = np.nan
         if k < 1:
             continue
         end0, end1 = rows[k, 0] + rows[k, 1], rows[k + 1, 0] + rows[k + 1, 1]
