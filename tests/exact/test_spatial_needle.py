@@ -251,3 +251,12 @@ def test_points_that_nobody_watched_close_as_well(seed):
     assert np.any(wanted[~watched] > 0.0)
     np.testing.assert_allclose(lam, wanted, atol=1e-12 * wanted.max())
     np.testing.assert_allclose(push, rows.T @ wanted, atol=1e-11 * wanted.max())
+
+
+def test_points_close_where_none_was_watched():
+    """One spring on its wall, k u = f and u = gap: the wall takes the rest of the force."""
+    rows, nothing = np.array([[1.0]]), np.zeros(1, dtype=bool)
+
+    lam, push = _forces(rows, np.ones(1), np.zeros((1, 1)), np.array([-2.0]), nothing, nothing)
+
+    assert (lam[0], push[0]) == (2.0, 2.0)

@@ -144,3 +144,18 @@ def test_an_impact_shows_its_fits_and_is_that_of_the_glued_body(tmp_path):
     heads = [table.columns for part in report_content(fitted).sections for table in part.tables]
     assert ("press fit", "needle.joint") in heads
     assert glued.warnings == fitted.warnings
+
+
+@pytest.mark.slow
+def test_a_part_that_yields_away_from_the_contact_leaves_it_elastic(tmp_path):
+    """To the bit: only the pressed armature has a yield stress, 15 mm from the faces."""
+    hard = ("materials", "hard_steel", "yield", None)
+    soft = ("materials", "soft_iron", "yield", None)
+
+    one, other = (
+        run_impact(changed(tmp_path, *changes), levels=("reduced",), certify=False)
+        for changes in ([hard], [hard, soft])
+    )
+
+    one, other = (study.levels["reduced"].history.force for study in (one, other))
+    assert one.tobytes() == other.tobytes()

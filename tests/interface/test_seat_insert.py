@@ -58,3 +58,27 @@ def test_the_seat_is_a_stop_below_the_body_of_the_lift(tmp_path, name):
     (tmp_path / "case.yaml").write_text(text, "utf-8")
     with pytest.raises(InputError, match=f"run.seat: got '{name}', expected .*'needle': .*seat"):
         klack.load_case(tmp_path / "case.yaml")
+
+
+def test_the_lift_is_that_of_the_point_at_the_named_seat(tmp_path):
+    """A needle on two seats: the default point of the lift follows the key."""
+    valve = """
+klack: 1
+title: Two seats
+network:
+  components:
+    needle: {type: rigid-mass, mass: 3 g, points: [inner, outer, top]}
+    one: {type: end-stop, gap: 0 um, law: {kind: linear, stiffness: 1e8 N/m}}
+    two: {type: end-stop, gap: 1 um, law: {kind: linear, stiffness: 1e8 N/m}}
+    spring: {type: spring, stiffness: 10 N/mm, preload: 12 N}
+  connections:
+    - [needle.inner, one.upper]
+    - [needle.outer, two.upper]
+    - [one.lower, two.lower, ground]
+    - [needle.top, spring.end]
+run: {duration: 1 ms, variants: [dry], seat: NAME}
+"""
+    for name, point in (("one", "inner"), ("two", "outer")):
+        (tmp_path / "case.yaml").write_text(valve.replace("NAME", name), "utf-8")
+        roles = find_roles(klack.load_case(tmp_path / "case.yaml").checked)
+        assert (roles.seat, roles.point) == (name, point)

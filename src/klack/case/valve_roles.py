@@ -82,16 +82,6 @@ def find_roles(case: ValveSections, network: Network | None = None) -> ValveRole
     gaps = {name: float(getattr(network.components[name], "gap", 0.0)) for name in meetings}
     above = [name for name, met in meetings.items() if met.lower and met.lower[0] == needle]
     below = [name for name, met in meetings.items() if met.upper and met.upper[0] == needle]
-    nearest_below = min(below, key=gaps.__getitem__, default="")
-    nearest_above = min(above, key=gaps.__getitem__, default="")
-    met = meetings.get(nearest_below or nearest_above)
-    side = met and (met.upper if nearest_below else met.lower)
-    point = side[1] if side else points[needle][0]
-    travel = travel_of(case, network, meetings)
-    seat = next(iter(travel.lowest({needle: 1.0})[1]), nearest_below)
-    opening = next(iter(travel.highest({needle: 1.0})[1]), nearest_above)
-    if case.run.lift is not None:
-        point = case.run.lift.surface
     named = case.run.seat
     if named is not None and named not in below:
         raise CaseProblem(
@@ -100,12 +90,22 @@ def find_roles(case: ValveSections, network: Network | None = None) -> ValveRole
             expected=f"an end stop below '{needle}': {one_of(below)}",
             hint=nearest(named, below, "connect its port 'upper' to a point of that body."),
         )
+    own_seat = named or min(below, key=gaps.__getitem__, default="")
+    nearest_above = min(above, key=gaps.__getitem__, default="")
+    met = meetings.get(own_seat or nearest_above)
+    side = met and (met.upper if own_seat else met.lower)
+    point = side[1] if side else points[needle][0]
+    travel = travel_of(case, network, meetings)
+    seat = named or next(iter(travel.lowest({needle: 1.0})[1]), own_seat)
+    opening = next(iter(travel.highest({needle: 1.0})[1]), nearest_above)
+    if case.run.lift is not None:
+        point = case.run.lift.surface
     return ValveRoles(
         needle=needle,
         point=point,
-        seat=named or seat,
+        seat=seat,
         opening_stop=opening,
-        own_seat=named or nearest_below,
+        own_seat=own_seat,
     )
 
 

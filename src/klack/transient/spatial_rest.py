@@ -136,16 +136,16 @@ def _forces(
 
     All but the watched rows stay open; those that would not are watched, too, and all begins anew.
     """
-    lam, closes = np.zeros(len(rows)), watched | active
-    watched = np.zeros_like(closes)
-    while np.any(closes):
-        watched |= closes
+    lam, watched = np.zeros(len(rows)), watched | active
+    while True:
         w = np.flatnonzero(watched)
         A = local[np.ix_(w, w)] + (rows[w] * answer) @ rows[w].T
         lam[w], active[w], _ = solve_lcp(0.5 * (A + A.T), gap[w], active[w])
         push = rows[w].T @ lam[w]
         closes = ~watched & (gap + local[:, w] @ lam[w] + rows @ (answer * push) < 0.0)
-    return lam, rows.T @ lam
+        if not np.any(closes):
+            return lam, rows.T @ lam
+        watched |= closes
 
 
 def _spins(model: InterfaceModel) -> NDArray[np.float64]:

@@ -257,7 +257,7 @@ class YieldingContact:
         lam, _, _ = self._elastic.solve(
             self.space.gap - (self._start + approach) * self.space.axial, None
         )
-        return max(body.elastic_utilisation(lam) for body in self.bodies) - 1.0
+        return max((body.elastic_utilisation(lam) for body in self.bodies), default=0.0) - 1.0
 
     def plastic_gap(self) -> Floats:
         """Plastic gap of both bodies, shape (nc,) [m]."""
