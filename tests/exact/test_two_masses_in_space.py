@@ -135,6 +135,22 @@ def test_a_needle_that_turns_has_no_restitution_of_its_centre(spin, turns):
         assert event.restitution == pytest.approx(1.0, abs=2e-3)
 
 
+def test_a_run_in_pieces_knows_what_went_into_rotation_before():
+    """Cut at 0.9 of the contact: what rotation gives after that would not blank the impact."""
+    velocity = np.zeros((2, 6))
+    velocity[0, 4] = 4.0
+
+    def run(duration, **more):
+        network = rows({}, speeds=(-0.02, 0.0), apart=1e-6)
+        return move(network, valve(apart=1e-6, velocity=velocity.ravel()), duration, **more)
+
+    (whole,) = run(90e-6, start="free").events
+    cut = 1e-6 * round(1e6 * (0.1 * whole.time + 0.9 * whole.separation_time))
+    (found,) = run(90e-6 - cut, state=run(cut, start="free").state).events
+    assert (found.time, found.besides, whole.besides) == (whole.time, "rotation", "rotation")
+    assert np.isnan(found.restitution)
+
+
 def sections(radius):
     return [ShaftSection(np.zeros((6, 1)), np.array([0.0, 0.0, 2e-3]), radius, None)]
 

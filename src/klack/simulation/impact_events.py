@@ -232,9 +232,9 @@ def judged(
     ----------
     until [s]
         End of the run.
-    before (stops, 1 + stops)
-        What the run before found of its last impact on each stop: its time, and the impulse of each
-        stop since then; shape (0, 0) for none.
+    before (stops, 2 + stops)
+        What the run before found of its last impact on each stop: its time, the impulse of each
+        stop since then, and the energy that went into rotation; shape (0, 0) for none.
     turning
         Times [s] and energies of rotation [J], of components that may turn.
 
@@ -264,7 +264,7 @@ def judged(
                 share[c, k] = sum(shared) / own
     after = before.copy()
     if not before.size:
-        after = np.column_stack([np.full(len(stops), -np.inf), np.zeros(share.shape)])
+        after = np.column_stack([np.full(len(stops), -np.inf), 0.0 * share, np.zeros(len(stops))])
     found = []
     for event in events:
         c = stops[event.stop]
@@ -277,12 +277,13 @@ def judged(
                 for stop, k in stops.items()
             ]
         )
+        turned = sum(_turned(*turning[name], event.time, end) for name in meeting[c] & set(turning))
         if before.size and before[c, 0] == event.time:
-            impulses += before[c, 1:]
-        after[c] = (event.time, *impulses)
+            impulses += before[c, 1:-1]
+            turned += before[c, -1]
+        after[c] = (event.time, *impulses, turned)
         most = _BESIDES * abs(event.impulse)
         besides = [stop for stop, k in stops.items() if share[c, k] * abs(impulses[k]) > most]
-        turned = sum(_turned(*turning[name], event.time, end) for name in meeting[c] & set(turning))
         if abs(turned) > _TURNED * 0.5 * masses[c] * event.approach_speed**2:
             besides.append(ROTATION)
         if besides and isfinite(event.restitution):
