@@ -417,3 +417,16 @@ def test_a_table_that_jumps_on_the_edge_of_a_step_delays_all_that_follows(tmp_pa
         check=False,
     )
     assert found.measures[0].slopes[0] == pytest.approx(1.0, abs=1e-4)  # error of the steps
+
+
+def test_a_blank_restitution_has_no_derivative():
+    """The seat of a clamped insert: while the needle is in contact, the ledge acts as well."""
+    found = klack.sensitivities(
+        klack.load_case(SMALL.with_name("seat_insert.yaml")).with_value("run.duration", "0.25 ms"),
+        parameters=["network.components.sleeve.preload"],
+        measures=["seat.restitution", "seat.energy_loss", "seat.peak_force"],
+        check=False,
+    )
+    values = [(item.value, item.slopes[0]) for item in found.measures]
+    assert values[:2] == [(None, None)] * 2
+    assert None not in values[2]

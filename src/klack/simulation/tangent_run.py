@@ -30,7 +30,7 @@ from klack.errors import ConvergenceError, InputError
 from klack.machine.memory import require_memory
 from klack.network.accuracy import Accuracy
 from klack.network.rows import Rows
-from klack.simulation.impact_events import ImpactFinder
+from klack.simulation.impact_events import ImpactFinder, judged
 from klack.simulation.network_arrays import PARTS, scratch_memory
 from klack.simulation.network_compile import compile_network
 from klack.simulation.network_kernel import CLOCK
@@ -179,6 +179,8 @@ class TangentRun:
             replace(event, energy_loss=heavier.get(event.stop, 1.0) * event.energy_loss)
             for event in finder.events(result.channels)
         )
+        until, none = float(time[-1]), np.empty((0, 0))
+        events, _ = judged(events, self.rows, result.interfaces, until, none, {})
         return replace(result, events=events)
 
     def _heavier(self, direction: int, amount: float) -> dict[str, float]:
