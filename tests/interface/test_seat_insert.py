@@ -60,9 +60,7 @@ def test_the_seat_is_a_stop_below_the_body_of_the_lift(tmp_path, name):
         klack.load_case(tmp_path / "case.yaml")
 
 
-def test_the_lift_is_that_of_the_point_at_the_named_seat(tmp_path):
-    """A needle on two seats: the default point of the lift follows the key."""
-    valve = """
+TWO_SEATS = """
 klack: 1
 title: Two seats
 network:
@@ -70,15 +68,36 @@ network:
     needle: {type: rigid-mass, mass: 3 g, points: [inner, outer, top]}
     one: {type: end-stop, gap: 0 um, law: {kind: linear, stiffness: 1e8 N/m}}
     two: {type: end-stop, gap: 1 um, law: {kind: linear, stiffness: 1e8 N/m}}
+    stop: {type: end-stop, gap: 50 um, law: {kind: linear, stiffness: 1e8 N/m}}
     spring: {type: spring, stiffness: 10 N/mm, preload: 12 N}
+    magnet: {type: force-over-time, time: [10 us, 60 us], force: [60 N, 0 N]}
   connections:
     - [needle.inner, one.upper]
     - [needle.outer, two.upper]
     - [one.lower, two.lower, ground]
-    - [needle.top, spring.end]
+    - [needle.top, spring.end, magnet.end, stop.lower]
+    - [ground, stop.upper]
 run: {duration: 1 ms, variants: [dry], seat: NAME}
 """
+
+
+def on_two_seats(folder, name):
+    (folder / "case.yaml").write_text(TWO_SEATS.replace("NAME", name), "utf-8")
+    return klack.load_case(folder / "case.yaml")
+
+
+def test_the_lift_is_that_of_the_point_at_the_named_seat(tmp_path):
+    """A needle on two seats: the default point of the lift follows the key."""
     for name, point in (("one", "inner"), ("two", "outer")):
-        (tmp_path / "case.yaml").write_text(valve.replace("NAME", name), "utf-8")
-        roles = find_roles(klack.load_case(tmp_path / "case.yaml").checked)
+        roles = find_roles(on_two_seats(tmp_path, name).checked)
         assert (roles.seat, roles.point) == (name, point)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["one", "two"])
+def test_a_needle_closes_when_it_touches_the_named_seat(tmp_path, name):
+    """Also where that is not the stop that ends its travel, which it touches before."""
+    variant = klack.run_stroke(on_two_seats(tmp_path, name), ["dry"]).record.reference
+    touches = [event.time for event in variant.result.events if event.stop == name]
+    assert variant.closing_time == touches[0]
+    assert variant.times[0].closing.stop == name

@@ -481,7 +481,7 @@ def variant_of(
     ``until`` [s] is the end of the run, by default that of its records.
     """
     result = seen_from_valve(result, rows, (roles.seat, roles.opening_stop))
-    times = all_lift_times(result, rows, roles.needle, roles.point)
+    times = all_lift_times(result, rows, roles.needle, roles.point, valve.case.run.seat or "")
     wet, flexible = not name.startswith("dry"), not name.endswith("lumped")
     measured = valve.case.measurement
     return StrokeVariant(

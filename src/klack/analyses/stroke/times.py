@@ -79,11 +79,12 @@ class LiftTimes:
 
 
 def all_lift_times(
-    result: NetworkResult, rows: Rows, needle: str, point: str
+    result: NetworkResult, rows: Rows, needle: str, point: str, seat: str = ""
 ) -> tuple[LiftTimes, ...]:
     """Times of the needle first, then of every other body that stops hold on both sides.
 
-    ``point`` is the port of the needle whose displacement is the lift.
+    ``point`` is the port of the needle whose displacement is the lift, ``seat`` the stop that it
+    closes where that is none of those at the end of its travel.
     """
     travel = Travel.of(rows)
     found = []
@@ -92,6 +93,8 @@ def all_lift_times(
         port = point if is_needle else row.names[0]
         displacement = result.channels[f"{row.component}.{port} displacement"].values
         (low, high), stops = travel.lift(row.component, float(displacement[0]))
+        if is_needle and seat and seat not in stops[0]:
+            stops = ((seat,), stops[1])
         if row.body.rigid_count == 0 or not (
             is_needle or (isfinite(high - low) and high - low > _NO_LIFT)
         ):
