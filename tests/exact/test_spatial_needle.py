@@ -236,6 +236,15 @@ def test_a_needle_that_nothing_holds_is_told():
         move(needle.rows({"load": pull(-5.0)}), needle.valve(), 5e-6)
 
 
+def test_the_record_of_a_contact_begins_with_its_force_at_rest():
+    """Newton: 5 N press the needle on its seat, and on nothing else; 1e-9 is left at rest."""
+    run = move(ROUND.rows({"land": pull(-5.0)}), ROUND.valve(), 5e-6)
+
+    for what in ("contact", "peak"):
+        assert run.channels[f"seat {what} force"].values[0] == pytest.approx(5.0, rel=1e-9)
+        assert run.channels[f"opening {what} force"].values[0] == 0.0
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_points_that_nobody_watched_close_as_well(seed):
     """Against the problem of all points at once, which has one solution; round-off."""

@@ -44,6 +44,9 @@ class MovingBodies(Protocol):
     ) -> int:
         """Advance by ``looks`` of ``look`` times ``block`` fine steps; a status."""
 
+    def pressing(self) -> Vector:
+        """Contact force of each interface at rest [N]."""
+
     def turning(self) -> dict[str, tuple[Vector, Vector]]:
         """Times [s] and energies of rotation [J] of each component that moves."""
 

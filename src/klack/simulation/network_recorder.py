@@ -351,6 +351,8 @@ def values_now(network: CompiledNetwork, speeds: Vector, h: float) -> tuple[Vect
     ]
     flows = branches.outputs[branches.output0[:-1]]
     pressing, friction = _interfaces(network, speeds, h), _sliders(network, speeds)
+    if network.moving is not None:
+        pressing[:, 0] += network.moving.pressing()
     states = [*_states(elements, rows.elements), *_states(branches, rows.branches)]
     return (
         np.concatenate(

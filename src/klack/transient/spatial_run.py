@@ -412,6 +412,10 @@ class _Moving:
     def gap(self) -> Vector:
         return np.full(len(self.order), -_AWAY)
 
+    def pressing(self) -> Vector:
+        """Contact force of each interface at rest [N]."""
+        return self.stops.force[np.argsort(self.order)]
+
     def channels(self, time: Vector) -> dict[str, ChannelData]:
         """Lateral displacement of the axis of the needle, and the forces of the guide."""
         told: dict[str, ChannelData] = {}
