@@ -238,7 +238,8 @@ def test_a_needle_that_nothing_holds_is_told():
 
 def test_the_record_of_a_contact_begins_with_its_force_at_rest():
     """Newton: 5 N press the needle on its seat, and on nothing else; 1e-9 is left at rest."""
-    run = move(ROUND.rows({"land": pull(-5.0)}), ROUND.valve(), 5e-6)
+    load = pull(-5.0, 30.0, over=(0.0, 2e-6))
+    run = move(ROUND.rows({"land": load}), ROUND.valve(), 20e-6)
 
     for what in ("contact", "peak"):
         assert run.channels[f"seat {what} force"].values[0] == pytest.approx(5.0, rel=1e-9)
