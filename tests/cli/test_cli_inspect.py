@@ -390,6 +390,38 @@ def test_a_valve_shows_travels_pairs_and_a_first_speed(tmp_path: Path, capsys):
     assert "on 1.6 g over 100 um; faster, as needle pushes it at first" in shown
 
 
+def test_a_body_pushes_all_that_lie_below_it(tmp_path: Path, capsys):
+    """By hand: 60 N and 1 N/mm over 50 um are 3 mJ, on 6 g 1 m/s, also in another order."""
+    masses = ["c: 3", "a: 1", "b: 2"]
+    law = "law: {kind: linear, stiffness: 1e8 N/m}}"
+    lines = [
+        "klack: 1",
+        "title: Three bodies in a row",
+        "network:",
+        "  components:",
+        *(f"    {m[0]}: {{type: rigid-mass, mass: {m[3]} g, points: [low, top]}}" for m in masses),
+        *(f"    {name}: {{type: end-stop, gap: 0 um, {law}" for name in ("ab", "bc", "seat")),
+        f"    stop: {{type: end-stop, gap: 50 um, {law}",
+        "    spring: {type: spring, stiffness: 1 N/mm, preload: 60 N}",
+        "  connections:",
+        "    - [a.low, ab.upper]",
+        "    - [b.top, ab.lower]",
+        "    - [b.low, bc.upper]",
+        "    - [c.top, bc.lower]",
+        "    - [c.low, seat.upper]",
+        "    - [seat.lower, stop.upper, ground]",
+        "    - [a.top, spring.end, stop.lower]",
+        "run: {duration: 1 ms, variants: [dry], lift: c.low}",
+    ]
+    (tmp_path / "row.yaml").write_text("\n".join(lines), encoding="utf-8")
+
+    assert main(["inspect", str(tmp_path / "row.yaml")]) == 0
+
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "a 1 m/s: springs 3 mJ, pressures 0 J on 6 g with b and c over 50 um" in shown
+    assert "on 3 g over 50 um; faster, as a pushes it at first" in shown
+
+
 def test_a_body_that_falls_faster_than_what_is_above_it_is_not_pushed(tmp_path: Path, capsys):
     """By hand: the coupling of 60 N on the armature of 0.2 g; the needle closes with 25 N less it.
 

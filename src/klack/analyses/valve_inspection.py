@@ -1,6 +1,6 @@
 """What a stroke of a valve will move: bodies, what meets at each stop, and a first speed."""
 
-from collections.abc import Container, Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping, Sequence
 from math import isfinite, sqrt
 
 from klack.case.valve import ValveCase
@@ -122,22 +122,35 @@ def _speeds(
 
     ways = {body: high - low for body, (low, high) in lifts.items() if masses.get(body, 0.0) > 0.0}
     ways = {body: way for body, way in ways.items() if isfinite(way) and way > 0.0}
-    pushes: dict[str, str] = {}
-    for body, way in ways.items():
-        for other in ways:
-            if _rests(network, meetings, body, other, lifts[body][1] - lifts[other][1]):
-                alone = [sum(works(name, way)) / masses[name] for name in (body, other)]
-                if alone[0] > alone[1]:
-                    pushes[other] = body
-    for body, way in ways.items():
-        group = [body, *(other for other, by in pushes.items() if by == body)]
+
+    def total(way: float, group: Sequence[str]) -> tuple[float, float, float]:
+        """Work of springs and of pressures [J], and mass [kg]."""
         springs, fluid = (sum(e) for e in zip(*(works(n, way, group) for n in group), strict=True))
-        mass, work = sum(masses[name] for name in group), springs + fluid
+        return springs, fluid, sum(masses[name] for name in group)
+
+    def rate(way: float, group: Sequence[str]) -> float:
+        springs, fluid, mass = total(way, group)
+        return (springs + fluid) / mass
+
+    groups = {body: [body] for body in ways}
+    for body, way in ways.items():
+        group = groups[body]
+        for above in group:  # it grows by those below, which may push others
+            for other in ways:
+                apart = lifts[above][1] - lifts[other][1]
+                if other not in group and _rests(network, meetings, above, other, apart):
+                    if rate(way, group) > rate(way, [other]):
+                        group.append(other)
+    for body, way in ways.items():
+        group = groups[body]
+        springs, fluid, mass = total(way, group)
+        work = springs + fluid
         beside = f" with {' and '.join(group[1:])}" if group[1:] else ""
         parts = f"springs {format_si(springs, 'J', 3)}, pressures {format_si(fluid, 'J', 3)}"
         speed = f"{sqrt(2.0 * work / mass):.3g} m/s" if work > 0.0 else "does not close by itself"
         on = f"{1e3 * mass:.4g} g{beside} over {format_si(way, 'm', 4)}"
-        first = f"; faster, as {pushes[body]} pushes it at first" if body in pushes else ""
+        above = next((name for name in ways if name != body and body in groups[name]), "")
+        first = f"; faster, as {above} pushes it at first" if above else ""
         yield "speed", body, f"{speed}: {parts} on {on}{first}"
 
 
