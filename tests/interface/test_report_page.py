@@ -261,6 +261,28 @@ def test_the_label_of_a_band_that_begins_before_the_axis_is_seen_whole():
     assert box.x1 <= frame.x1
 
 
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("full order, 87132 degrees of freedom", "reduced, 20 + 40 modes, consistent law"),
+        ("MMMMMMMMMMMMMMMMMMM", "MMMMMMMMMMMMMMMMMM", "WWWWWWWWWWWWWWWWWWW"),
+    ],
+    ids=["two", "three"],
+)
+def test_a_legend_is_seen_whole(names: tuple[str, ...]):
+    x = np.linspace(0.0, 1.0, 5)
+    curves = tuple(Curve(x=x, y=x, label=name) for name in names)
+    panel = Panel(y=AxisSpec(label="y"), curves=curves)
+    axes = shown_chart(Chart(name="long", title="long", x=AxisSpec(label="x"), panels=(panel,)))
+    axes.figure.draw_without_rendering()
+    (legend,) = axes.figure.legends
+    frame, box = axes.figure.bbox, legend.get_window_extent()
+    pyplot.close(axes.figure)
+
+    assert frame.x0 <= box.x0
+    assert box.x1 <= frame.x1
+
+
 @pytest.mark.parametrize("at", [0.0, 0.3, 0.7, 1.0])
 def test_a_label_stays_within_its_plot(at: float):
     """At the left end right of its line, at the right end left of it; drawn and measured."""

@@ -372,7 +372,11 @@ def _legend(figure: Figure, grid: Any) -> None:
     if not entries:
         return
     longest = max(map(len, entries))
-    columns = 3 if longest < 20 else 2 if longest < 40 else 1
-    figure.legend(
-        entries.values(), entries.keys(), loc="outside upper left", ncols=min(columns, len(entries))
-    )
+    most = min(3 if longest < 20 else 2 if longest < 40 else 1, len(entries))
+    for columns in range(most, 0, -1):  # as many as the width holds
+        legend = figure.legend(
+            entries.values(), entries.keys(), loc="outside upper left", ncols=columns
+        )
+        if columns == 1 or legend.get_window_extent().width <= figure.bbox.width:
+            return
+        legend.remove()
