@@ -74,6 +74,25 @@ def test_a_mistake_in_a_fit_is_one_error_with_its_place(tmp_path, changes, messa
         changed(tmp_path, *changes)
 
 
+def test_parts_that_another_one_joins_are_one_error_with_its_place(tmp_path):
+    """It is found only with the mesh, and names the line of the joint all the same."""
+    lid = [
+        {"line": [2.5, 19.4], "name": "top"},
+        {"line": [5, 19.4], "name": "disc_top"},
+        {"line": [5, 20], "name": "rim"},
+        {"line": [0, 20], "name": "lid_top"},
+        {"close": True, "name": "lid_axis"},
+    ]
+    case = changed(
+        tmp_path,
+        (*PARTS, "lid", {"start": [0, 19.4], "edges": lid}),
+        (*NEEDLE, "material", "steel"),
+    )
+    place = r"case\.yaml:\d+: bodies\.needle\.fits\.joint: "
+    with pytest.raises(InputError, match=place + ".*glued to each other by other parts"):
+        press_fits(case, "needle")
+
+
 def test_a_body_that_is_not_drawn_has_no_fits(tmp_path):
     """A STEP file, and a mesh."""
     for name in ("a.step", "a.inp"):

@@ -13,6 +13,7 @@ from klack.bodies.elasticity.eigen import eigenmodes
 from klack.bodies.elasticity.press_fit import pressed_state
 from klack.bodies.elasticity.stress import work_of_stress
 from klack.case.bodies import CaseFile, Fit
+from klack.case.placed_errors import tells_place
 from klack.errors import InputError
 from klack.materials.material import Material
 from klack.mesh.joint import cylinder_joint
@@ -139,6 +140,7 @@ class PressFit:
         )
 
 
+@tells_place
 def press_fits(case: CaseFile, body: str) -> tuple[PressFit, ...]:
     """State of the press fits of a body, as drawn and free."""
     given = case.bodies[body]
@@ -159,7 +161,7 @@ def press_fits(case: CaseFile, body: str) -> tuple[PressFit, ...]:
         if not error.where.startswith("fits"):
             raise
         raise InputError(
-            f"{case.path or 'case'}: bodies.{body}.{error.where}",
+            f"bodies.{body}.{error.where}",
             got=error.got,
             expected=error.expected,
             hint=error.hint,
