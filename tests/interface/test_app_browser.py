@@ -440,12 +440,18 @@ window.release = () => { const all = window.heard; window.heard = null; all.forE
 """
 
 
-def test_what_is_pressed_before_the_server_listens_is_done_once_it_does(page, server, folder):
+def _typed_early(page, server):
+    """The text area of a case, typed into before the server listens."""
     page.add_init_script(LATE)
     page.goto(f"{server.base}/case?path={CASE}")
     area = page.get_by_label("case file, YAML")
     area.fill("klack: 1\ntitle: early\n")
     page.wait_for_selector("#k-link >> text=connecting")
+    return area
+
+
+def test_what_is_pressed_before_the_server_listens_is_done_once_it_does(page, server, folder):
+    area = _typed_early(page, server)
     assert not page.evaluate("window.did_handshake")
     page.evaluate("window.release()")
 
@@ -458,11 +464,7 @@ def test_what_is_pressed_before_the_server_listens_is_done_once_it_does(page, se
 
 def test_text_discarded_at_once_stays_discarded(page, server, folder):
     """It was typed while the server did not listen; the page looks at the clock only later."""
-    page.add_init_script(LATE)
-    page.goto(f"{server.base}/case?path={CASE}")
-    area = page.get_by_label("case file, YAML")
-    area.fill("klack: 1\ntitle: early\n")
-    page.wait_for_selector("#k-link >> text=connecting")
+    area = _typed_early(page, server)
     page.evaluate("window.paused = true; window.release()")
     page.wait_for_selector("text=not valid, not saved")
     page.get_by_role("button", name="Discard changes").click()
