@@ -48,6 +48,7 @@ def changed(folder, *changes, source="pressed_armature.yaml"):
     [
         ([(*FIT, "interference", "-8 um")], r"fits\.joint\.interference: got .*-8 um"),
         ([(*FIT, "friction", -0.1)], r"fits\.joint\.friction: got .*-0\.1"),
+        ([(*FIT, "friction", 12)], r"fits\.joint\.friction: got 12, expected a value 2 or less"),
         ([(*FIT, "friction", None)], r"fits\.joint: got no key 'friction'"),
         ([(*FIT, "interference", "8 N")], r"fits\.joint\.interference: got"),
         ([(*NEEDLE, "fits", {"joints": {"interference": "8 um", "friction": 0.1}})],

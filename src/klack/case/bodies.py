@@ -19,6 +19,7 @@ from klack.case.geometry import Geometry, MeshSettings, Support
 from klack.case.origin import ExpandedCase
 from klack.case.parameters import PARAMETERS, Written
 from klack.case.plausible import GO_ON, Number
+from klack.contact.friction import MOST_FRICTION
 from klack.errors import InputError
 from klack.input.problem import CaseProblem, Key, key_text, nearest, one_of
 from klack.input.section import Count, Name, NamedSection, PlainName, Section, Text
@@ -244,7 +245,10 @@ class Fit(Section):
         "of the outer one.",
     )
     friction: Ratio = Field(
-        ge=0, examples=[0.12], description="Coefficient of friction that holds force and torque."
+        ge=0,
+        le=MOST_FRICTION,
+        examples=[0.12],
+        description="Coefficient of friction that holds force and torque.",
     )
 
 
