@@ -36,6 +36,7 @@ PARTS = {
     "limit": "bytes moved against the bandwidth of the machine",
     "reduced_peers": "solve_ivp, CVODE and FMPy on the same reduced model",
     "ngsolve_peer": "NGSolve: assembly and modes on the same mesh",
+    "modal_peers": "SciPy with PARDISO, and CalculiX: factor and modes on the same mesh",
     "calculix": "CalculiX: an impact in 3-D on the same mesh",
     "growth": "every stage over degrees of freedom",
     "volumes": "the time loop over volumes, stops, bodies, contact points and duration",

@@ -6,7 +6,7 @@ are skipped.
 
 import shutil
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from datetime import UTC, datetime
 from importlib.util import find_spec
 from pathlib import Path
@@ -313,12 +313,19 @@ def _fmus(folder: Path) -> Iterator[Check]:
             )
 
 
-_SECONDS = 60
 _TYPES = {"tet10": "C3D10", "hex20": "C3D20"}
 
 
-def calculix_frequencies(mesh: Mesh, material: Material, count: int, folder: Path) -> np.ndarray:
-    """Elastic frequencies [Hz] of a free body of ``tet10`` or ``hex20``, computed by CalculiX."""
+def calculix_frequencies(
+    mesh: Mesh,
+    material: Material,
+    count: int,
+    folder: Path,
+    *,
+    held: Iterable[int] = (),
+    seconds: float = 60.0,
+) -> np.ndarray:
+    """Elastic frequencies [Hz] of a body of ``tet10`` or ``hex20``, computed by CalculiX."""
     folder.mkdir()
     lines = ["*NODE"]  # fields have 20 columns at most
     lines += [f"{i},{x:.12e},{y:.12e},{z:.12e}" for i, (x, y, z) in enumerate(mesh.points * 1e3, 1)]
@@ -336,12 +343,13 @@ def calculix_frequencies(mesh: Mesh, material: Material, count: int, folder: Pat
         f"*ELASTIC\n{material.young * 1e-6:.12e},{material.poisson:.12e}",
         f"*DENSITY\n{material.density * 1e-12:.12e}",
         "*SOLID SECTION,ELSET=all,MATERIAL=m",
+        *("*BOUNDARY\n" + f"{node + 1},1,3" for node in held),
         # the shift of the solver does not like the six rigid modes at zero: it counts them too
         f"*STEP\n*FREQUENCY\n{count + 6}\n*END STEP\n",
     ]
     (folder / "body.inp").write_text("\n".join(lines))
     subprocess.run(
-        ["ccx", "-i", "body"], cwd=folder, check=False, capture_output=True, timeout=_SECONDS
+        ["ccx", "-i", "body"], cwd=folder, check=False, capture_output=True, timeout=seconds
     )
     found = _of_dat(folder / "body.dat")
     if len(found) < count:

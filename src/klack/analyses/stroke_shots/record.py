@@ -164,7 +164,9 @@ RESULTS: tuple[Measure[Row], ...] = described_in(
         name="structure-borne energy",
         symbol="W_in",
         unit="J",
-        definition="Work of the stops on the modes of the held bodies, along the axis.",
+        definition="Work of the stops on the modes of the held bodies, along the axis; negative "
+        "where no impact follows when a pressed face is let go, which gives its elastic energy "
+        "back.",
     ),
     Measure(
         key="delivered_mass",
