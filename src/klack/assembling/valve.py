@@ -52,6 +52,7 @@ __all__ = [
     "build_valve_bodies",
     "filled_network",
     "mesh_valve_bodies",
+    "valve_of_bodies",
     "valve_parts",
 ]
 
@@ -96,7 +97,17 @@ def build_valve(
         Of the solvers, which decide the last bits; default: all cores.  Bodies of few unknowns
         always take one, which is faster.
     """
-    bodies = build_valve_bodies(case, progress)
+    return valve_of_bodies(case, build_valve_bodies(case, progress), progress, threads=threads)
+
+
+def valve_of_bodies(
+    case: ValveCase,
+    bodies: Mapping[str, ElasticBody],
+    progress: Progress,
+    *,
+    threads: int | None = None,
+) -> Valve:
+    """As :func:`build_valve`, of meshed and assembled bodies."""
     if case.motion == "three-dimensional":
         check_heights(case, find_roles(case), bodies)
     # side by side, unless one of them is worth several threads

@@ -16,6 +16,7 @@ from klack.input.problem import CaseProblem, Key, nearest, one_of
 from klack.units import format_si
 
 __all__ = [
+    "BACKING_LEVELS",
     "GIVEN_LEVELS",
     "check_body",
     "check_consistency",
@@ -187,6 +188,7 @@ def check_consistency(case: ImpactSections) -> None:
     for check in (
         _check_local_law,
         _check_opposite,
+        _check_backing,
         _check_roughness,
         _check_solid_only,
         _check_off_axis,
@@ -250,13 +252,26 @@ def check_shifts(case: CaseFile, reduction: Reduction) -> None:
 
 
 def _check_bodies(case: ImpactSections) -> None:
-    count, words = (2, "two") if case.opposite is None else (3, "three")
+    if case.opposite is not None and case.backing is not None:
+        raise CaseProblem(
+            ("backing",),
+            got="a body behind the struck one together with an upper stop",
+            expected="one of them: no level has both",
+            hint="remove 'backing' or 'opposite'; a stroke has both (klack stroke).",
+            on_key=True,
+        )
+    has_third = case.opposite is not None or case.backing is not None
+    count, words = (3, "three") if has_third else (2, "two")
     if len(case.bodies) != count:
+        names = [side.body for side in case.contact.between]
+        third = next((name for name in case.bodies if name not in names), "housing")
         raise CaseProblem(
             ("bodies",),
             got=f"{len(case.bodies)} bodies ({one_of(case.bodies)})",
             expected=f"exactly {words}",
-            hint="one that moves and one that it hits; with 'opposite' also the upper stop.",
+            hint="one that moves and one that it hits; a third one as an upper stop ('opposite'), "
+            "or behind the struck one: "
+            f"'backing: {{between: [{names[1]}.SURFACE, {third}.SURFACE]}}'.",
         )
 
 
@@ -384,6 +399,111 @@ def _check_opposite(case: ImpactSections) -> None:
             expected="all bodies axisymmetric or all three-dimensional",
             hint="take 'model: swept' with 'layers: 18'.",
         )
+
+
+BACKING_LEVELS = ("reduced",)
+"""Levels that know a third body behind the struck one."""
+
+
+def _check_backing(case: ImpactSections) -> None:
+    """A loose body in the middle, met along the axis by elastic, smooth faces as drawn."""
+    backing = case.backing
+    if backing is None:
+        return
+    for i, surface in enumerate(backing.between):
+        check_surface(case, ("backing", "between", i), surface)
+    lower, third = backing.between
+    moving, struck = case.contact.between
+    if lower.body != struck.body or third.body in (moving.body, struck.body) or lower == struck:
+        raise CaseProblem(
+            ("backing", "between"),
+            got=f"{lower} and {third}",
+            expected=f"another surface of '{struck.body}', then one of the third body",
+            hint="the order is needle, insert, housing.",
+        )
+    middle, last = case.bodies[struck.body], case.bodies[third.body]
+    if middle.fixed:
+        raise CaseProblem(
+            ("bodies", struck.body, "fixed"),
+            got=f"supports of '{struck.body}', and a body behind it",
+            expected="no supports there: its contact with the body behind carries it",
+            hint="remove 'fixed', or 'backing' and the third body.",
+            on_key=True,
+        )
+    if last.geometry.dimension != case.dimension and case.has_surfaces:
+        raise CaseProblem(
+            ("bodies", third.body, "geometry", "model"),
+            got=f"'{third.body}' of another dimension than the moving body",
+            expected="all bodies axisymmetric or all three-dimensional",
+            hint="take 'model: swept' with 'layers: 18'.",
+        )
+    if backing.clamp is not None:
+        key: Key = ("backing", "clamp", "surface")
+        check_surface(case, key, SurfaceName(body=struck.body, surface=backing.clamp.surface))
+        if backing.clamp.surface in (lower.surface, struck.surface):
+            raise CaseProblem(
+                key,
+                got=f"'{backing.clamp.surface}', where '{struck.body}' meets another body",
+                expected="a surface of its own, such as a shoulder",
+                hint="split the edge in the drawing.",
+            )
+        if not last.fixed:
+            raise CaseProblem(
+                ("backing", "clamp"),
+                got=f"a clamp, but nothing holds '{third.body}'",
+                expected=f"bodies.{third.body}.fixed: a surface that takes the preload",
+                hint="add 'fixed: [{surface: NAME}]' to it, or remove 'clamp'.",
+                on_key=True,
+            )
+    _check_beside_backing(case)
+
+
+def _check_beside_backing(case: ImpactSections) -> None:
+    """Reject what an impact with a body behind does not have."""
+    contact, motion, run = case.contact, case.motion, case.run
+    straight = motion.placement.is_centred and motion.is_straight
+    laws = {contact.local_law.kind, "" if case.backing is None else case.backing.local_law.kind}
+    rubs = "friction" if contact.friction else "static_friction"
+    others = [level for level in run.levels if level not in BACKING_LEVELS]
+    asked: list[tuple[Key, object, str]] = [
+        (("bodies",), not case.has_surfaces, "a body without surfaces"),
+        (
+            ("run", "levels") if "levels" in run.model_fields_set else ("run",),
+            others,
+            "other levels",
+        ),
+        (("motion",), not straight, "a motion off the axis"),
+        (("guide",), case.guide, "a guide"),
+        (("shots",), case.shots, "shots"),
+        (("measurement",), case.measurement, "a measurement"),
+        (("outputs",), case.outputs, "sensors"),
+        (("contact", rubs), not contact.faces.is_none, "friction of the faces"),
+        (("contact", "roughness"), contact.roughness, "rough faces"),
+        (("contact", "crown"), contact.crown, "a crown"),
+        (("contact", "waviness"), contact.waviness, "waviness"),
+        (("contact", "tilt"), contact.tilt, "a tilt"),
+        (("contact", "worn"), contact.worn, "worn faces"),
+        (("contact", "local_law"), not laws <= {"consistent", "linear", ""}, "such a local law"),
+        (("run", "impacts"), run.impacts > 1, "several impacts"),
+        (("run", "run_in"), run.run_in, "running in"),
+        (("run", "transfer"), run.transfer, "transfer functions"),
+        (("reduction", "correction"), case.reduction.correction != "consistent", "this correction"),
+        (("reduction", "shifts"), case.reduction.shifts, "shifts"),
+    ]
+    for key, is_there, what in asked:
+        if is_there:
+            raise CaseProblem(
+                key,
+                got=f"{what}, and a body behind the struck one",
+                expected="an impact along the axis at 'levels: [reduced]', of meshed bodies with "
+                "smooth faces as drawn and consistent or linear laws",
+                hint=f"remove '{key[-1]}', or 'backing' and the third body, or run a stroke "
+                "(how-to/seat-insert)."
+                if key[0] != "run" or not others
+                else "write 'levels: [reduced]'; klack stroke takes three bodies in three "
+                "dimensions.",
+                on_key=True,
+            )
 
 
 def _check_roughness(case: ImpactSections) -> None:

@@ -5,7 +5,7 @@ from typing import Self
 
 from pydantic import model_validator
 
-from klack.case.consistency import check_consistency, check_noise
+from klack.case.consistency import BACKING_LEVELS, check_consistency, check_noise
 from klack.case.impact_sections import ImpactSections
 from klack.case.levels import LEVELS, OBLIQUE_LEVELS, OFF_AXIS_LEVELS, ROUGH_LEVELS, Level
 from klack.errors import InputError
@@ -44,6 +44,9 @@ class Case(ImpactSections):
                     expected="its stiffness, required by the level 'lumped'",
                     hint="add 'lumped: {stiffness: 1e9 N/m}'.",
                 )
+        for level in wanted:
+            if level not in BACKING_LEVELS:
+                self.require_pair(f"the level '{level}'")
         left_out = [level for level in wanted if level not in ROUGH_LEVELS]
         if self.contact.roughness is not None and left_out:
             raise InputError(
@@ -60,8 +63,20 @@ class Case(ImpactSections):
             raise self._off_axis(f"the level '{on_axis[0]}'")
         return tuple(level for level in LEVELS if level in wanted)
 
+    def require_pair(self, what: str) -> None:
+        """Reject a third body behind the struck one."""
+        if self.backing is not None:
+            raise InputError(
+                f"{self._path or 'case'}: backing",
+                got=f"{what} of three bodies in a row",
+                expected=f"klack impact with --level {one_of(BACKING_LEVELS)}",
+                hint="take that; or remove 'backing' and draw the struck body and the one behind "
+                "it as one, glued (how-to/two-materials).",
+            )
+
     def require_on_axis(self, what: str) -> None:
-        """Reject off-axis axisymmetric bodies: interface level alone; and oblique motion."""
+        """Reject off-axis axisymmetric bodies, oblique motion and a body behind the struck one."""
+        self.require_pair(what)
         self.require_straight(what)
         if self.leaves_axis:
             raise self._off_axis(what)

@@ -53,6 +53,14 @@ def _of_contacts(case: CaseFile) -> Iterator[_Named]:
         pairs = [(("contact", "between"), case.contact.between)]
         if case.opposite is not None:
             pairs.append((("opposite", "between"), case.opposite.between))
+        if case.backing is not None:
+            pairs.append((("backing", "between"), case.backing.between))
+            if case.backing.clamp is not None:
+                yield (
+                    ("backing", "clamp", "surface"),
+                    case.contact.stop.body,
+                    case.backing.clamp.surface,
+                )
         if case.guide is not None:
             yield ("guide", "surface"), case.contact.moving.body, case.guide.surface
         for key, between in pairs:

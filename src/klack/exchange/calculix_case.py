@@ -33,6 +33,7 @@ def calculix_impact(case: Case, progress: Progress) -> CalculixImpact:
             hint="use 'model: swept' (with layers) or 'model: solid' in both geometries.",
         )
     case.require_ends("a deck")
+    case.require_pair("a deck")
     case.require_straight("a deck")
     forms = ("crown", "waviness", "tilt", "roughness")
     form = next((key for key in forms if getattr(case.contact, key)), None)

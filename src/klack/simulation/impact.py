@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from math import pi, sqrt
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from klack.bodies.reduction.reduced_body import ReducedBody
@@ -81,6 +82,7 @@ class FlatSystem:
     blocks: tuple[BodyBlock, ...]
     omega: NDArray[np.float64]
     damping: NDArray[np.float64]
+    q: NDArray[np.float64]
     v: NDArray[np.float64]
     modes: StepMatrices
     contacts: Contacts
@@ -108,6 +110,7 @@ def flatten(system: ReducedSystem, velocities: Mapping[str, float], step: float)
     B = np.array([step_of.B1, step_of.B2])
     P = np.array([A[0] * B[0] + A[1] * B[1], A[2] * B[0] + A[3] * B[1]])
     rows, watch_q = _contact_rows(system, blocks, w.size)
+    q, gaps = _preloaded(system, blocks, rows, w)
     watch_v = np.zeros((len(blocks), w.size))
     for k, block in enumerate(blocks):
         rigid = block.body.rigid_count
@@ -125,11 +128,12 @@ def flatten(system: ReducedSystem, velocities: Mapping[str, float], step: float)
         blocks=tuple(blocks),
         omega=w,
         damping=z,
+        q=q,
         v=np.concatenate(speeds),
         modes=StepMatrices(A, B, P, push_index, B[:, push_index] * force[push_index]),
         contacts=Contacts(
             rows=rows,
-            gap=np.array([contact.gap for contact in system.contacts]),
+            gap=gaps,
             G=(rows * B[0]) @ rows.T,
             law_kind=np.array([law.kind for law in laws]),
             law_data=np.concatenate([law.parameters for law in laws]),
@@ -256,6 +260,53 @@ def _contact_rows(
     return watch[0::2] - watch[1::2], watch
 
 
+def _preloaded(
+    system: ReducedSystem,
+    blocks: list[BodyBlock],
+    rows: NDArray[np.float64],
+    w: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    r"""Modal positions, and gaps at position zero: the static state where contacts are preloaded.
+
+    :math:`\omega^2 q = f_0 + \varphi F_0`, and a gap that the law closes with :math:`F_0`. Springs
+    and constant forces must balance a free body.
+    """
+    loads = np.array([contact.preload for contact in system.contacts])
+    gaps = np.array([contact.gap for contact in system.contacts])
+    q = np.zeros(w.size)
+    if not loads.any():
+        return q, gaps
+    contact_force = loads @ rows
+    for block in blocks:
+        own = slice(block.first, block.last)
+        if not contact_force[own].any():
+            continue
+        held = w[own] > 0.0
+        force = contact_force[own] + block.basis.T @ block.constant
+        for phi, _, preload in block.springs:
+            force -= preload * (block.basis.T @ phi)
+        if np.any(np.abs(force[~held]) > _UNBALANCED * np.abs(contact_force[own]).max()):
+            raise InputError(
+                f"preload of '{block.body.name}'",
+                got=f"{loads.max():g} N that nothing balances",
+                expected="a spring or a constant force that presses the body as much",
+                hint="add it, or leave the preload out.",
+            )
+        q[own] = np.where(held, force / np.where(held, w[own], 1.0) ** 2, 0.0) - block.rest
+    closed = [_indentation(contact.law, contact.preload) for contact in system.contacts]
+    return q, gaps - closed - rows @ q
+
+
+def _indentation(law: InterfaceLaw | YieldingLaw, force: float) -> float:
+    """Indentation [m] at which a law has a force [N]."""
+    deep = 1e-9 if force else 0.0
+    while float(law.force(deep)) < force:
+        deep *= 2.0
+    found = scipy.optimize.brentq(lambda d: float(law.force(d)) - force, 0.0, deep, xtol=1e-21)
+    return float(found) if force else 0.0
+
+
+_UNBALANCED = 1e-6  # share of the preload on a free body
 _BALANCE = 1e-9  # energy residual that every run keeps, whatever its step
 
 
@@ -374,7 +425,7 @@ def simulate(
         )
     records = int(np.ceil(duration / (step * steps_per_record) * (1.0 - 1e-12)))
     contacts = len(system.contacts)
-    q, v = np.zeros(flat.v.size), flat.v.copy()
+    q, v = flat.q.copy(), flat.v.copy()
     record = Record.empty(records, contacts, flat.watched)
     record.v[0] = flat.watched.v @ v
     books = np.zeros(4 + 2 * contacts)
@@ -412,6 +463,8 @@ def simulate(
         own = slice(block.first, block.last)
         positions.append(block.basis @ (q[own] + block.rest))
         speeds.append(block.basis @ v[own])
+    displacement = record.q
+    displacement[1:] -= flat.watched.q @ flat.q
     pressed = tuple(_pressed(flat, c) for c in range(contacts))
     for pair, deep in zip(system.contacts, pressed, strict=True):
         if isinstance(pair.law, YieldingLaw):
@@ -431,7 +484,7 @@ def simulate(
         force=record.force,
         peak_force=record.peak,
         gap=record.gap,
-        displacement=record.q.reshape(records + 1, contacts, 2),
+        displacement=displacement.reshape(records + 1, contacts, 2),
         velocity=record.v,
         external_force=_external_forces(system, flat, records, step * steps_per_record, record.v),
         final_position=tuple(positions),
@@ -507,7 +560,8 @@ def _ledger(
 ) -> EnergyLedger:
     initial, work, spring, bodies = 0.0, 0.0, 0.0, []
     for block, q, v in zip(flat.blocks, positions, speeds, strict=True):
-        q0, v0 = block.basis @ block.rest, block.basis @ flat.v[block.first : block.last]
+        own = slice(block.first, block.last)
+        q0, v0 = block.basis @ (block.rest + flat.q[own]), block.basis @ flat.v[own]
         initial += _body_energy(block, q0, v0).total
         bodies.append(_body_energy(block, q, v))
         work += float(block.constant @ (q - q0))
@@ -516,8 +570,11 @@ def _ledger(
             spring += (y - y0) * (0.5 * stiffness * (y + y0) + preload)
     contact, at = 0.0, flat.contacts
     yields = bool(at.law_kind[0] == LAW_YIELDING)
-    for c in range(len(system.contacts)):
+    at_start = at.gap + at.rows @ flat.q
+    for c, pair in enumerate(system.contacts):
         gap, e = books[4 + 2 * c], books[5 + 2 * c]
+        if pair.preload:
+            initial += law_potential(at.law_kind[c], at.law_data, at.law_start[c], -at_start[c])
         contact += law_potential(at.law_kind[c], at.law_data, at.law_start[c], -gap - e)
         contact += 0.5 * e**2 / at.series[c] if e else 0.0
     return EnergyLedger(

@@ -34,6 +34,9 @@ class ContactPair:
         At the start.
     series_compliance [m/N]
         Massless linear compliance in series with the law, with its own state.
+    preload [N]
+        Force at the start, of the static state of both bodies under it and all that is constant;
+        the gap is then that of this force.
     """
 
     body_a: str
@@ -43,11 +46,21 @@ class ContactPair:
     law: InterfaceLaw | YieldingLaw
     gap: float
     series_compliance: float = 0.0
+    preload: float = 0.0
 
     def __post_init__(self) -> None:
         where = f"contact {self.body_a}.{self.port_a} on {self.body_b}.{self.port_b}"
         require_nonnegative(f"{where}: gap", self.gap, "m")
         require_nonnegative(f"{where}: series_compliance", self.series_compliance, "m/N")
+        require_nonnegative(f"{where}: preload", self.preload, "N")
+        if self.preload > 0.0 and (self.gap > 0.0 or self.series_compliance > 0.0):
+            raise InputError(
+                where,
+                got=f"a preload of {self.preload:g} N beside a gap or a series compliance",
+                expected="a contact that is closed at the start, all of whose compliance is in "
+                "modes and law",
+                hint="leave one of them out.",
+            )
         if self.body_a == self.body_b:
             raise InputError(
                 where,

@@ -12,6 +12,7 @@ import numpy as np
 from klack.analyses.analysis import Measured, StoredAnalysis
 from klack.analyses.contact_doubts import CONTACT, contact_doubt, elastic_above
 from klack.analyses.impact.measures import (
+    BACKING_MEASURES,
     CONTACT_TIME,
     DEVIATION_MEASURES,
     LEVEL_MEASURES,
@@ -77,6 +78,11 @@ _OBLIQUE = JsonForm(
     "Motion across the axis after the impact.",
     *measured_keys(OBLIQUE_MEASURES),
 )
+_BACKING = JsonForm(
+    "BackingJson",
+    "Contact of the struck body with the one behind it.",
+    *measured_keys(BACKING_MEASURES),
+)
 _LEVEL = JsonForm(
     "LevelJson",
     "Impact at one level.",
@@ -86,6 +92,12 @@ _LEVEL = JsonForm(
         (_OBLIQUE, None),
         "Null for a body that starts along the axis.",
         lambda level: None if level.oblique is None else level,
+    ),
+    Key(
+        "backing",
+        (_BACKING, None),
+        "Null for two bodies.",
+        lambda level: None if level.backing is None else level,
     ),
     Key("doubts", list[str], "Why the level may be wrong."),
     Key(
@@ -196,6 +208,11 @@ def study_told(study: ImpactStudy) -> Iterator[TextTable | str]:
     oblique = [item for item in study.levels.items() if item[1].oblique is not None]
     if oblique:
         yield text_table("Across the axis", "level", OBLIQUE_MEASURES, oblique)
+    row = [item for item in study.levels.items() if item[1].backing is not None]
+    for name, level in row:
+        assert level.backing is not None
+        title = f"Behind: {level.backing.surfaces}"
+        yield text_table(title, "level", BACKING_MEASURES, [(name, level)])
     yield answer_line(study)
     if doubt := contact_doubt(study.contact):
         yield doubt
@@ -393,6 +410,7 @@ IMPACT = StoredAnalysis(
     measures={
         "impact level": LEVEL_MEASURES,
         "oblique impact level": OBLIQUE_MEASURES,
+        "impact level of three bodies": BACKING_MEASURES,
         "difference of two levels": DEVIATION_MEASURES,
     },
     measured=study_measured,

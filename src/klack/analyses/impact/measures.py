@@ -10,6 +10,7 @@ from klack.contact.restitution import Deviation
 from klack.report.wording import count, quantity
 
 __all__ = [
+    "BACKING_MEASURES",
     "CONTACT_TIME",
     "DEVIATION_MEASURES",
     "LEVEL_MEASURES",
@@ -74,7 +75,7 @@ RESTITUTION = Measure[LevelResult](
     key="restitution",
     symbol="e",
     definition="Velocity of the centre of mass after the impact over that before it (relative "
-    "velocity of both centres where both are free).",
+    "velocity of both centres where both are free; of three bodies in a row, of the upper one).",
     note="It is a result of the vibration left in the bodies, never an input, and not "
     "the velocity of a point on the surface.",
     page=True,
@@ -133,6 +134,69 @@ OBLIQUE_MEASURES: tuple[Measure[LevelResult], ...] = described_in(
     ),
 )
 """Of levels that move a body sideways; no others have a value."""
+
+
+def _backing(read: Callable[..., float]) -> Callable[[LevelResult], float | None]:
+    """Read the contact with the third body; None for two bodies and for what does not happen."""
+
+    def found(level: LevelResult) -> float | None:
+        value = float("nan") if level.backing is None else read(level.backing)
+        return value if isfinite(value) else None
+
+    return found
+
+
+BACKING_MEASURES: tuple[Measure[LevelResult], ...] = described_in(
+    _THEORY,
+    Measure(
+        key="backing_peak_force",
+        symbol="F_2",
+        unit="N",
+        definition="Largest force between the struck body and the one behind it in the whole run, "
+        "with the preload.",
+        page=True,
+        read=_backing(lambda contact: contact.peak_force),
+        column=Column("N", 1.0, ".2f", "peak"),
+    ),
+    Measure(
+        key="backing_least_force",
+        symbol="F_2min",
+        unit="N",
+        definition="Smallest force there from its first contact on; 0 where the struck body lifts.",
+        page=True,
+        read=_backing(lambda contact: contact.least_force),
+        column=Column("N", 1.0, ".2f", "least"),
+    ),
+    Measure(
+        key="lift_off",
+        symbol="t_off",
+        unit="s",
+        definition="When the struck body first leaves the one behind it, from the start of the "
+        "run.",
+        page=True,
+        read=_backing(lambda contact: contact.lift_off),
+        column=Column("us", 1e6, ".3f", "lifts at"),
+    ),
+    Measure(
+        key="open_time",
+        symbol="t_open",
+        unit="s",
+        definition="How long the two are apart in all, after their first contact.",
+        page=True,
+        read=_backing(lambda contact: contact.open_time),
+        column=Column("us", 1e6, ".3f", "open"),
+    ),
+    Measure(
+        key="largest_gap",
+        symbol="g_2",
+        unit="m",
+        definition="Largest gap between the two after their first contact.",
+        page=True,
+        read=_backing(lambda contact: contact.largest_gap),
+        column=Column("um", 1e6, ".4f", "gap"),
+    ),
+)
+"""Of three bodies in a row; no others have a value."""
 
 LEVEL_MEASURES: tuple[Measure[LevelResult], ...] = described_in(
     _THEORY,
@@ -295,7 +359,12 @@ LEVEL_MEASURES: tuple[Measure[LevelResult], ...] = described_in(
 def measures_of(*levels: LevelResult) -> tuple[Measure[LevelResult], ...]:
     """Measures that any of these levels has."""
     oblique = any(level.oblique is not None for level in levels)
-    return (*LEVEL_MEASURES, *(OBLIQUE_MEASURES if oblique else ()))
+    backing = any(level.backing is not None for level in levels)
+    return (
+        *LEVEL_MEASURES,
+        *(OBLIQUE_MEASURES if oblique else ()),
+        *(BACKING_MEASURES if backing else ()),
+    )
 
 
 def _of_level(measure: Measure[LevelResult]) -> Measure[Deviation]:

@@ -20,6 +20,7 @@ from klack.mesh.skin import Skin
 
 __all__ = [
     "SETTLED",
+    "BackingContact",
     "BodyPicture",
     "ContactSummary",
     "FrictionRecord",
@@ -204,6 +205,64 @@ class ObliqueMotion:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class BackingContact:
+    """Contact of the struck body with the third one behind it, during the whole run.
+
+    Parameters
+    ----------
+    surfaces
+        For example ``"insert.foot on housing.ledge"``.
+    preload [N]
+        At the start.
+    """
+
+    surfaces: str
+    preload: float
+    history: ImpactHistory
+
+    @property
+    def peak_force(self) -> float:
+        """Largest force of any time step [N]."""
+        return float(self.history.peak_force.max())
+
+    @property
+    def least_force(self) -> float:
+        """Smallest force [N]; without a preload, after the first contact."""
+        return float(self.history.force[self._first :].min(initial=0.0 if self._none else np.inf))
+
+    @property
+    def lift_off(self) -> float:
+        """When the contact first opens, from the start of the run [s]; nan if it never does."""
+        opened = np.flatnonzero(self._open)
+        return float(self.history.edges[opened[0]]) if opened.size else float("nan")
+
+    @property
+    def open_time(self) -> float:
+        """Time without force after the first contact [s]."""
+        return float(self.history.step * np.count_nonzero(self._open))
+
+    @property
+    def largest_gap(self) -> float:
+        """After the first contact [m]; 0 if it never opens."""
+        return float(self.history.gap[self._open].max(initial=0.0))
+
+    @property
+    def _none(self) -> bool:
+        return not self.history.force.any()
+
+    @property
+    def _first(self) -> int:
+        """First record in contact; their number if there is none."""
+        closed = self.history.force > 0.0
+        return int(np.argmax(closed)) if closed.any() else closed.size
+
+    @property
+    def _open(self) -> NDArray[np.bool_]:
+        after = np.arange(self.history.force.size) >= self._first
+        return after & (self.history.force <= 0.0)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class LevelResult:
     """One computed impact.
 
@@ -234,6 +293,8 @@ class LevelResult:
         Output channels; none at the level lumped.
     oblique
         Of a body that starts sideways or with a spin.
+    backing
+        Of three bodies in a row.
     """
 
     level: str
@@ -253,6 +314,7 @@ class LevelResult:
     doubts: tuple[str, ...] = ()
     gauges: tuple[GaugeRecord, ...] = ()
     oblique: ObliqueMotion | None = None
+    backing: BackingContact | None = None
 
     def doubted(self, *doubts: str) -> Self:
         """The same with further doubts, if not empty."""

@@ -40,6 +40,7 @@ from klack.analyses.impact.record import (
 )
 from klack.analyses.impact.running_in import asks_for_more, points_running_in, running_in
 from klack.analyses.impact.section import section_picture
+from klack.analyses.impact.three_bodies import run_three_bodies
 from klack.analyses.impact.transfer import TRANSFER_MODES, compare_transfer
 from klack.analyses.impact.trust import (
     DISAGREEMENT,
@@ -165,6 +166,8 @@ def run_impact(
     _require_time_to_touch(case, case.contact.gap)
     if not case.has_surfaces:
         return run_given_impact(case, levels=wanted, progress=progress, threads=threads)
+    if case.backing is not None:
+        return run_three_bodies(case, progress=progress, threads=threads)
     clock = StageClock(progress, result_cache())
     with collected_warnings() as notes:
         placed = place_bodies(case, clock, threads=threads)

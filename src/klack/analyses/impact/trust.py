@@ -18,12 +18,15 @@ from math import isfinite, sqrt
 import numpy as np
 
 from klack.analyses.impact.record import LevelResult
+from klack.assembling.bodies import BodyPair
 from klack.assembling.problem import ContactProblem
 from klack.assembling.reduced_pair import ReducedPair
 from klack.bodies.elasticity.body import ElasticBody
 from klack.bodies.elasticity.eigen import Modes
+from klack.case.schema import Case
 from klack.contact.history import ImpactHistory
 from klack.contact.restitution import Deviation, ImpactMeasures, find_contacts
+from klack.contact.statics import StaticContact
 from klack.contact.touch_shape import area_at_once, front_pressure
 from klack.materials.material import Material
 from klack.units import format_si
@@ -36,6 +39,7 @@ __all__ = [
     "doubt_modal_levels",
     "doubts_of",
     "doubts_of_history",
+    "flat_doubt",
     "flat_for_modes",
     "flat_for_reduced",
     "trust_notes",
@@ -267,35 +271,41 @@ level is off by 18 % at a share of 0.36 and by 3 % at 0.18."""
 def flat_for_reduced(problem: ContactProblem, kept: ReducedPair) -> str:
     """Doubt about the reduced level, for faces that meet all at once."""
     highest = (float(body.frequencies.max(initial=0.0)) for body in (kept.upper, kept.lower))
-    return _doubt(problem, highest)
+    return flat_doubt(problem.case, problem.pair, problem.static, highest)
 
 
 def flat_for_modes(problem: ContactProblem, modes: Iterable[Modes]) -> str:
     """Doubt about the interface level with these modes of the bodies."""
     highest = (float(one.frequency.max(initial=0.0)) for one in modes)
-    return _doubt(problem, highest)
+    return flat_doubt(problem.case, problem.pair, problem.static, highest)
 
 
-def _doubt(problem: ContactProblem, highest: Iterable[float]) -> str:
-    pair, speed = problem.pair, problem.case.motion.speed
+def flat_doubt(case: Case, pair: BodyPair, static: StaticContact, highest: Iterable[float]) -> str:
+    """Doubt about faces that meet all at once, for the highest kept frequencies [Hz]."""
+    speed = case.motion.speed
     bodies = (pair.upper, pair.lower)
-    materials = [_material(problem, *one) for one in zip(bodies, pair.solids, strict=True)]
+    materials = [_material(case, *one) for one in zip(bodies, pair.solids, strict=True)]
     period = max((1.0 / one for one in highest if one > 0.0), default=0.0)
     if None in materials or period == 0.0:
         return ""
     pressure = front_pressure(speed, *(one for one in materials if one is not None))
     layer = 0.0 if pair.layer is None else pair.layer.closure_at(pressure)
-    area = area_at_once(problem.space, speed * period - layer)
+    area = area_at_once(static.space, speed * period - layer)
     front = area * pressure
-    if front < _SHARE * problem.static.max_force:
+    if front < _SHARE * static.max_force:
         return ""
-    contact = problem.case.contact
-    advice = (
-        "Try: more modes, or level full; the form that the case gives closes within that time."
-        if contact.has_form or contact.roughness is not None
-        else "Try: real faces (contact.crown, waviness, tilt, roughness; ground ends deviate by "
-        "0.2 to 5 um), more modes, or level full."
-    )
+    contact = case.contact
+    if case.backing is not None:
+        advice = "Try: faces as crowned in the drawing as real ones are, or more modes."
+    elif contact.has_form or contact.roughness is not None:
+        advice = (
+            "Try: more modes, or level full; the form that the case gives closes within that time."
+        )
+    else:
+        advice = (
+            "Try: real faces (contact.crown, waviness, tilt, roughness; ground ends deviate by "
+            "0.2 to 5 um), more modes, or level full."
+        )
     return (
         f"{1e6 * area:.3g} mm^2 of the faces meet all at once, within the shortest period of the "
         f"kept modes ({format_si(period, 's', 2)}): the force rises by about "
@@ -313,7 +323,7 @@ def doubt_modal_levels(
     return {name: result.doubted(doubts[name]) for name, result in results.items()}
 
 
-def _material(problem: ContactProblem, body: ElasticBody, solid: str) -> Material | None:
-    if problem.case.bodies[body.name].material is None:
+def _material(case: Case, body: ElasticBody, solid: str) -> Material | None:
+    if case.bodies[body.name].material is None:
         return None
-    return problem.case.materials_of(body.name, body.mesh.solids)[solid]
+    return case.materials_of(body.name, body.mesh.solids)[solid]

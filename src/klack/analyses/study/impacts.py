@@ -119,7 +119,7 @@ class _Impacts(PointKind[Case, _Built]):
         """
         if place[0] in _ASIDE:
             return place[:2] == ("run", "transfer")  # takes more modes
-        if case.opposite is not None:
+        if case.opposite is not None or case.backing is not None:
             return True
         is_damping = place[0] == "bodies" and place[2:3] == ("damping",)
         return not (is_damping or place[:2] in _OF_THE_IMPACT)
@@ -135,7 +135,7 @@ class _Impacts(PointKind[Case, _Built]):
         level = _level(asked)
         with ExitStack() as opened:
             bodies = shots = None
-            if level not in ("", "full") and case.has_surfaces:
+            if level not in ("", "full") and case.has_surfaces and case.backing is None:
                 bodies = impact_bodies(case, levels=(level,), progress=progress, threads=1)
                 opened.enter_context(bodies).placed.keep_no_more()
             if asked.variant.rpartition(_WITH)[2] == SHOTS:

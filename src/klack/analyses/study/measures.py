@@ -15,7 +15,7 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 
 from klack.acoustics.signal_statistics import SoundStatistics, sound_statistics
-from klack.analyses.impact.measures import LEVEL_MEASURES, OBLIQUE_MEASURES
+from klack.analyses.impact.measures import BACKING_MEASURES, LEVEL_MEASURES, OBLIQUE_MEASURES
 from klack.analyses.impact.record import LevelResult
 from klack.analyses.measures import Measure
 from klack.analyses.noise.body import Transfers
@@ -294,7 +294,9 @@ def _judged(found: DroppedShots, measure: Measure[RuleVerdict]) -> float | None:
 _OF_THE_CLOCK = ("wall_time", "setup_time")
 """Differ from run to run."""
 _OF_LEVELS = {
-    item.key: item for item in (*LEVEL_MEASURES, *OBLIQUE_MEASURES) if item.key not in _OF_THE_CLOCK
+    item.key: item
+    for item in (*LEVEL_MEASURES, *OBLIQUE_MEASURES, *BACKING_MEASURES)
+    if item.key not in _OF_THE_CLOCK
 }
 
 

@@ -1,0 +1,208 @@
+"""One impact of three bodies in a row: a needle on an insert that may leave its housing.
+
+The bodies and laws are those of a stroke (:mod:`klack.assembling.body_row`), the march that of any
+impact, with two contacts.  The interface level and the full order have one contact below the body
+that moves, so there is nothing to estimate the error with.
+"""
+
+import warnings
+from collections.abc import Iterator
+from dataclasses import replace
+from time import perf_counter
+
+import numpy as np
+
+from klack.analyses.impact.contact_check import ContactCheck, check_contact
+from klack.analyses.impact.levels import law_summary, level_result
+from klack.analyses.impact.record import (
+    BackingContact,
+    ContactSummary,
+    ImpactStudy,
+    LawSummary,
+    LevelResult,
+)
+from klack.analyses.impact.trust import flat_doubt, trust_notes
+from klack.analyses.record import case_fields, run_fields
+from klack.assembling.body_row import BACKING, CONTACT, BodyRow, build_row
+from klack.assembling.body_summary import BodySummary, summarise_body
+from klack.assembling.fits import press_fits
+from klack.bodies.reduction.reduced_body import elastic_count
+from klack.case.bodies import SurfaceName
+from klack.case.schema import Case
+from klack.contact.history import ImpactHistory
+from klack.errors import AccuracyWarning
+from klack.machine.cache.result_cache import result_cache
+from klack.machine.progress import Progress
+from klack.machine.stages import StageClock, collected_warnings
+from klack.simulation.impact import SystemRecord, simulate
+from klack.units import format_si
+
+__all__ = ["run_three_bodies"]
+
+_LEVEL = "reduced"
+_NO_ESTIMATE = (
+    "only the level 'reduced' has three bodies. Try: twice as many modes (reduction.modes), and "
+    "compare."
+)
+
+
+def run_three_bodies(case: Case, *, progress: Progress, threads: int | None = None) -> ImpactStudy:
+    """Compute one impact of three bodies at the level ``reduced``."""
+    begin = perf_counter()
+    clock = StageClock(progress, result_cache())
+    with collected_warnings() as notes:
+        row = build_row(case, clock, threads=threads)
+        clock("reduced", 0.0)
+        level = _run(case, row, clock.spent(("factorise", "static contact", "modes", "reduced")))
+        assert level.backing is not None
+        peaks = {CONTACT: level.measures.peak_force, BACKING: level.backing.peak_force}
+        checks = {name: _check(row, name, peak) for name, peak in peaks.items() if peak > 0.0}
+        results = {_LEVEL: level.doubted(*_doubts(case, row, checks, peaks))}
+        clock("reduced", 1.0)
+    return ImpactStudy(
+        **case_fields(case),
+        speed=case.motion.speed,
+        gap=case.contact.gap or 0.0,
+        **run_fields(begin, clock),
+        bodies=_bodies(row),
+        contact=_contact(row, checks[CONTACT]),
+        law=_law(case, row, peaks[CONTACT]),
+        levels=results,
+        reference=_LEVEL,
+        deviations={},
+        fits=tuple(fit for name in case.bodies for fit in press_fits(case, name)),
+        warnings=(*dict.fromkeys(notes), *trust_notes(results, _LEVEL, {})),
+        estimate_doubt=_NO_ESTIMATE,
+        structures=row.valve.structures,
+    )
+
+
+def _run(case: Case, row: BodyRow, setup_time: float) -> LevelResult:
+    step, moving = case.run.reduced_step, case.contact.moving.body
+
+    def run(duration: float) -> SystemRecord:
+        speeds = {moving: -case.motion.speed}
+        return simulate(row.system, velocities=speeds, step=step, duration=duration)
+
+    run(4 * step)  # compiles, so that the time below is that of the run
+    begin = perf_counter()
+    record = run(case.run.duration)
+    wall_time = perf_counter() - begin
+    bodies = row.system.bodies
+    counts = " + ".join(str(elastic_count(body)) for body in bodies)
+    result = level_result(
+        _of_needle(record.impact(0)),
+        level=_LEVEL,
+        label=f"reduced, {counts} modes",
+        dofs=sum(body.mode_count for body in bodies),
+        step=step,
+        wall_time=wall_time,
+        setup_time=setup_time,
+    )
+    assert case.backing is not None
+    # energy in the bodies below is vibration, motion and what their contact and clamp store
+    return replace(
+        result,
+        measures=replace(result.measures, vibration_share=float("nan")),
+        backing=BackingContact(
+            surfaces=_surfaces(row, BACKING),
+            preload=case.backing.preload,
+            history=record.impact(1),
+        ),
+    )
+
+
+def _of_needle(history: ImpactHistory) -> ImpactHistory:
+    """Speeds before and after the impact are those of the needle: below it is no single body."""
+    return replace(history, velocity_b=np.zeros(history.velocity_b.size), mass_b=np.inf)
+
+
+def _surfaces(row: BodyRow, stop: str) -> str:
+    upper, lower = row.valve.case.stops[stop].between
+    return f"{upper} on {lower}"
+
+
+def _check(row: BodyRow, stop: str, peak: float) -> ContactCheck:
+    contact = row.contact(stop)
+    force = min(peak, contact.closing.max_force)
+    return check_contact(row.valve.case, contact.pair, contact.closing, force, _surfaces(row, stop))
+
+
+def _doubts(
+    case: Case, row: BodyRow, checks: dict[str, ContactCheck], peaks: dict[str, float]
+) -> Iterator[str]:
+    assert case.backing is not None
+    laws = {CONTACT: case.contact.local_law, BACKING: case.backing.local_law}
+    for name, peak in peaks.items():
+        contact, surfaces = row.contact(name), _surfaces(row, name)
+        if laws[name].kind == "consistent" and peak > contact.closing.max_force:
+            yield (
+                f"{surfaces} is pressed with {format_si(peak, 'N', 3)}, beyond the "
+                f"{format_si(contact.closing.max_force, 'N', 3)} of its static contact: its law "
+                "continues straight. Try: a shorter run, or klack stroke with stops.speed and "
+                "force of this contact."
+            )
+        if contact.loops is not None:
+            warnings.warn(
+                f"{surfaces}: the faces yield, which the contact laws of three bodies leave out. "
+                "Try: klack stroke of the same bodies.",
+                AccuracyWarning,
+                stacklevel=2,
+            )
+            yield f"it leaves out that the faces {surfaces} yield. Try: klack stroke."
+        if name == BACKING:
+            yield from (
+                f"{surfaces}: {doubt}" for doubt in (checks[name].doubts if name in checks else ())
+            )
+        if name == CONTACT or not case.backing.preload:
+            pair = contact.pair
+            kept = (row.valve.reduced[body.name] for body in (pair.upper, pair.lower))
+            highest = (float(body.frequencies.max(initial=0.0)) for body in kept)
+            if doubt := flat_doubt(case, pair, contact.closing, highest):
+                yield f"{surfaces}: {doubt}"
+
+
+def _bodies(row: BodyRow) -> tuple[BodySummary, ...]:
+    """From the needle down; the share of the compliance is that of the upper contact of each."""
+    sides: list[SurfaceName] = [*row.valve.case.stops[CONTACT].between]
+    sides.append(row.valve.case.stops[BACKING].between[1])
+    found = []
+    for side in sides:
+        reduced = row.valve.reduced[side.body]
+        share = float(reduced.compliance_share[reduced.port_index(side.surface)])
+        body = row.valve.bodies[side.body]
+        found.append(summarise_body(row.valve.case, body, reduced, compliance_share=share))
+    return tuple(found)
+
+
+def _contact(row: BodyRow, check: ContactCheck) -> ContactSummary:
+    static = row.contact(CONTACT).closing
+    return ContactSummary(
+        surfaces=_surfaces(row, CONTACT),
+        points=static.space.count,
+        half_width=check.half_width,
+        size_ratio=check.size_ratio,
+        points_across=check.points_across,
+        doubts=check.doubts,
+        needed_yield=check.needed_yield,
+        approach=static.approach,
+        force=static.force,
+        area=static.area,
+    )
+
+
+def _law(case: Case, row: BodyRow, peak: float) -> LawSummary:
+    found = row.valve.laws.get(CONTACT)
+    if found is None:
+        force = np.linspace(0.0, 1.2 * peak, 50)
+        law = row.system.contacts[0].law
+        indentation = force / float(law.tangent_stiffness(1e-6))
+        return law_summary("given", indentation, force, np.full(force.size, np.nan), peak)
+    local = found.local
+    return law_summary(
+        "consistent",
+        np.append(0.0, local.force_indentation),
+        np.append(0.0, local.force),
+        np.append(np.nan, local.share),
+        peak,
+    )
