@@ -68,7 +68,10 @@ def test_the_middle_one_of_three_rods_passes_the_blow_on():
 M1, M2, K1, K2, CLAMP = 2e-3, 1e-3, 3e8, 8e8, 2e7  # [kg], [N/m]
 
 
-def row_of_masses(preload, clamp=CLAMP, laws=(LinearLaw(K1), LinearLaw(K2)), **behind):
+SPRINGS = (LinearLaw(K1), LinearLaw(K2))
+
+
+def row_of_masses(preload, clamp=CLAMP, laws=SPRINGS):
     needle, insert = rigid_mass_body("needle", M1), rigid_mass_body("insert", M2)
     housing = fixed_body("housing")
     pressed = ReturnSpring(body="insert", port="contact", stiffness=clamp, preload=preload)
@@ -76,7 +79,7 @@ def row_of_masses(preload, clamp=CLAMP, laws=(LinearLaw(K1), LinearLaw(K2)), **b
         bodies=(needle, insert, housing),
         contacts=(
             on(needle, insert, laws[0]),
-            on(insert, housing, laws[1], preload=preload, **behind),
+            on(insert, housing, laws[1], preload=preload),
         ),
         springs=(pressed,) if preload or clamp else (),
     )

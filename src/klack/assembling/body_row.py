@@ -112,7 +112,6 @@ def row_as_valve(case: Case) -> ValveCase:
             components={**bodies, **stops, **springs}, connections=tuple(connections)
         ),
         motion="axial",
-        noise=case.noise,
         run=StrokeRun.model_construct(
             duration=case.run.duration, lift=case.contact.moving, seat=CONTACT
         ),

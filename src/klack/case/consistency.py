@@ -476,6 +476,7 @@ def _check_beside_backing(case: ImpactSections) -> None:
         (("guide",), case.guide, "a guide"),
         (("shots",), case.shots, "shots"),
         (("measurement",), case.measurement, "a measurement"),
+        (("noise",), case.noise, "noise"),
         (("outputs",), case.outputs, "sensors"),
         (("contact", rubs), not contact.faces.is_none, "friction of the faces"),
         (("contact", "roughness"), contact.roughness, "rough faces"),

@@ -70,8 +70,8 @@ class Case(ImpactSections):
                 f"{self._path or 'case'}: backing",
                 got=f"{what} of three bodies in a row",
                 expected=f"klack impact with --level {one_of(BACKING_LEVELS)}",
-                hint="take that; or remove 'backing' and draw the struck body and the one behind "
-                "it as one, glued (how-to/two-materials).",
+                hint="take that, or klack stroke; or draw the struck body and the one behind it as "
+                "one, glued (how-to/two-materials), without 'backing'.",
             )
 
     def require_on_axis(self, what: str) -> None:

@@ -13,6 +13,7 @@ from klack.analyses.impact.body_picture import section_lines
 from klack.analyses.impact.record import BodyPicture, ImpactStudy
 from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
 from klack.assembling.bodies import place_meshes
+from klack.assembling.body_row import row_as_valve
 from klack.assembling.held_nodes import held_nodes
 from klack.assembling.touch_ring import TouchingSide, goes_round, touch_ring
 from klack.assembling.valve import mesh_valve_bodies
@@ -54,6 +55,8 @@ def view_of_case(case: Case | ValveCase, progress: Progress = silent) -> View:
             expected="bodies with surfaces",
             hint="klack inspect lists what is in such a case.",
         )
+    if case.backing is not None:
+        return _valve_view(row_as_valve(case), view, progress)
     placed = place_meshes(case, progress)
     moving, stop = case.contact.moving, case.contact.stop
     meshes = {moving.body: placed.upper, stop.body: placed.lower}

@@ -66,6 +66,7 @@ def report_content(study: ImpactStudy) -> Content:
     sections = [_estimates(study), _computed(study)]
     sections += [_bodies_in_space(study), _bodies_at_peak(study)]
     sections.append(Section(title="Force over time", charts=named("force")))
+    sections.append(Section(title="The body behind the struck one", charts=named("backing")))
     sections.append(_pressure(study))
     sections.append(_friction(study))
     sections.append(_running_in(study))
@@ -94,7 +95,7 @@ def report_content(study: ImpactStudy) -> Content:
 
 
 def _next_steps(study: ImpactStudy) -> list[NextStep]:
-    meshed = all(body.elements for body in study.bodies)
+    meshed = all(body.elements for body in study.bodies) and not study.is_row
     steps = []
     if meshed and not leaves_axis(study) and "full" not in {*study.levels, *study.failures}:
         steps.append(
@@ -110,8 +111,10 @@ def _next_steps(study: ImpactStudy) -> list[NextStep]:
                 command="klack advise CASE",
             )
         )
+    if not study.is_row:
+        sound = "The sound of this impact, with WAV files."
+        steps.append(NextStep(purpose=sound, command="klack noise RESULT"))
     steps += [
-        NextStep(purpose="The sound of this impact, with WAV files.", command="klack noise RESULT"),
         NextStep(
             purpose="Force and motion as tables for other programs.",
             command="klack export RESULT --to csv --out tables",
@@ -122,7 +125,7 @@ def _next_steps(study: ImpactStudy) -> list[NextStep]:
 
 def _bodies_in_space(study: ImpactStudy) -> Section:
     title = "The bodies in space"
-    if not any(body.model == "3-D" and body.elements for body in study.bodies):
+    if study.is_row or not any(b.model == "3-D" and b.elements for b in study.bodies):
         return Section(title=title)
     if study.pictures:
         from klack.analyses.impact.solid_figure import solid_figure
@@ -142,6 +145,8 @@ def _bodies_at_peak(study: ImpactStudy) -> Section:
         from klack.analyses.impact.section_figure import section_figure
 
         return Section(title=title, picture=section_figure(study))
+    if study.is_row:
+        return Section(title=title)
     text = "No picture: the displacement of the whole bodies is only available at level 'full', "
     if "full" in study.failures:
         text += "which failed; see the warnings."
@@ -503,7 +508,7 @@ def _limits(study: ImpactStudy) -> tuple[tuple[str, str], ...]:
             "Reduced level",
             "Motion and force along the axis, with one pressure pattern. Eccentric, tilted or "
             "partial contact is outside its assumption, and no number of modes corrects "
-            "that: use the interface level.",
+            f"that{'' if study.is_row else ': use the interface level'}.",
         ),
         (
             "Resolution",

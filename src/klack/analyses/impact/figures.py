@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from klack.acoustics.comparison import first_impact, impact_third_octaves
 from klack.acoustics.spectrum import impulse_level, impulse_spectrum
 from klack.acoustics.third_octave import ThirdOctaves
-from klack.analyses.impact.record import ImpactStudy, LevelResult
+from klack.analyses.impact.record import BackingContact, ImpactStudy, LevelResult
 from klack.bodies.gauges.gauge import GaugeKind
 from klack.bodies.reduction.transfer import TransferComparison
 from klack.contact.history import ImpactHistory
@@ -31,6 +31,7 @@ from klack.report.wording import quantity, sentence
 __all__ = [
     "OUTPUT_UNITS",
     "approach_chart",
+    "backing_chart",
     "charts",
     "energy_bars",
     "force_chart",
@@ -70,6 +71,7 @@ def charts(study: ImpactStudy) -> tuple[AnyChart, ...]:
     """Every figure that the study has data for, in the order of the report."""
     found: list[AnyChart] = [force_chart(study), spectrum_chart(study)]
     found.append(motion_chart(study))
+    found += [backing_chart(one, one.backing) for one in study.ordered if one.backing is not None]
     found += output_charts(study)
     found += [transfer_chart(comparison) for comparison in study.transfer]
     found += [law_chart(study), approach_chart(study), energy_bars(study)]
@@ -153,6 +155,30 @@ def _span(curves: list[Curve], least: float, most: float) -> tuple[float, float]
     if min(tops) > most:
         limit = 1.15 * max(tops)
     return -limit, limit
+
+
+def backing_chart(result: LevelResult, contact: BackingContact) -> Chart:
+    """Forces above and below the struck body, and the gap below it where it lifts."""
+    time = _since_touch(result, result.history.time)
+    below, above = _look(result.level), OTHER
+    curves = (
+        above.curve(time, result.history.force, "on the struck body"),
+        below.curve(time, contact.history.force, contact.surfaces),
+    )
+    marks = (Mark(value=contact.preload, axis="y", label="preload"),) if contact.preload else ()
+    panels = [Panel(y=AxisSpec(label="contact force", unit="N"), curves=curves, marks=marks)]
+    if contact.open_time > 0.0:
+        gap = below.curve(time, 1e6 * np.maximum(contact.history.gap, 0.0))
+        panels.append(Panel(y=AxisSpec(label="gap", unit="µm"), curves=(gap,), share=0.5))
+    return Chart(
+        name="backing",
+        title="Forces on both sides of the struck body",
+        x=_TIME,
+        panels=tuple(panels),
+        note=f"From the start to the end of the run. Gap: of {contact.surfaces}, where it is open."
+        if contact.open_time > 0.0
+        else "From the start to the end of the run; the lower contact stays closed.",
+    )
 
 
 def motion_chart(study: ImpactStudy) -> Chart:

@@ -540,6 +540,11 @@ class ImpactStudy(CaseRecord):
         first = dict.fromkeys(name for name in best if name in self.levels)
         return tuple(self.levels[name] for name in first | dict.fromkeys(self.levels))
 
+    @property
+    def is_row(self) -> bool:
+        """Whether three bodies stand in a row, which the level ``reduced`` alone knows."""
+        return any(level.backing is not None for level in self.levels.values())
+
     def why_missing(self, name: str) -> str:
         """Why a level failed; empty if it was not requested."""
         text = self.failures.get(name, "")

@@ -73,7 +73,6 @@ def run_three_bodies(case: Case, *, progress: Progress, threads: int | None = No
         fits=tuple(fit for name in case.bodies for fit in press_fits(case, name)),
         warnings=(*dict.fromkeys(notes), *trust_notes(results, _LEVEL, {})),
         estimate_doubt=_NO_ESTIMATE,
-        structures=row.valve.structures,
     )
 
 

@@ -53,6 +53,7 @@ def answer(study: ImpactStudy) -> str:
         if isfinite(numbers.vibration_share):
             text += f"; {share(numbers.vibration_share)} of the impact energy remains as vibration"
         text += f". {_across(reference)}"
+    text += _behind(reference)
     text += f"These numbers come from the {_called(study.reference)} run"
     if study.reference == "full":
         text += ", which follows every degree of freedom and every contact point"
@@ -68,6 +69,24 @@ def answer(study: ImpactStudy) -> str:
     elif study.reference == "reduced" and "reduced" in study.estimates and study.estimates_settled:
         text += f" {_estimated(study.estimates['reduced'])}"
     return text
+
+
+def _behind(level: LevelResult) -> str:
+    """What the body behind the struck one takes; empty for two bodies."""
+    contact = level.backing
+    if contact is None:
+        return ""
+    text = (
+        f"Below, {contact.surfaces} carries {quantity(contact.least_force, 'N', 3)} to "
+        f"{quantity(contact.peak_force, 'N', 3)}"
+    )
+    if contact.open_time > 0.0:
+        return (
+            f"{text}: it lifts off {quantity(contact.lift_off, 's', 3)} after the start of the run, "
+            f"is open for {quantity(contact.open_time, 's', 3)} in all, up to "
+            f"{quantity(contact.largest_gap, 'm', 3)}. "
+        )
+    return f"{text} and stays closed. "
 
 
 def _across(level: LevelResult) -> str:

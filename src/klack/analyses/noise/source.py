@@ -164,6 +164,7 @@ def run_sources(
         variants = tuple(names) or case.run.variants[:1]
         stroke = run_stroke(case, variants=variants, progress=progress, threads=threads)
         return _with_notes(stroke_sources(stroke, tuple(names)), case)
+    case.require_pair("noise")
     levels = case.require_levels(tuple(names) or ("reduced",))
     # transfer functions are not asked for here, and take longer than all the rest
     case = case.model_copy(update={"run": case.run.model_copy(update={"transfer": None})})
@@ -186,6 +187,13 @@ def impact_sources(
     The structure is that of the reduced level, whichever level the force comes from.  The section
     ``noise`` and the materials are those of the text of the study, or of ``case``.
     """
+    if study.is_row:
+        raise InputError(
+            "noise",
+            got="an impact of three bodies in a row",
+            expected="an impact of two bodies, or a stroke",
+            hint="run the three bodies as a stroke: klack stroke, then klack noise.",
+        )
     _require_structures(study)
     wanted = tuple(levels) or (study.reference,)
     failed = [f"The impact is incomplete: {note}" for note in failure_notes(study.failures)]

@@ -330,6 +330,13 @@ def impact_measures(case: Case, names: Iterable[str]) -> tuple[ChosenMeasure, ..
             expected=f"one of: {one_of(_OF_LEVELS)}",
             hint="noise needs bodies with meshes.",
         )
+        refuse_if(
+            item.is_noise and case.backing is not None,
+            "measures",
+            got=f"'{item.name}', of three bodies in a row",
+            expected=f"one of: {one_of(_OF_LEVELS)}",
+            hint="klack noise takes three bodies in a stroke (klack stroke).",
+        )
     return chosen
 
 
