@@ -58,10 +58,10 @@ def test_the_middle_one_of_three_rods_passes_the_blow_on():
     for contact, begin in ((0, 0.0), (1, 1.0)):
         inside = (time > begin + 0.1) & (time < begin + 1.9)
         outside = (time < begin - 0.1) | (time > begin + 2.1)
-        # 200 modes ring behind the front: 0.5 +- 0.02 a tenth of a passage away from it
-        assert np.mean(record.force[inside, contact]) == pytest.approx(0.5, rel=2e-3)
-        assert np.max(np.abs(record.force[outside, contact])) < 0.02
-    assert record.velocity[-1] == pytest.approx([0.0, 0.0, -1.0], abs=5e-3)
+        # 200 modes ring about the plateau; found 2.1e-4, 8e-4 and 1.1e-3
+        assert np.mean(record.force[inside, contact]) == pytest.approx(0.5, rel=1e-3)
+        assert np.max(np.abs(record.force[outside, contact])) < 2e-3
+    assert record.velocity[-1] == pytest.approx([0.0, 0.0, -1.0], abs=3e-3)
     assert record.ledger.residual == pytest.approx(0.0, abs=1e-12)
 
 
@@ -98,8 +98,8 @@ def test_two_masses_on_springs_while_the_preload_holds_the_insert():
     y = np.array(states)
     expected = np.column_stack([K1 * (y[:, 1] - y[:, 0]), preload - K2 * y[:, 1]])
     mean = 0.5 * (expected[1:] + expected[:-1])
-    # the mean of a step by the trapezoidal rule and by the scheme: (omega h)^2 / 12 = 1e-7
-    assert record.force == pytest.approx(mean, rel=2e-6, abs=2e-3)
+    # the mean of a step by the trapezoidal rule and by the scheme: (omega h)^2 / 12 = 9.7e-8
+    assert record.force == pytest.approx(mean, abs=3e-7 * mean.max())
     assert record.displacement[:, 1, 0] == pytest.approx(y[:, 1], abs=1e-6 * np.abs(y).max())
     assert abs(record.ledger.residual) < 1e-12
 
@@ -151,8 +151,8 @@ def test_a_stiff_contact_under_a_large_preload_is_one_rod():
         simulate(system, velocities={"needle": -speed}, step=2e-3, duration=8.0).impact(0)
         for system in (glued, held)
     )
-    # what 200 modes of each half leave to a massless law at the joint: 0.02 % of the peak
-    assert second.force == pytest.approx(first.force, abs=3e-4 * first.force.max())
+    # 200 modes of each half leave 1.5e-6 of the peak, a quarter of what 100 leave
+    assert second.force == pytest.approx(first.force, abs=3e-6 * first.force.max())
 
 
 @each("seed", range(40))

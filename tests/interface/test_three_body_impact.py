@@ -3,8 +3,10 @@
 Truth: the loop of a stroke with the same bodies and laws, which marches them on its own.
 """
 
+import json
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from pages import HOW_TO
@@ -12,6 +14,7 @@ from pages import HOW_TO
 import klack
 from klack.assembling.body_row import build_row
 from klack.case import read_case
+from klack.cli.main import main
 from klack.contact.restitution import measure_impact
 from klack.errors import InputError
 from klack.machine.progress import silent
@@ -55,3 +58,110 @@ def test_a_stroke_of_the_same_bodies_gives_the_same_impact(row):
     assert record.force[:, 1].min() == pytest.approx(foot.contact_force.min(), rel=1e-3)
     assert found.impulse == pytest.approx((seat.contact_force * seat.step).sum(), rel=1e-3)
     assert abs(record.ledger.residual) < 1e-12
+
+
+# insert, peak [N], contact time [us], restitution, force on the ledge, lifts at, apart, gap
+LINE = (
+    r"^\| (clamped with (\d+) N|loose|loose, 2 um.*?) \| ([\d.]+) N \| ([\d.]+) us \| ([\d.]+) "
+    r"\| (\d+) to (\d+) N \| ([\d.]*)[ us]*\| ([\d.]*)[ us]*\| ([\d.]*)"
+)
+LINES = re.findall(LINE, PAGE, flags=re.MULTILINE)
+CLAMP = re.search(r"  clamp: .*\n", TEXT).group()
+
+
+def test_the_page_has_the_case_and_its_numbers(tmp_path):
+    """One unit of the last digit, all of them from one mesh."""
+    assert len(LINES) == 6
+    for words, preload, *numbers in LINES:
+        text = TEXT.replace("500 N", f"{preload} N") if preload else TEXT
+        if not preload:
+            text = text.replace(CLAMP, "  gap: 2 um\n" if "2 um" in words else "")
+        (tmp_path / "case.yaml").write_text(text, "utf-8")
+        study = klack.run_impact(tmp_path / "case.yaml", ["reduced"]).record
+        level = study.levels["reduced"]
+        peak, time, restitution, least, largest, lift, apart, gap = (
+            float(number) if number else 0.0 for number in numbers
+        )
+        assert level.measures.peak_force == pytest.approx(peak, abs=0.1)
+        assert 1e6 * level.measures.contact_time == pytest.approx(time, abs=0.01)
+        assert level.measures.restitution == pytest.approx(restitution, abs=1e-4)
+        below = level.backing
+        assert below.least_force == pytest.approx(least, abs=1.0)
+        assert below.peak_force == pytest.approx(largest, abs=1.0)
+        assert (below.lift_off == below.lift_off) == (lift > 0.0)
+        if lift:
+            assert 1e6 * below.lift_off == pytest.approx(lift, abs=0.03)
+        assert 1e6 * below.open_time == pytest.approx(apart, abs=0.1)
+        assert 1e6 * below.largest_gap == pytest.approx(gap, abs=2e-3)
+        assert abs(level.energy_residual) < 1e-12
+        assert not study.estimates_settled
+        # a crown of 1 um on a foot that hits its ledge
+        flat = any("meet all at once" in doubt for doubt in level.doubts)
+        assert flat == (not preload)
+
+
+def test_a_result_is_stored_shown_and_has_no_sound(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["impact", str(CASE), "--out", "out", "--json", "out.json", "--quiet"]) == 0
+    found = json.loads(Path("out.json").read_text("utf-8"))["levels"]["reduced"]
+    stored = klack.load_result("out")
+    assert (
+        found["backing"]["backing_peak_force_N"]
+        == stored.record.levels["reduced"].backing.peak_force
+    )
+    assert "lift_off_s" in found["backing"]
+    assert found["backing"]["lift_off_s"] is None
+    page = Path("out/report.html").read_text("utf-8")
+    assert "Forces on both sides of the struck body" in page
+    assert "carries 306" in page
+    assert "--level reduced,full" not in page
+    assert main(["show", "out", "--out", "page.html"]) == 0
+    assert "3 bodies, 2 contacts" in capsys.readouterr().out
+    for command in (["noise", "out"], ["noise", str(CASE)], ["advise", str(CASE)]):
+        assert main([*command]) == 2
+        assert "three bodies in a row" in capsys.readouterr().err
+
+
+def refused(text, *, match):
+    with pytest.raises(InputError, match=match) as caught:
+        read_case(text, CASE)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "match"),
+    [
+        ("levels: [reduced]", "levels: [reduced, full]", r"run.levels: got other levels"),
+        ("run: {duration: 60 us, levels: [reduced]}", "run: {duration: 60 us}", "other levels"),
+        ("insert.foot, housing.ledge]", "insert.seat, housing.ledge]", "another surface of 'ins"),
+        ("insert.foot, housing.ledge]", "housing.ledge, insert.foot]", "another surface of 'ins"),
+        ("insert.foot, housing.ledge]", "insert.fot, housing.ledge]", "did you mean 'foot'"),
+        ("surface: shoulder", "surface: foot", "a surface of its own"),
+        ("surface: shoulder", "surface: sholder", "did you mean 'shoulder'"),
+        ("    fixed: [{surface: rim}]\n", "", "a surface that takes the preload"),
+        ("backing:\n", "backing:\n  gap: 1 um\n", "the clamp closes it"),
+        ("gap: 0.1 um}", "gap: 0.1 um, friction: 0.1}", "friction of the faces, and a body"),
+        ("gap: 0.1 um}", "gap: 0.1 um, crown: 1 um}", "a crown, and a body behind"),
+        ("motion: {", "noise: {}\nmotion: {", "noise, and a body behind"),
+        ("motion: {", "motion: {placement: {tilt: 0.1 deg}, ", "motion off the axis"),
+        ("preload: 500 N", "preload: 0 N", "above 0"),
+    ],
+)
+def test_what_three_bodies_cannot_have_is_refused_at_its_line(old, new, match):
+    assert old in TEXT
+    text = refused(TEXT.replace(old, new), match=match)
+    assert re.search(r"seat_insert_impact.yaml:\d+: ", text)
+    assert "Try: " in text
+
+
+def test_a_third_body_without_the_section_is_told_what_to_write():
+    text = TEXT[: TEXT.index("backing:")] + TEXT[TEXT.index("motion:") :]
+    told = refused(text, match="got 3 bodies .needle, insert, housing., expected exactly two")
+    assert "'backing: {between: [insert.SURFACE, housing.SURFACE]}'" in told
+
+
+@pytest.mark.parametrize("level", ["lumped", "interface", "full", "reduced-none"])
+def test_other_levels_and_commands_refuse_before_meshing(level):
+    case = read_case(TEXT.replace("motion: {", "lumped: {stiffness: 1e9 N/m}\nmotion: {"), CASE)
+    with pytest.raises(InputError, match=r"three bodies in a row, expected .*--level reduced"):
+        case.require_levels([level])

@@ -166,7 +166,7 @@ class PlacedMeshes:
 def place_meshes(case: Case, progress: Progress) -> PlacedMeshes:
     """Mesh both bodies and place the upper one; rejects bodies that penetrate as drawn."""
     _require_surfaces(case)
-    case.require_pair("a pair")
+    case.require_pair("this computation")
     progress("mesh", 0.0)
     shapes = require_given_shapes(
         case, lambda name: mesh_body(case.bodies[name], name, ()), progress

@@ -7,22 +7,22 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import sqrt
 
+from klack.assembling.ladder import closing_force, moving_energy
 from klack.assembling.reduced_pair import impact_system
 from klack.assembling.stops import StopContact
 from klack.assembling.valve import Valve, build_valve_bodies, valve_of_bodies
 from klack.bodies.elasticity.body import ElasticBody
 from klack.case.bodies import SurfaceName
-from klack.case.impact_sections import LinearLocalLaw, LocalLaw
 from klack.case.schema import Case
 from klack.case.valve import ValveCase
 from klack.case.valve_sections import CaseStop, StrokeRun, ValveBody
-from klack.contact.laws import ContactLaw, LinearLaw
 from klack.errors import InputError
 from klack.machine.progress import Progress
 from klack.mechanics.end_stop import EndStop
 from klack.mechanics.flexible_body import FlexibleBody
+from klack.mechanics.force import ConstantForce
 from klack.mechanics.spring import Spring
-from klack.mechanics.stop_law import ConsistentStopLaw, LinearStopLaw
+from klack.mechanics.stop_law import ConsistentStopLaw
 from klack.network.component import Component
 from klack.network.declaration import NetworkSection
 from klack.simulation.system import ContactPair, ReducedSystem, ReturnSpring
@@ -77,7 +77,6 @@ def row_as_valve(case: Case) -> ValveCase:
     """Valve of three bodies in a row: both contacts as end stops, the clamp a spring."""
     assert case.backing is not None
     sides = {CONTACT: case.contact.between, BACKING: case.backing.between}
-    laws = {CONTACT: case.contact.local_law, BACKING: case.backing.local_law}
     gaps = {CONTACT: case.contact.gap or 0.0, BACKING: case.backing.gap}
     clamp, struck = case.backing.clamp, case.contact.stop.body
     surfaces = [side for pair in sides.values() for side in pair]
@@ -88,7 +87,11 @@ def row_as_valve(case: Case) -> ValveCase:
     if clamp is not None:
         surfaces.append(SurfaceName(body=struck, surface=clamp.surface))
         connections.append((str(surfaces[-1]), f"{_CLAMP}.end"))
-        springs[_CLAMP] = Spring(stiffness=clamp.stiffness, preload=clamp.preload)
+        springs[_CLAMP] = (
+            Spring(stiffness=clamp.stiffness, preload=clamp.preload)
+            if clamp.stiffness
+            else ConstantForce(force=-clamp.preload)
+        )
     bodies: dict[str, Component] = {
         body: FlexibleBody(
             body=body,
@@ -98,7 +101,7 @@ def row_as_valve(case: Case) -> ValveCase:
         for body in case.bodies
     }
     stops: dict[str, Component] = {
-        name: EndStop(gap=gaps[name], law=_stop_law(laws[name])) for name in sides
+        name: EndStop(gap=gaps[name], law=ConsistentStopLaw(kind="consistent")) for name in sides
     }
     return ValveCase.model_construct(
         **{name: getattr(case, name) for name in ("klack", "title", "description", "materials")},
@@ -118,27 +121,23 @@ def row_as_valve(case: Case) -> ValveCase:
     )
 
 
-def _stop_law(law: LocalLaw) -> ConsistentStopLaw | LinearStopLaw:
-    if isinstance(law, LinearLocalLaw):
-        return LinearStopLaw(kind="linear", stiffness=law.stiffness)
-    return ConsistentStopLaw(kind="consistent")
-
-
 def _stops(case: Case, bodies: Mapping[str, ElasticBody]) -> dict[str, CaseStop]:
     """Both contacts, each with a speed at which it takes all energy of the body that moves."""
     assert case.backing is not None
 
+    way = (case.contact.gap or 0.0) + case.backing.gap
+
     def stop(
         between: tuple[SurfaceName, SurfaceName], force: float, reach: float | None
     ) -> CaseStop:
-        masses = [bodies[side.body] for side in between if side.body in bodies]
-        free = sum(1.0 / body.mass for body in masses if not body.is_fixed)
         speed = case.motion.speed
-        if masses:
-            speed *= sqrt(bodies[case.contact.moving.body].mass * free)
+        if bodies:
+            free = [bodies[side.body] for side in between if not bodies[side.body].is_fixed]
+            energy = moving_energy(case, bodies[case.contact.moving.body].mass, way)
+            speed = sqrt(2.0 * energy * sum(1.0 / body.mass for body in free))
         return CaseStop.model_construct(between=between, speed=speed, force=force, reach=reach)
 
-    closing = max(case.motion.closing_force, 0.0)
+    closing = closing_force(case)
     return {
         CONTACT: stop(case.contact.between, closing, case.contact.reach),
         BACKING: stop(case.backing.between, closing + case.backing.preload, case.backing.reach),
@@ -146,7 +145,10 @@ def _stops(case: Case, bodies: Mapping[str, ElasticBody]) -> dict[str, CaseStop]
 
 
 def _system(case: Case, valve: Valve) -> ReducedSystem:
-    """The impact of the upper two bodies, and what is below."""
+    """The impact of the upper two bodies, and what is below.
+
+    Laws are elastic: one with memory is not for several contacts.
+    """
     assert case.backing is not None
     moving, struck = case.contact.between
     lower, third = case.backing.between
@@ -154,7 +156,7 @@ def _system(case: Case, valve: Valve) -> ReducedSystem:
         case,
         valve.reduced[moving.body],
         valve.reduced[struck.body],
-        _law(case.contact.local_law, valve, CONTACT),
+        valve.laws[CONTACT].local.law,
         ports=(moving.surface, struck.surface),
     )
     second = ContactPair(
@@ -162,7 +164,7 @@ def _system(case: Case, valve: Valve) -> ReducedSystem:
         port_a=lower.surface,
         body_b=third.body,
         port_b=third.surface,
-        law=_law(case.backing.local_law, valve, BACKING),
+        law=valve.laws[BACKING].local.law,
         gap=case.backing.gap,
         preload=case.backing.preload,
     )
@@ -178,10 +180,3 @@ def _system(case: Case, valve: Valve) -> ReducedSystem:
         contacts=(*system.contacts, second),
         springs=springs,
     )
-
-
-def _law(law: LocalLaw, valve: Valve, stop: str) -> ContactLaw:
-    """Elastic law: one with memory is not for several contacts."""
-    if isinstance(law, LinearLocalLaw):
-        return LinearLaw(law.stiffness)
-    return valve.laws[stop].local.law

@@ -41,10 +41,14 @@ def closing_force(case: Case) -> float:
 
 def impact_energy(case: Case, pair: BodyPair) -> float:
     """Bound of the energy at first touch [J], work of closing forces included."""
-    kinetic = 0.5 * effective_mass(pair) * case.motion.speed**2
-    gap, spring = case.contact.gap or 0.0, case.motion.spring
-    stored = 0.5 * spring.stiffness * gap**2 if spring else 0.0
-    return kinetic + closing_force(case) * gap + stored
+    return moving_energy(case, effective_mass(pair), case.contact.gap or 0.0)
+
+
+def moving_energy(case: Case, mass: float, way: float) -> float:
+    """Energy [J] of a mass [kg] at the speed of the case and after a way [m] of closing forces."""
+    spring = case.motion.spring
+    stored = 0.5 * spring.stiffness * way**2 if spring else 0.0
+    return 0.5 * mass * case.motion.speed**2 + closing_force(case) * way + stored
 
 
 def static_ladder(

@@ -97,6 +97,48 @@ class CaseOpposite(Section):
         return self.between[1]
 
 
+class Clamp(Section):
+    """What presses the struck body onto the one behind it, such as a sleeve."""
+
+    surface: Name = Field(description="Surface of the struck body that it presses, along -z.")
+    preload: Force = Field(gt=0, description="Its force at the start, a state of rest.")
+    stiffness: Stiffness = Field(
+        default=0.0, ge=0, description="Of the clamp itself; default a constant force."
+    )
+
+
+class CaseBacking(Section):
+    """Third body behind the struck one, in a row, which it may leave: a housing behind an insert.
+
+    Only the level ``reduced`` knows it, in ``klack impact`` and ``klack study``.
+    """
+
+    between: tuple[BodySurface, BodySurface] = Field(
+        description="Lower surface of the struck body, then the surface of the third body below."
+    )
+    gap: Length = Field(default=0.0, ge=0, description="Between these two at the start.")
+    clamp: Clamp | None = Field(default=None, description="Default none: the struck body is loose.")
+    reach: Length | None = Field(
+        default=None, gt=0, description="Largest gap of points that may come into contact."
+    )
+
+    @model_validator(mode="after")
+    def _closed_where_clamped(self) -> Self:
+        if self.clamp is not None and self.gap > 0.0:
+            raise CaseProblem(
+                ("gap",),
+                got=f"a gap of {format_si(self.gap, 'm')} below a body that a clamp presses down",
+                expected="0 m: the clamp closes it before the impact",
+                hint="remove 'gap', or 'clamp'.",
+            )
+        return self
+
+    @property
+    def preload(self) -> float:
+        """Force of the contact at the start [N]."""
+        return self.clamp.preload if self.clamp is not None else 0.0
+
+
 class FaceWaviness(Section):
     """Waves on the faces, of both together."""
 
@@ -262,51 +304,6 @@ LocalLaw = Annotated[
     ConsistentLocalLaw | LinearLocalLaw | HertzLocalLaw | SubmodelLocalLaw,
     Field(discriminator="kind"),
 ]
-
-
-class Clamp(Section):
-    """What presses the struck body onto the one behind it, such as a sleeve."""
-
-    surface: Name = Field(description="Surface of the struck body that it presses, along -z.")
-    preload: Force = Field(gt=0, description="Its force at the start, a state of rest.")
-    stiffness: Stiffness = Field(
-        default=0.0, ge=0, description="Of the clamp itself; default a constant force."
-    )
-
-
-class CaseBacking(Section):
-    """Third body behind the struck one, in a row, which it may leave: a housing behind an insert.
-
-    Only the level ``reduced`` knows it, in ``klack impact`` and ``klack study``.
-    """
-
-    between: tuple[BodySurface, BodySurface] = Field(
-        description="Lower surface of the struck body, then the surface of the third body below."
-    )
-    gap: Length = Field(default=0.0, ge=0, description="Between these two at the start.")
-    clamp: Clamp | None = Field(default=None, description="Default none: the struck body is loose.")
-    local_law: LocalLaw = Field(
-        default=ConsistentLocalLaw(kind="consistent"), description="Local law of this contact."
-    )
-    reach: Length | None = Field(
-        default=None, gt=0, description="Largest gap of points that may come into contact."
-    )
-
-    @model_validator(mode="after")
-    def _closed_where_clamped(self) -> Self:
-        if self.clamp is not None and self.gap > 0.0:
-            raise CaseProblem(
-                ("gap",),
-                got=f"a gap of {format_si(self.gap, 'm')} below a body that a clamp presses down",
-                expected="0 m: the clamp closes it before the impact",
-                hint="remove 'gap', or 'clamp'.",
-            )
-        return self
-
-    @property
-    def preload(self) -> float:
-        """Force of the contact at the start [N]."""
-        return self.clamp.preload if self.clamp is not None else 0.0
 
 
 class CaseWorn(Section):

@@ -257,10 +257,14 @@ def _curves(chart: Chart, width: float, blank: Blank) -> Figure:
     return figure
 
 
+_PARTS = 6  # whose legend leaves room for the bars
+
+
 def _bars(chart: BarChart, blank: Blank) -> Figure:
     """Horizontal stacked bars; wide shares carry their number."""
     with rc_context({"axes.grid.axis": "x"}):
-        figure = blank(figsize=(_WIDTH, 1.1 + 0.36 * len(chart.rows)), layout="constrained")
+        height = 1.1 + 0.36 * len(chart.rows) + 0.2 * max(len(chart.parts) - _PARTS, 0)
+        figure = blank(figsize=(_WIDTH, height), layout="constrained")
         axes = figure.subplots()
         left = [0.0] * len(chart.rows)
         whole = max(sum(part.values[i] for part in chart.parts) for i in range(len(left)))

@@ -513,7 +513,7 @@ def energy_bars(study: ImpactStudy) -> BarChart:
     return BarChart(
         name="energy",
         title="Energy balance",
-        x=AxisSpec(label="share of the initial kinetic energy", unit="%"),
+        x=AxisSpec(label=f"share of the {next(iter(results[0].energies))} energy", unit="%"),
         rows=tuple(result.label for result in results),
         parts=tuple(parts),
         note="After separation. Shares below 0.05 % are in the table only.",
@@ -565,5 +565,6 @@ def modal_energy_chart(study: ImpactStudy) -> Chart:
         title="Energy left in the modes",
         x=AxisSpec(label="eigenfrequency", unit="kHz"),
         panels=tuple(panels),
-        note="Share of the initial kinetic energy in each elastic mode at the end of the run.",
+        note=f"Share of the {next(iter(results[0].energies))} energy in each elastic mode at the "
+        "end of the run.",
     )

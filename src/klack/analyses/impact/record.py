@@ -280,7 +280,7 @@ class LevelResult:
         Of all that this level needs before (shared steps counted once each).
     energies [J]
         After separation, e.g. ``"needle kinetic (rigid)"``, ``"needle vibration"``, ...; the first
-        entry is ``"initial kinetic"``.
+        entry is ``"initial kinetic"``, of a clamped row with what the preload stores.
     energy_residual [-]
         Over the initial kinetic energy.
     pressure

@@ -82,8 +82,8 @@ def _behind(level: LevelResult) -> str:
     )
     if contact.open_time > 0.0:
         return (
-            f"{text}: it lifts off {quantity(contact.lift_off, 's', 3)} after the start of the run, "
-            f"is open for {quantity(contact.open_time, 's', 3)} in all, up to "
+            f"{text}: it lifts off {quantity(contact.lift_off, 's', 3)} after the start of the "
+            f"run, is open for {quantity(contact.open_time, 's', 3)} in all, up to "
             f"{quantity(contact.largest_gap, 'm', 3)}. "
         )
     return f"{text} and stays closed. "
