@@ -143,7 +143,7 @@ def refused(text, *, match):
         ("gap: 0.1 um}", "gap: 0.1 um, friction: 0.1}", "friction of the faces, and a body"),
         ("gap: 0.1 um}", "gap: 0.1 um, crown: 1 um}", "a crown, and a body behind"),
         ("motion: {", "noise: {}\nmotion: {", "noise, and a body behind"),
-        ("motion: {", "motion: {placement: {tilt: 0.1 deg}, ", "motion off the axis"),
+        ("motion: {", "motion: {placement: {tilt: 0.1 deg}, ", "motion off-axis"),
         ("preload: 500 N", "preload: 0 N", "above 0"),
     ],
 )

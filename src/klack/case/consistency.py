@@ -470,7 +470,7 @@ def _check_beside_backing(case: ImpactSections) -> None:
             others,
             "other levels",
         ),
-        (("motion",), not straight, "motion off the axis"),
+        (("motion",), not straight, "motion off-axis"),
         (("guide",), case.guide, "a guide"),
         (("shots",), case.shots, "shots"),
         (("measurement",), case.measurement, "a measurement"),
