@@ -122,6 +122,24 @@ def test_a_result_is_stored_shown_and_has_no_sound(tmp_path, monkeypatch, capsys
         assert "three bodies in a row" in capsys.readouterr().err
 
 
+@pytest.mark.slow  # loops of faces that yield take half a minute on a busy core
+def test_yield_is_a_doubt(tmp_path):
+    text = TEXT.replace("7850 kg/m^3", "7850 kg/m^3, yield: 500 MPa")
+    (tmp_path / "case.yaml").write_text(text, "utf-8")
+    level = klack.run_impact(tmp_path / "case.yaml", ["reduced"]).record.levels["reduced"]
+    assert any("faces needle.tip on insert.seat yield" in doubt for doubt in level.doubts)
+
+
+def test_closing_forces_that_speed_the_needle_up_are_a_doubt(tmp_path):
+    """It follows the loose insert down and is thrown back with it: a restitution of 2.9."""
+    text = TEXT.replace(CLAMP, "  gap: 10 um\n").replace("1.6 m/s", "0.3 m/s, force: 40 N")
+    text = text.replace("60 us", "100 us")
+    (tmp_path / "case.yaml").write_text(text, "utf-8")
+    level = klack.run_impact(tmp_path / "case.yaml", ["reduced"]).record.levels["reduced"]
+    assert level.measures.restitution > 1.0
+    assert any("leaves faster than it came" in doubt for doubt in level.doubts)
+
+
 def refused(text, *, match):
     with pytest.raises(InputError, match=match) as caught:
         read_case(text, CASE)

@@ -5,7 +5,6 @@ impact, with two contacts.  The interface level and the full order have one cont
 that moves, so there is nothing to estimate the error with.
 """
 
-import warnings
 from collections.abc import Iterator
 from dataclasses import replace
 from time import perf_counter
@@ -30,7 +29,6 @@ from klack.bodies.reduction.reduced_body import elastic_count
 from klack.case.bodies import SurfaceName
 from klack.case.schema import Case
 from klack.contact.history import ImpactHistory
-from klack.errors import AccuracyWarning
 from klack.machine.cache.result_cache import result_cache
 from klack.machine.progress import Progress
 from klack.machine.stages import StageClock, collected_warnings
@@ -152,13 +150,10 @@ def _doubts(
                 "force of this contact."
             )
         if contact.loops is not None:
-            warnings.warn(
-                f"{surfaces}: the faces yield, which the contact laws of three bodies leave out. "
-                "Try: klack stroke of the same bodies.",
-                AccuracyWarning,
-                stacklevel=2,
+            yield (
+                f"the faces {surfaces} yield, which laws of several contacts leave out. Try: klack "
+                "stroke of the same bodies."
             )
-            yield f"it leaves out that the faces {surfaces} yield. Try: klack stroke."
         if name == BACKING:
             yield from (
                 f"{surfaces}: {doubt}" for doubt in (checks[name].doubts if name in checks else ())
