@@ -163,6 +163,7 @@ def refused(text, *, match):
         ("motion: {", "noise: {}\nmotion: {", "noise, and a body behind"),
         ("motion: {", "motion: {placement: {tilt: 0.1 deg}, ", "motion off-axis"),
         ("preload: 500 N", "preload: 0 N", "above 0"),
+        (", gap: 0.1 um}", "}", "contact: got no gap between"),
     ],
 )
 def test_what_three_bodies_cannot_have_is_refused_at_its_line(old, new, match):
@@ -170,6 +171,13 @@ def test_what_three_bodies_cannot_have_is_refused_at_its_line(old, new, match):
     text = refused(TEXT.replace(old, new), match=match)
     assert re.search(r"seat_insert_impact.yaml:\d+: ", text)
     assert "Try: " in text
+
+
+def test_surfaces_that_do_not_meet_are_refused_at_their_line(tmp_path):
+    path = tmp_path / "case.yaml"
+    path.write_text(TEXT.replace("housing.ledge]", "housing.rim]"), "utf-8")
+    with pytest.raises(InputError, match=r"case.yaml:67: backing.between: insert.foot on housing"):
+        klack.run_impact(path, ["reduced"])
 
 
 def test_a_third_body_without_the_section_is_told_what_to_write():

@@ -124,7 +124,6 @@ def row_as_valve(case: Case) -> ValveCase:
 def _stops(case: Case, bodies: Mapping[str, ElasticBody]) -> dict[str, CaseStop]:
     """Both contacts, each with a speed at which it takes all energy of the body that moves."""
     assert case.backing is not None
-
     way = (case.contact.gap or 0.0) + case.backing.gap
 
     def stop(

@@ -421,6 +421,14 @@ def _check_backing(case: ImpactSections) -> None:
             expected=f"another surface of '{struck.body}', then one of the third body",
             hint="the order is needle, insert, housing.",
         )
+    if case.contact.gap is None:
+        raise CaseProblem(
+            ("contact",),
+            got="no gap between the body that moves and one that may shift on the body behind it",
+            expected="gap: the distance between them at the start",
+            hint="add 'gap: 0 um'.",
+            on_key=True,
+        )
     middle, last = case.bodies[struck.body], case.bodies[third.body]
     if middle.fixed:
         raise CaseProblem(
