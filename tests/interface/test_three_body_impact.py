@@ -117,8 +117,10 @@ def test_a_result_is_stored_shown_and_has_no_sound(tmp_path, monkeypatch, capsys
     assert "--level reduced,full" not in page
     assert main(["show", "out", "--out", "page.html"]) == 0
     assert "3 bodies, 2 contacts" in capsys.readouterr().out
-    for command in (["noise", "out"], ["noise", str(CASE)], ["advise", str(CASE)]):
-        assert main([*command]) == 2
+    others = (["noise", "out"], ["noise", str(CASE)], ["advise", str(CASE)], ["reduce", str(CASE)])
+    compared = (["compare", "out", way, "out.json"] for way in ("--measurement", "--calculix"))
+    for command in (*others, *compared):
+        assert main(command) == 2
         assert "three bodies in a row" in capsys.readouterr().err
 
 

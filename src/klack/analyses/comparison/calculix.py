@@ -147,7 +147,14 @@ _COMPARISON = JsonForm(
 
 
 def level_of(study: ImpactStudy, name: str) -> LevelResult:
-    """Level of a study by name; InputError if it is missing."""
+    """Level of a study of two bodies by name; InputError if it is missing."""
+    if study.is_row:
+        raise InputError(
+            f"result of case '{study.case}'",
+            got="an impact of three bodies in a row",
+            expected="an impact of two bodies, which has sensors and a deck of CalculiX",
+            hint="compare a stroke of the three bodies with its measurement.",
+        )
     if name not in study.levels:
         raise InputError(
             f"result of case '{study.case}'",
