@@ -87,6 +87,17 @@ def _refused(page: Any) -> None:
     page.wait_for_selector("text=not valid, not saved")
 
 
+def _form(page: Any) -> None:
+    page.get_by_role("button", name="Form", exact=True).click()
+    page.wait_for_selector(".k-form summary")
+
+
+def _component(page: Any) -> None:
+    page.wait_for_selector(".k-net svg")
+    page.get_by_label("Component", exact=True).select_option("armature_gap")
+    page.wait_for_selector("text=armature_gap: annulus")
+
+
 def planned(step: int, **other: str) -> Callable[[Path], None]:
     """The guide at a step, with the drawings of the example and their faces chosen."""
 
@@ -107,6 +118,7 @@ def _unplanned(folder: Path) -> None:
 
 
 _REPORT = "/report?path=klack-results/{}/report.html"
+_STROKE = "/case?path=stroke/case.yaml"
 _BOTH = "a=klack-results/impact&b=klack-results/impact"
 
 PAGES = (
@@ -116,7 +128,9 @@ PAGES = (
     Place("dialog, duplicate", "/", "text=2 notes on this result", _press(f"Duplicate {CASE}")),
     Place("dialog, note", "/", "text=2 notes on this result", _press(f"Note {CASE}")),
     Place("case, impact", f"/case?path={CASE}", "text=valid impact", _open_all),
-    Place("case, stroke", "/case?path=stroke/case.yaml", "text=valid stroke", picture="app-case"),
+    Place("case, stroke", _STROKE, "text=valid stroke", _form, picture="app-case"),
+    Place("case, schematic", _STROKE, "text=valid stroke", _component, picture="app-schematic"),
+    Place("dialog, component", _STROKE, ".k-net svg", _press("Add a component")),
     Place("case, not valid", f"/case?path={CASE}", "text=valid impact", _refused),
     Place("case, none", "/case?path=none.yaml", ".k-error"),
     Place("sliders", f"/sliders?path={CASE}", ".k-badge.good", _open_all),

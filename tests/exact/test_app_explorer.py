@@ -319,7 +319,7 @@ def test_a_form_changes_one_value_and_nothing_else():
         for old, new in zip(TEXT.splitlines(), text.splitlines(), strict=True)
         if old != new
     ]
-    assert changed == [("motion: {speed: 0.3 m/s}", 'motion: {speed: "0.5 m/s"}')]
+    assert changed == [("motion: {speed: 0.3 m/s}", "motion: {speed: 0.5 m/s}")]
     assert read_case(text, PATH).motion.speed == 0.5
 
 

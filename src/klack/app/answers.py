@@ -11,6 +11,7 @@ from klack.units import format_in, format_si
 
 __all__ = [
     "Answer",
+    "CatalogueEntry",
     "Checked",
     "Curve",
     "FaceFacts",
@@ -20,6 +21,9 @@ __all__ = [
     "Hearing",
     "Judgement",
     "MeasureOffer",
+    "NetworkPart",
+    "NetworkPort",
+    "NetworkView",
     "Number",
     "Opened",
     "PartFacts",
@@ -352,6 +356,47 @@ class Checked:
             return {}
         sliders = {"Sliders": "sliders"} if self.has_sliders else {}
         return {"Show": "show", **sliders, "New study": "new-study"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class CatalogueEntry:
+    """A component type that can be added; ``fields`` are its keys, those required are written."""
+
+    group: str
+    word: str
+    meaning: str
+    fields: tuple[FormField, ...]
+    required: frozenset[str]
+
+
+@dataclass(frozen=True, kw_only=True)
+class NetworkPort:
+    """A port of a component, and the ports and words that it is connected with."""
+
+    name: str
+    domain: str
+    joined: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class NetworkPart:
+    """A component of a text; one of an included part, ``is_included``, has no fields."""
+
+    name: str
+    type: str
+    meaning: str
+    fields: tuple[FormField, ...] = ()
+    ports: tuple[NetworkPort, ...] = ()
+    is_included: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class NetworkView:
+    """The network of a text; ``svg`` is empty where it cannot be drawn."""
+
+    svg: str = ""
+    width: float = 0.0
+    parts: tuple[NetworkPart, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -32,6 +32,7 @@ from klack.app.explorer import (
     stroke_curves,
     stroke_numbers,
 )
+from klack.app.network_view import added_component, catalogue, edited, network_view
 from klack.app.study_points import StudyPoints, points_json
 from klack.app.texts import (
     checked_text,
@@ -57,6 +58,10 @@ class Reader:
 
     check = staticmethod(checked_text)
     exchange = staticmethod(exchanged_text)
+    network = staticmethod(network_view)
+    catalogue = staticmethod(catalogue)
+    edited = staticmethod(edited)
+    added = staticmethod(added_component)
     study_problem = staticmethod(study_problem)
     study_offer = staticmethod(study_offer)
     study_text = staticmethod(study_text)

@@ -28,10 +28,15 @@ from klack.input.problem import CaseProblem, Key
 from klack.input.section import Section
 
 __all__ = [
+    "as_yaml",
     "checked_text",
+    "choices_of",
     "differing_inputs",
     "exchanged_text",
     "form_of",
+    "leaves",
+    "limits_of",
+    "shown",
     "study_offer",
     "study_problem",
     "study_text",
@@ -56,6 +61,8 @@ _OF_THE_SOLVER = (
 )
 """Numbers of a run, not of the valve."""
 _PLAIN = re.compile(r"[A-Za-z0-9_.+-]+(?: [A-Za-z0-9_.+*/^%()°-]+)*")
+_TYPED = re.compile(r"\d[\d.]*(?:e-?\d+)? ?(?:%|[A-Za-z][A-Za-z0-9*/^]*)|[A-Za-z][A-Za-z0-9_-]*")
+"""A quantity or a word that YAML takes for the text that it is."""
 _TAKEN = ("true", "false", "null", "yes", "no", "on", "off", "nan", "inf")
 _WORDS = {"minimise", "maximise"}
 _DESIGNS = {
@@ -206,7 +213,7 @@ def study_text(choice: StudyChoice, case_text: str, case_path: str) -> str:
         "#   klack study CASE --study THIS_FILE       computes the points of the design",
         "#   klack optimise CASE --study THIS_FILE    searches the ranges for the best points",
         "klack: 1",
-        f"case: {_as_yaml(name)}  # klack app runs it with this case",
+        f"case: {as_yaml(name)}  # klack app runs it with this case",
         "study:",
         "  # keys of the case and their ranges; a tolerance is {normal: {mean: 12 N, sd: 0.3 N}}",
         "  parameters:",
@@ -218,7 +225,7 @@ def study_text(choice: StudyChoice, case_text: str, case_path: str) -> str:
             raise _refused(key[:80], "a key that the case has no number at", "one of the list", "")
         name = known.label.replace(" ", "_") if known.also else key
         lines.append(
-            f"    {_as_yaml(name)}: {{from: {_as_yaml(low)}, to: {_as_yaml(high)}}}"
+            f"    {as_yaml(name)}: {{from: {as_yaml(low)}, to: {as_yaml(high)}}}"
             f"  # today {known.text(known.start)}"
         )
         if known.also:
@@ -228,10 +235,10 @@ def study_text(choice: StudyChoice, case_text: str, case_path: str) -> str:
     measures = dict.fromkeys((*choice.measures, *choice.objectives))
     of = {item.name: item.measure for item in kind_of(case).measures(case, measures)}
     lines.append("  measures:")
-    lines += [f"    - {_as_yaml(name)}  # {_comment(of[name].definition)}" for name in measures]
+    lines += [f"    - {as_yaml(name)}  # {_comment(of[name].definition)}" for name in measures]
     if choice.objectives:
         lines.append("  objectives:  # of klack optimise, and of the front that klack app shows")
-        lines += [f"    {_as_yaml(name)}: {way}" for name, way in choice.objectives.items()]
+        lines += [f"    {as_yaml(name)}: {way}" for name, way in choice.objectives.items()]
     if choice.design not in _DESIGNS:
         raise _refused("design", choice.design[:40], ", ".join(_DESIGNS), "choose one of them.")
     lines.append(f"  # {_DESIGNS[choice.design]}")
@@ -247,7 +254,7 @@ def study_text(choice: StudyChoice, case_text: str, case_path: str) -> str:
     return text
 
 
-def _as_yaml(text: str) -> str:
+def as_yaml(text: str) -> str:
     """YAML of a text: plain if that is the same, else in quotes."""
     plain = text.strip()
     if _PLAIN.fullmatch(plain) and not _is_number_like_word(plain):
@@ -338,13 +345,14 @@ def exchanged_text(text: str, path: str, place: Key, written: str) -> str:
 
     InputError if the file cannot have the value there.
     """
-    tree = tree_of(text, Path(path))
+    data, lines = parse(text, Path(path))  # without the files that it includes
+    tree = CaseTree(path=Path(path), text=text, data=data, lines=lines)
     return with_values(tree, {place: _scalar(written, is_text=_takes_text(tree, place))})
 
 
 def form_of(case: Section, tree: CaseTree) -> Iterator[FormField]:
     """Fields in the file, then further single values for its sections."""
-    written = dict(_leaves(tree.data))
+    written = dict(leaves(tree.data))
     count = 0
     for place in (*written, *_further(case, tree.data)):
         try:
@@ -361,26 +369,26 @@ def form_of(case: Section, tree: CaseTree) -> Iterator[FormField]:
             place=place,
             section=str(place[start]) if len(place) > 1 else "case",
             label=" ".join(map(str, place[start + 1 :] or place[-1:])).replace("_", " "),
-            written="" if place not in written else _shown(written[place]),
+            written="" if place not in written else shown(written[place]),
             kind="" if kind is None else kind.name,
             example="" if kind is None else kind.example,
-            limits=_limits(info),
-            choices=_choices(info),
+            limits=limits_of(info),
+            choices=choices_of(info),
             description="" if info is None else (info.description or ""),
-            default="" if place in written or info is None else _shown(node),
+            default="" if place in written or info is None else shown(node),
         )
 
 
-def _leaves(data: Any, above: Key = ()) -> Iterator[tuple[Key, Any]]:
+def leaves(data: Any, above: Key = ()) -> Iterator[tuple[Key, Any]]:
     """Single values of the file, without coordinates of profiles."""
     if "edges" in above or "start" in above[-2:]:
         return
     if isinstance(data, dict):
         for key, value in data.items():
-            yield from _leaves(value, (*above, key))
+            yield from leaves(value, (*above, key))
     elif isinstance(data, list):
         for i, value in enumerate(data):
-            yield from _leaves(value, (*above, i))
+            yield from leaves(value, (*above, i))
     elif above != ("klack",):
         yield above, data
 
@@ -407,7 +415,8 @@ def _is_quantity(value: Any, info: FieldInfo) -> bool:
     return kind_at(value, info) is not None
 
 
-def _limits(info: FieldInfo | None) -> str:
+def limits_of(info: FieldInfo | None) -> str:
+    """Bounds of a field in signs."""
     found = [] if info is None else info.metadata
     words = [
         f"{sign} {getattr(item, name):g}"
@@ -418,7 +427,8 @@ def _limits(info: FieldInfo | None) -> str:
     return ", ".join(words)
 
 
-def _choices(info: FieldInfo | None) -> tuple[str, ...]:
+def choices_of(info: FieldInfo | None) -> tuple[str, ...]:
+    """Words that a field allows; empty for any."""
     annotation = None if info is None else info.annotation
     options = [annotation, *get_args(annotation)]
     words = [
@@ -430,7 +440,8 @@ def _choices(info: FieldInfo | None) -> tuple[str, ...]:
     return tuple(words)
 
 
-def _shown(value: Any) -> str:
+def shown(value: Any) -> str:
+    """A value as a box shows it."""
     if value is None:
         return ""
     if isinstance(value, bool):
@@ -457,14 +468,24 @@ def _takes_text(tree: CaseTree, place: Key) -> bool:
 
 
 def _scalar(text: str, *, is_text: bool) -> str:
-    """YAML of typed text: numbers, true and false stay, if allowed."""
-    import json
-
+    """YAML of typed text: plain where that means the same, else in quotes."""
     plain = text.strip()
     if is_text:
         return json.dumps(plain, ensure_ascii=False)
+    if plain[:1] in ("[", "{") and _is_in_brackets(plain):
+        return plain
+    if _TYPED.fullmatch(plain) and plain.lower() not in _TAKEN[2:]:
+        return plain
     try:
         float(plain if len(plain) <= _LONGEST_NUMBER else "text")
     except ValueError:
-        return plain if plain in ("true", "false") else json.dumps(plain, ensure_ascii=False)
+        return json.dumps(plain, ensure_ascii=False)
     return plain
+
+
+def _is_in_brackets(text: str) -> bool:
+    """Whether a text is a list or a section in YAML, on one line."""
+    try:
+        return isinstance(parse(f"value: {text}", Path("value"))[0]["value"], list | dict)
+    except KlackError:
+        return False

@@ -1,13 +1,13 @@
 """A fitting example for each key: a supply pressure is not 210 GPa."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from types import UnionType
-from typing import Any, Union, get_args, get_origin
+from typing import Any, Literal, Union, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
-from klack.case.key_path import written_at
+from klack.case.key_path import kind_in, written_at
 from klack.errors import InputError
 from klack.input.problem import Key
 from klack.input.section import Section
@@ -16,7 +16,7 @@ from klack.network.component import Component
 from klack.network.declaration import LateSection
 from klack.units import Kind, format_si, parse_quantity
 
-__all__ = ["fitting_example"]
+__all__ = ["field_at", "fitting_example", "written_example"]
 
 _QUANTITY = re.compile(r"\d+\.?\d*(?:e-?\d+)? ?(?:%|[A-Za-z]+(?:[*/][A-Za-z]+)*(?:\^\d)?)")
 
@@ -26,7 +26,7 @@ def fitting_example(case: type[Section], data: Any, key: Key, kind: Kind) -> str
 
     ``data`` need not be a valid case.
     """
-    field = _field_at(case, data, key)
+    field = field_at(case, data, key)
     if field is None:
         return kind.example
     if field.examples:
@@ -34,6 +34,51 @@ def fitting_example(case: type[Section], data: Any, key: Key, kind: Kind) -> str
     if isinstance(field.default, float) and field.default and kind.unit != "K":
         return format_si(field.default, kind.unit)
     return next(_quantities_in(field.description or "", kind), kind.example)
+
+
+def written_example(info: FieldInfo) -> str:
+    """Value of a field as a file has it, in YAML on one line: a section with its required keys.
+
+    >>> from klack.mechanics.end_stop import EndStop
+    >>> written_example(EndStop.model_fields["gap"])
+    '80 um'
+    """
+    if info.examples:
+        return _in_yaml(info.examples[0])
+    kind = kind_in(info.annotation, info.metadata)
+    return _written(info.annotation, "" if kind is None else kind.example)
+
+
+def _written(annotation: Any, quantity: str) -> str:
+    """Example of a type; ``quantity`` is that of the numbers in it."""
+    kinds = [item for item in _types_in(annotation) if item is not type(None)]
+    kind = kinds[0] if kinds else str
+    if get_origin(kind) is Literal:
+        return _in_yaml(get_args(kind)[0])
+    if get_origin(kind) in (tuple, list, Sequence):
+        kinds = get_args(kind)
+        inside = kinds[:1] * 2 if kinds[-1] is Ellipsis or len(kinds) == 1 else kinds
+        return f"[{', '.join(_written(item, quantity) for item in inside)}]"
+    if get_origin(kind) is Mapping:
+        return f"{{name: {_written(get_args(kind)[-1], quantity)}}}"
+    if isinstance(kind, type) and issubclass(kind, Section):
+        fields = {item.alias or name: item for name, item in kind.model_fields.items()}
+        words = (
+            f"{name}: {written_example(item)}"
+            for name, item in fields.items()
+            if item.is_required() or (get_origin(item.annotation) is Literal and name == "kind")
+        )
+        return f"{{{', '.join(words)}}}"
+    return quantity or {bool: "true", int: "1", float: "1"}.get(kind, "name")
+
+
+def _in_yaml(value: Any) -> str:
+    """An example in YAML on one line."""
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(f'{key}: {_in_yaml(item)}' for key, item in value.items())}}}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_in_yaml, value))}]"
+    return {True: "true", False: "false"}[value] if isinstance(value, bool) else str(value)
 
 
 def _quantities_in(text: str, kind: Kind) -> Iterator[str]:
@@ -46,8 +91,11 @@ def _quantities_in(text: str, kind: Kind) -> Iterator[str]:
         yield match[0]
 
 
-def _field_at(case: type[Section], data: Any, key: Key) -> FieldInfo | None:
-    """Field of a key; None where the schema has no such place."""
+def field_at(case: type[Section], data: Any, key: Key) -> FieldInfo | None:
+    """Field of a key; None where the schema has no such place.
+
+    ``data`` need not be a valid case.
+    """
     places: list[Any] = [case]
     field: FieldInfo | None = None
     for part in key:

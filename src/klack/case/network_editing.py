@@ -99,8 +99,8 @@ def without_key(text: str, path: Path, name: str, key: str) -> str:
 def with_component_renamed(text: str, path: Path, old: str, new: str) -> str:
     """Text in which a component has another name, wherever the case names it.
 
-    That is in the connections, in ``run.lift``, in the study, in each ``network.components.NAME``,
-    and for an end stop in ``stops``.
+    That is in the connections, in ``run.lift``, in the study, in ``thermal``, in each
+    ``network.components.NAME``, and for an end stop in ``stops``.
     """
     data, root = _read(text, path)
     known = data["network"]["components"]
@@ -117,9 +117,10 @@ def with_component_renamed(text: str, path: Path, old: str, new: str) -> str:
         if word == whole or word.startswith(f"{whole}."):
             return word.replace(whole, ".".join((*_COMPONENTS, new)), 1)
         named = above[:2] in (_CONNECTIONS, ("run", "lift")) or above[:1] == ("study",)
-        if named and word.startswith(f"{old}."):
-            return new + word[len(old) :]
-        return word
+        begins = word.startswith(f"{old}.")
+        if above[:1] == ("thermal",) and _names_in_heat(above, is_key):
+            named, begins = True, word.replace(".", " ").split(" ")[0] == old
+        return new + word[len(old) :] if named and begins else word
 
     pieces: Pieces = []
     _collect_renamed(root, (), rule, text, pieces)
@@ -348,6 +349,13 @@ def _other_ports(text: str, node: SequenceNode, ports: list[str]) -> Pieces:
 
 
 # --------------------------------------------------------------------------- names
+
+
+def _names_in_heat(above: Key, is_key: bool) -> bool:
+    """Whether a key or a value of the section ``thermal`` names a component."""
+    if is_key:
+        return above[1:] in (("windings",), ("magnets",))
+    return above[-1] in ("loss", "node", "fluid") or above[1] == "windings" or "of" in above
 
 
 _Rule = Callable[[Key, str, bool], str]

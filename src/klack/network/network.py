@@ -36,6 +36,8 @@ class Network:
         At its temperature; needed if anything is hydraulic.
     gas
         Needed if anything is pneumatic.
+    is_draft
+        Of a network to be drawn: open ports and a missing fluid are for :meth:`rows` to reject.
 
     Raises
     ------
@@ -57,6 +59,7 @@ class Network:
     ambient: Ambient = field(default_factory=Ambient)
     fluid: NetworkFluid | None = None
     gas: NetworkGas | None = None
+    is_draft: bool = False
     nodes: tuple[Node, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -72,9 +75,12 @@ class Network:
                     hint="rename the component.",
                     on_key=True,
                 )
-        nodes = join(self.components, self.connections)
-        check_nodes(self.components, nodes)
-        object.__setattr__(self, "nodes", nodes)
+        object.__setattr__(self, "nodes", join(self.components, self.connections))
+        if not self.is_draft:
+            self._require_complete()
+
+    def _require_complete(self) -> None:
+        check_nodes(self.components, self.nodes)
         if self.fluid is None:
             for name, component in self.components.items():
                 if _has_port_of(component, "hydraulic"):
@@ -100,6 +106,8 @@ class Network:
         Bodies come first, then whatever rules a pressure, then all others in their own order, so
         that each finds what it needs.
         """
+        if self.is_draft:
+            self._require_complete()
         rows = Rows(ambient=self.ambient, fluid=self.fluid, gas=self.gas)
         if any(_has_port_of(component, "hydraulic") for component in self.components.values()):
             rows.component = "ambient"

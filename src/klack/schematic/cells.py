@@ -35,6 +35,7 @@ class PlannedPort:
     """A port and where it leads to.
 
     ``node`` is None for one that is drawn as a ``mark``: ``ground``, ``ambient`` or ``open``.
+    ``is_missing``: it is open and must not be, in a network that is still drawn.
     """
 
     name: str
@@ -42,6 +43,7 @@ class PlannedPort:
     sides: tuple[Side, ...]
     node: int | None
     mark: str = ""
+    is_missing: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +106,8 @@ _OPEN: Mapping[str, str] = {
 
 def _port_text(port: PlannedPort) -> str:
     name = cut(port.name, 24)
+    if port.is_missing:
+        return f"{name} (to be connected)"
     return f"{name} ({_OPEN.get(port.domain, 'open')})" if port.mark == "open" else name
 
 

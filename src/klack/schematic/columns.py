@@ -71,7 +71,8 @@ def plan_of(network: Network) -> Plan:
                 if kind.domain in FLUID_DOMAINS:
                     side = "left"
                 mark = words.get(joint, "open")
-                planned.append(PlannedPort(port, domain, (side,), None, mark))
+                is_missing = mark == "open" and not (kind.optional or kind.role is Role.MOTION)
+                planned.append(PlannedPort(port, domain, (side,), None, mark, is_missing))
                 continue
             node = at[joint]
             ruler = rulers[node]

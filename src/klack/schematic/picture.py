@@ -236,8 +236,12 @@ _INKS = {
 }
 
 
-def svg_of(drawn: Schematic, name: str = "") -> str:
-    """Picture as text; ``name`` is for screen readers."""
+def svg_of(drawn: Schematic, name: str = "", *, has_targets: bool = False) -> str:
+    """Picture as text; ``name`` is for screen readers.
+
+    ``has_targets`` puts clear shapes over components and ports, for pages in which they are
+    clicked: ``data-name`` and ``data-port`` say what is hit.
+    """
     box = drawn.box
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{box.width:g}" height="{box.height:g}" '
@@ -249,6 +253,7 @@ def svg_of(drawn: Schematic, name: str = "") -> str:
         *_ordered_lines(drawn),
         *(_symbol(symbol) for symbol in drawn.symbols),
         *(_label(label) for label in drawn.labels),
+        *(_targets(drawn) if has_targets else ()),
         "</svg>",
     ]
     return "\n".join(part for part in parts if part) + "\n"
@@ -289,6 +294,25 @@ def _symbol(symbol: Symbol) -> str:
     place += f" rotate({symbol.turn})" if symbol.turn else ""
     named = f' class="component" data-name="{_safe(symbol.component)}"' if symbol.component else ""
     return f'<g transform="{place}"{named}>{"".join(map(_stroke, symbol.strokes))}</g>'
+
+
+def _targets(drawn: Schematic) -> Iterable[str]:
+    """Clear shapes over symbols and, above those, over the outer ends of ports."""
+    for symbol in drawn.symbols:
+        if name := _safe(symbol.component):
+            box = symbol.box
+            yield (
+                f'<rect class="target" data-name="{name}" x="{box.x - 4:g}" y="{box.y - 4:g}" '
+                f'width="{box.width + 8:g}" height="{box.height + 8:g}" rx="5" fill="none" '
+                f'pointer-events="all"><title>{name}</title></rect>'
+            )
+    for lead in drawn.leads:
+        if port := _safe(lead.port):
+            x, y = lead.points[0]
+            yield (
+                f'<circle class="target" data-port="{port}" cx="{x:g}" cy="{y:g}" r="9" '
+                f'fill="none" pointer-events="all"><title>{port}</title></circle>'
+            )
 
 
 def _stroke(stroke: Stroke) -> str:

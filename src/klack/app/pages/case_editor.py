@@ -2,20 +2,21 @@
 
 import asyncio
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from itertools import groupby
 from typing import Any
 
 from nicegui import ui
 
-from klack.app.answers import Checked, FormField
+from klack.app.answers import Checked, FormField, NetworkView
+from klack.app.pages.fields import field_row, in_a_line, kind_of_box
 from klack.app.pages.frame import (
     address,
     asking,
     button,
-    choice_box,
     element,
     frame,
     heading,
@@ -23,6 +24,7 @@ from klack.app.pages.frame import (
     plain,
     show_error,
 )
+from klack.app.pages.network_panel import NetworkPanel
 from klack.app.pages.studies import StudyPanel
 from klack.app.state import State
 from klack.errors import KlackError
@@ -82,6 +84,7 @@ class _Editor:
         self._keys: frozenset[FormField] = frozenset()
         self._items: dict[str, FormField] = {}  # of all boxes so far, by their names in the page
         self._open = {"case", "motion", "contact", "parameters", "objectives"}
+        self._network = NetworkPanel(state.reader, self._change, self._items)
 
     def build(self) -> None:
         self._panel = StudyPanel(self._state, self._case)
@@ -91,6 +94,9 @@ class _Editor:
         with ui.element("div").classes("k-head"):
             self._status = plain("checking ...").classes("k-badge").props("role=status")
             plain("").style("flex:1 1 auto")
+            for word in ("Undo", "Redo"):
+                found = button(word).props(f"id=k-{word.lower()}")
+                found.on("click", js_handler=f"() => window.klack{word}()")
             button("Discard changes", self._discard)
             self._of_case = ui.element("div").classes("k-tools")
             with self._of_case:
@@ -105,15 +111,18 @@ class _Editor:
         self._go.set_visibility(False)
         with ui.element("div").classes("k-editor"):
             with ui.element("section"):
-                heading("Form").classes("k-sr")
-                self._form = ui.element("div").classes("k-sheet k-form")
-                # not of each box: what one tells as the form is made again would be dropped
-                for event in ("change", "focusout"):
-                    self._form.on(
-                        event,
-                        self._changed,
-                        js_handler="(e) => window.klackChanged(e, emit)",
-                    )
+                with ui.element("div").classes("k-steps") as self._sides:
+                    for word in ("Schematic", "Form"):
+                        button(word, partial(self._show_side, word))
+                self._sides.set_visibility(False)
+                with ui.element("div") as self._schematic:
+                    heading("Schematic").classes("k-sr")
+                    self._network.build(self._listen)
+                with ui.element("div") as self._of_form:
+                    heading("Form").classes("k-sr")
+                    self._form = ui.element("div").classes("k-sheet k-form")
+                    self._listen(self._form)
+                self._show_side("Form")
             with ui.element("section").classes("k-sheet k-text"):
                 heading("YAML").classes("k-sr")
                 element("pre", id="k-lines", tabindex=-1, aria_hidden="true")
@@ -131,6 +140,19 @@ class _Editor:
                 )
         ui.add_head_html('<script src="/static/editor.js" defer></script>')
         ui.timer(0.05, self._settle, once=True)
+
+    def _listen(self, boxes: ui.element) -> None:
+        # not to each box: what one tells as its part is made again would be dropped
+        for event in ("change", "focusout"):
+            boxes.on(event, self._changed, js_handler="(e) => window.klackChanged(e, emit)")
+
+    def _show_side(self, side: str) -> None:
+        """Show the schematic or the form beside the text."""
+        self._schematic.set_visibility(side == "Schematic")
+        self._of_form.set_visibility(side == "Form")
+        for found in self._sides.default_slot.children:
+            found.props["aria-pressed"] = "true" if found.text == side else "false"  # type: ignore[attr-defined]
+            found.update()
 
     # ----------------------------------------------------------------------- from the text
 
@@ -215,7 +237,54 @@ class _Editor:
                 for words, way in self._ways.items():
                     way.set_visibility(words in found.ways)
                 self._above.set_visibility(found.has_study)
+        await self._show_network(text, found.error)
         await self._panel.checked(text, found)
+
+    async def _show_network(self, text: str, error: str) -> None:
+        """Draw the network of a text, if it has one."""
+        mine = self._count
+        try:
+            view: NetworkView | None = await self._state.reader.call("network", text, self._path)
+        except (KlackError, OSError) as failed:
+            with self._form:
+                show_error(failed)
+            return
+        if mine != self._count or text != self._text:
+            return
+        if view is None and not error:  # of a case without a network
+            self._sides.set_visibility(False)
+            self._show_side("Form")
+        if view is None and not self._sides.visible:
+            return
+        if not self._sides.visible:
+            self._sides.set_visibility(True)
+            self._show_side("Schematic")
+        with self._schematic:
+            boxes = self._network.show(view, error)
+        self._tell_boxes(boxes)
+
+    async def _change(
+        self, act: str, *words: Any, told: Callable[[str], None] | None = None
+    ) -> bool:
+        """Change the text by a function of the reader; whether it did."""
+        async with self._turn:
+            await self._write()
+            text = self._text
+            try:
+                if self._is_too_long:
+                    raise KlackError(_TOO_LONG)
+                found = await self._state.reader.call(act, text, self._path, *words)
+                if text != self._text:
+                    raise KlackError("The text was changed at the same time. Do it again.")
+            except (KlackError, OSError) as error:
+                with self._form:
+                    (show_error if told is None else lambda error: told(str(error)))(error)
+                return False
+            self._text = found
+            self._begin()
+            self._show_text()
+            await self._check()
+        return True
 
     async def keep_now(self, case: str) -> None:
         """Write what waits, and keep the text, if this is the case."""
@@ -241,15 +310,19 @@ class _Editor:
 
     def _show_form(self, fields: tuple[FormField, ...]) -> None:
         """Show the values; make the form again only for other keys."""
-        keys = frozenset(replace(item, written=_kind_of_box(item), default="") for item in fields)
+        keys = frozenset(replace(item, written=kind_of_box(item), default="") for item in fields)
         if keys != self._keys:
             self._keys = keys
             self._form.clear()
             self._make_form(fields)
         found = {f"f-{item.key}": item for item in fields}
         self._items |= found
+        self._tell_boxes(found)
+
+    def _tell_boxes(self, found: Mapping[str, FormField]) -> None:
+        """Hand the values of the text to the boxes of these names."""
         values = {
-            box: (_in_a_line(item), item.default or item.example) for box, item in found.items()
+            box: (in_a_line(item), item.default or item.example) for box, item in found.items()
         }
         self._tell("klackBoxes", values)
 
@@ -261,12 +334,12 @@ class _Editor:
         for name, found in sections.items():
             with self._folded(name, name.replace("_", " ")):
                 for item in (item for item in found if item.written):
-                    self._show_field(item)
+                    field_row(item)
                 further = [item for item in found if not item.written]
                 if further:
                     with self._folded(f"{name}/", f"further keys: {len(further)}", "k-soft"):
                         for item in further:
-                            self._show_field(item)
+                            field_row(item)
 
     def _folded(self, name: str, words: str, more: str = "") -> ui.element:
         """A part that stays open where it was."""
@@ -282,33 +355,12 @@ class _Editor:
             plain(words, "summary").classes(more)
         return part
 
-    def _show_field(self, item: FormField) -> None:
-        with ui.element("div").classes("k-field"):
-            with ui.element("div"):
-                with element("label", for_=f"f-{item.key}"):
-                    plain(item.label.replace(".", ".\u200b"))  # long keys break at their dots
-                words = [item.description]
-                if item.kind:
-                    words.append(f"{item.kind}, e.g. {item.example}")
-                if item.limits:
-                    words.append(item.limits)
-                plain(" · ".join(filter(None, words)), "small")
-            self._show_entry(item)
-
-    def _show_entry(self, item: FormField) -> None:
-        now = _in_a_line(item)
-        common = {"id": f"f-{item.key}", "data-told": now}
-        if _kind_of_box(item) == "select":
-            words = {} if item.written else {"": f"({item.default or 'not given'})"}
-            choice_box(words | {word: word for word in item.choices}, item.written, None, **common)
-            return
-        hint = None if item.written else item.default or item.example
-        kind = {"type": "text", "maxlength": "4000", "start": now}
-        element("input", "k-input", placeholder=hint, **kind | common)
-
     async def _changed(self, event: Any) -> None:
         box, value, count = event.args
         item = self._items[box]
+        if not value and item.place[:2] == ("network", "components") and len(item.place) == 4:
+            await self._change("edited", "leave out", *map(str, item.place[2:]))
+            return
         if not value:  # to remove a key is for the text, which shows what goes with it
             ui.notify(f"{item.label} stays as it was. To remove the key, delete it in the text.")
             return
@@ -410,12 +462,3 @@ class _Editor:
             self._waiting.clear()
             self._show_text()
             await self._check()
-
-
-def _in_a_line(item: FormField) -> str:
-    """A value on one line: browsers drop line ends in boxes."""
-    return " ".join(item.written.splitlines())
-
-
-def _kind_of_box(item: FormField) -> str:
-    return "select" if item.choices and item.written in ("", *item.choices) else "input"

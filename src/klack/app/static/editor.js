@@ -136,3 +136,74 @@
     area.scrollIntoView({ block: "nearest" });
   };
 })();
+// Undo and redo: one history of what is typed, and of what the form and the schematic change, as pieces of the text.
+(() => {
+  const MOST = 2000;  // changes
+  let area = null, last = "", done = [], undone = [];
+  const piece = (old, text) => {
+    let from = 0, end = 0;
+    const most = Math.min(old.length, text.length);
+    while (from < most && old[from] === text[from]) from++;
+    while (end < most - from && old[old.length - 1 - end] === text[text.length - 1 - end]) end++;
+    return { from, removed: old.slice(from, old.length - end), added: text.slice(from, text.length - end) };
+  };
+  // letters of a word are one change
+  const goesOn = (first, next) => first?.isTyped && next.isTyped && !first.removed && !next.removed &&
+    next.added.length === 1 && /\S/.test(next.added) && /\S$/.test(first.added) && next.from === first.from + first.added.length;
+  const note = (isTyped) => {
+    if (area.value === last) return;
+    const found = { ...piece(last, area.value), isTyped }, before = done[done.length - 1];
+    if (!undone.length && goesOn(before, found)) before.added += found.added;
+    else done.push(found);
+    if (done.length > MOST) done.shift();
+    undone = [];
+    last = area.value;
+  };
+  const put = (from, old, text) => {
+    area.setRangeText(text, from, from + old.length, "end");
+    last = area.value;
+    area.dispatchEvent(new Event("input", { bubbles: true }));
+  };
+  const begun = () => {
+    if (area) return true;
+    area = document.getElementById("k-yaml");
+    if (area) last = area.value;
+    return area !== null;
+  };
+  window.klackNoted = () => { if (begun()) note(false); };
+  window.klackUndo = () => {
+    const found = begun() && done.pop();
+    if (!found) return;
+    undone.push(found);
+    put(found.from, found.added, found.removed);
+  };
+  window.klackRedo = () => {
+    const found = begun() && undone.pop();
+    if (!found) return;
+    done.push({ ...found, isTyped: false });
+    put(found.from, found.removed, found.added);
+  };
+  const wait = setInterval(() => { if (begun()) clearInterval(wait); }, 30);
+  document.addEventListener("input", ({ target }) => { if (begun() && target === area) note(true); }, true);
+  document.addEventListener("beforeinput", (event) => {
+    const act = { historyUndo: window.klackUndo, historyRedo: window.klackRedo }[event.inputType];
+    if (!act || event.target.id !== "k-yaml") return;
+    event.preventDefault();
+    act();
+  });
+  document.addEventListener("keydown", (event) => {
+    const key = event.key.toLowerCase(), isUndo = key === "z" && !event.shiftKey, isRedo = key === "y" || key === "z" && event.shiftKey;
+    if (!(event.ctrlKey || event.metaKey) || event.altKey || !(isUndo || isRedo) || !begun()) return;
+    if (event.target !== area && event.target.closest("input, textarea, select, [role=dialog]")) return;
+    event.preventDefault();
+    (isUndo ? window.klackUndo : window.klackRedo)();
+  });
+})();
+// The schematic: component and port that a click hits.
+window.klackHit = (target) => {
+  const hit = target.closest("[data-name], [data-port]")?.dataset ?? {};
+  return [hit.name ?? "", hit.port ?? ""];
+};
+window.klackShowChosen = () => requestAnimationFrame(() => requestAnimationFrame(() => {  // once it is drawn
+  document.querySelector(".k-net [data-name].k-chosen")?.scrollIntoView({ block: "nearest", inline: "nearest" });
+}));

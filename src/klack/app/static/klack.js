@@ -117,6 +117,7 @@
     while (from < most && old[from] === text[from]) from++;
     while (end < most - from && old[old.length - 1 - end] === text[text.length - 1 - end]) end++;
     area.setRangeText(text.slice(from, text.length - end), from, old.length - end, "preserve");  // the cursor stays
+    klackNoted();
     klackDrawn();
   };
   addEventListener("beforeunload", () => document.activeElement?.blur());  // half typed: told before the page goes

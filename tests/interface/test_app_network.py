@@ -1,0 +1,148 @@
+"""The network of a case is edited on its schematic, in a browser.
+
+Truth: the text of the case.  What is done on the schematic is in it, what is written in it is
+drawn, and as many steps back as were made give the first text, byte for byte.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("nicegui")
+from app_browser import page, require_within, server
+from served_app import Served
+
+__all__ = ["page", "server"]  # fixtures
+
+pytestmark = pytest.mark.slow
+
+CASE = "case.yaml"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("network")
+    (place / CASE).write_text(Path("docs/how-to/small_valve.yaml").read_text("utf-8"), "utf-8")
+    return place
+
+
+@pytest.fixture
+def editor(page: Any, server: Served) -> Iterator[Any]:
+    """The page of the case as it is saved, with its schematic."""
+    page.set_default_timeout(60_000)
+    page.goto(f"{server.base}/case?path={CASE}")
+    page.wait_for_selector("text=valid stroke, saved")
+    page.wait_for_selector(".k-net svg")
+    yield page
+    page.get_by_role("button", name="Discard changes").click()
+    page.wait_for_selector("text=valid stroke, saved")
+
+
+def text_of(page: Any) -> str:
+    return str(page.get_by_label("case file, YAML").input_value())
+
+
+def require_text(page: Any, text: str) -> None:
+    page.wait_for_function("text => document.getElementById('k-yaml').value === text", arg=text)
+
+
+def require_line(page: Any, words: str) -> None:
+    page.wait_for_function(
+        "words => document.getElementById('k-yaml').value.includes(words)", arg=words
+    )
+
+
+def test_a_bleed_is_added_connected_renamed_removed_and_all_is_undone(editor):
+    """With the mouse, as an engineer would."""
+    texts = [text_of(editor)]
+
+    editor.get_by_role("button", name="Add a component").click()
+    dialog = editor.get_by_role("dialog")
+    dialog.get_by_label("Group").select_option("hydraulics")
+    dialog.get_by_label("Type").select_option("orifice")
+    dialog.get_by_text("Short restriction of constant area").wait_for()
+    dialog.get_by_label("Name").fill("bleed")
+    dialog.get_by_role("button", name="Add", exact=True).click()
+    dialog.get_by_text("exactly one of diameter, area").wait_for()
+    dialog.get_by_label("diameter", exact=True).fill("0.3 mm")
+    dialog.get_by_role("button", name="Add", exact=True).click()
+    require_line(editor, "    bleed: {type: orifice, diameter: 0.3 mm}\n")
+    dialog.wait_for(state="detached")
+    texts.append(text_of(editor))
+
+    editor.wait_for_selector("text=the port bleed.a in no connection")
+    editor.locator(".target.k-fault[data-name=bleed]").wait_for()
+    editor.locator(".target[data-port='bleed.a']").click()
+    editor.wait_for_selector("text=bleed.a: click the port")
+    editor.locator(".target[data-port='chamber.fluid']").first.click()
+    require_line(editor, "face.fluid, bleed.a]")
+    texts.append(text_of(editor))
+    editor.wait_for_selector("text=the port bleed.b in no connection")
+    editor.locator(".target[data-port='bleed.b']").click()
+    editor.wait_for_selector("text=bleed.b: click the port")
+    editor.get_by_label("connect bleed.b to").select_option("ambient")
+    require_line(editor, "[bleed.b, ambient]")
+    editor.wait_for_selector("text=valid stroke, not saved")
+    texts.append(text_of(editor))
+
+    box = editor.locator("[id='n-network.components.bleed.diameter']")
+    box.fill("0.4 mm")
+    box.press("Enter")
+    require_line(editor, "diameter: 0.4 mm}")
+    texts.append(text_of(editor))
+    editor.get_by_role("button", name="Rename bleed").click()
+    dialog.get_by_label("Name").fill("leak")
+    dialog.get_by_role("button", name="Rename", exact=True).click()
+    require_line(editor, "[leak.b, ambient]")
+    dialog.wait_for(state="detached")
+    texts.append(text_of(editor))
+    editor.get_by_role("button", name="Remove leak").click()
+    require_text(editor, texts[0])
+    editor.wait_for_selector("text=valid stroke, saved")
+
+    for text in reversed(texts):
+        editor.get_by_role("button", name="Undo").click()
+        require_text(editor, text)
+    for text in (*texts[1:], texts[0]):
+        editor.get_by_role("button", name="Redo").click()
+        require_text(editor, text)
+    require_within(editor)
+
+
+def test_the_keyboard_alone_edits_and_the_text_is_drawn(editor):
+    """Typed letters of one word are one step; the schematic follows the text, both ways."""
+    first = text_of(editor)
+    area = editor.get_by_label("case file, YAML")
+    area.focus()
+    editor.keyboard.press("Control+End")
+    editor.keyboard.type("oops")
+    editor.wait_for_selector("text=not valid, not saved")
+    editor.locator(".k-net .k-old").wait_for()
+    editor.keyboard.press("Control+z")
+    require_text(editor, first)
+    editor.locator(".k-net .k-old").wait_for(state="detached")
+    editor.keyboard.press("Control+Shift+z")
+    require_text(editor, first + "oops")
+    editor.keyboard.press("Control+z")
+    require_text(editor, first)
+
+    editor.wait_for_selector("text=valid stroke, saved")
+    editor.get_by_label("Component", exact=True).focus()
+    editor.keyboard.type("spring")
+    editor.keyboard.press("Enter")
+    editor.locator(".target.k-chosen[data-name=spring]").wait_for()
+    box = editor.locator("[id='n-network.components.spring.preload']")
+    box.focus()
+    editor.keyboard.press("Control+a")
+    editor.keyboard.type("5 kg")
+    editor.keyboard.press("Enter")
+    editor.wait_for_selector("#k-told:has-text('network.components.spring.preload: got')")
+    editor.locator(".k-net .k-old").wait_for()
+    editor.get_by_role("button", name="Undo").press("Enter")
+    require_text(editor, first)
+    editor.wait_for_selector("text=valid stroke, saved")
+
+    area.fill(first.replace("spring:", "coil_spring:").replace("spring.end", "coil_spring.end"))
+    editor.locator(".target[data-name=coil_spring]").wait_for(state="attached")
