@@ -263,6 +263,16 @@ def test_a_component_that_the_reader_refuses_is_not_added():
         added_component(TEXT, "case.yaml", "new", "orifice", {})
 
 
+@pytest.mark.parametrize(
+    "typed", ["{a: 1", "0x1F", "2026-11-30", "a: b", "[1, 2", "5 N # x", "null"]
+)
+def test_what_is_typed_for_a_new_component_is_one_value(typed):
+    """Truth: the reader of components, which gets what was typed as a text."""
+    with pytest.raises(InputError, match=r"new\.stiffness: got ") as found:
+        added_component(TEXT, "case.yaml", "new", "spring", GIVEN | {"stiffness": typed})
+    assert typed in found.value.got
+
+
 def test_a_connection_of_two_domains_is_refused_in_the_words_of_the_reader():
     text = added_component(TEXT, "case.yaml", "hole", "orifice", {"diameter": "1 mm"})
 

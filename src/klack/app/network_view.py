@@ -16,7 +16,7 @@ from klack.app.answers import (
     NetworkView,
     typed,
 )
-from klack.app.texts import as_yaml, choices_of, leaves, limits_of, shown
+from klack.app.texts import choices_of, leaves, limits_of, scalar_of, shown
 from klack.case.field_example import field_at, written_example
 from klack.case.first_error import first_error
 from klack.case.key_path import kind_in
@@ -254,7 +254,7 @@ def added_component(text: str, path: str, name: str, word: str, given: Mapping[s
     ``given`` are its keys as they were typed; empty ones are left out.
     """
     name = name.strip()
-    entries = {"type": word} | {key: _in_flow(v) for key, v in given.items() if v.strip()}
+    entries = {"type": word} | {key: scalar_of(v) for key, v in given.items() if v.strip()}
     changed = with_component(text, Path(path), name, entries)
     data, lines = parse(changed, Path(path))
     alone = {"components": {name: data["network"]["components"][name]}}
@@ -277,9 +277,3 @@ class _Added(Section):
     """Components alone, as in a network."""
 
     components: Mapping[Name, AnyComponent]
-
-
-def _in_flow(written: str) -> str:
-    """YAML of what was typed, for a place in brackets: lists and sections stay as they are."""
-    plain = written.strip()
-    return plain if plain[0] in "[{" else as_yaml(plain)

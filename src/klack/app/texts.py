@@ -28,7 +28,6 @@ from klack.input.problem import CaseProblem, Key
 from klack.input.section import Section
 
 __all__ = [
-    "as_yaml",
     "checked_text",
     "choices_of",
     "differing_inputs",
@@ -36,6 +35,7 @@ __all__ = [
     "form_of",
     "leaves",
     "limits_of",
+    "scalar_of",
     "shown",
     "study_offer",
     "study_problem",
@@ -61,7 +61,7 @@ _OF_THE_SOLVER = (
 )
 """Numbers of a run, not of the valve."""
 _PLAIN = re.compile(r"[A-Za-z0-9_.+-]+(?: [A-Za-z0-9_.+*/^%()°-]+)*")
-_TYPED = re.compile(r"\d[\d.]*(?:e-?\d+)? ?(?:%|[A-Za-z][A-Za-z0-9*/^]*)|[A-Za-z][A-Za-z0-9_-]*")
+_TYPED = re.compile(r"\d[\d.]*(?:e-?\d+)?(?: ?%| [A-Za-z][A-Za-z0-9*/^]*)|[A-Za-z][A-Za-z0-9_-]*")
 """A quantity or a word that YAML takes for the text that it is."""
 _TAKEN = ("true", "false", "null", "yes", "no", "on", "off", "nan", "inf")
 _WORDS = {"minimise", "maximise"}
@@ -213,7 +213,7 @@ def study_text(choice: StudyChoice, case_text: str, case_path: str) -> str:
         "#   klack study CASE --study THIS_FILE       computes the points of the design",
         "#   klack optimise CASE --study THIS_FILE    searches the ranges for the best points",
         "klack: 1",
-        f"case: {as_yaml(name)}  # klack app runs it with this case",
+        f"case: {_as_yaml(name)}  # klack app runs it with this case",
         "study:",
         "  # keys of the case and their ranges; a tolerance is {normal: {mean: 12 N, sd: 0.3 N}}",
         "  parameters:",
@@ -225,7 +225,7 @@ def study_text(choice: StudyChoice, case_text: str, case_path: str) -> str:
             raise _refused(key[:80], "a key that the case has no number at", "one of the list", "")
         name = known.label.replace(" ", "_") if known.also else key
         lines.append(
-            f"    {as_yaml(name)}: {{from: {as_yaml(low)}, to: {as_yaml(high)}}}"
+            f"    {_as_yaml(name)}: {{from: {_as_yaml(low)}, to: {_as_yaml(high)}}}"
             f"  # today {known.text(known.start)}"
         )
         if known.also:
@@ -235,10 +235,10 @@ def study_text(choice: StudyChoice, case_text: str, case_path: str) -> str:
     measures = dict.fromkeys((*choice.measures, *choice.objectives))
     of = {item.name: item.measure for item in kind_of(case).measures(case, measures)}
     lines.append("  measures:")
-    lines += [f"    - {as_yaml(name)}  # {_comment(of[name].definition)}" for name in measures]
+    lines += [f"    - {_as_yaml(name)}  # {_comment(of[name].definition)}" for name in measures]
     if choice.objectives:
         lines.append("  objectives:  # of klack optimise, and of the front that klack app shows")
-        lines += [f"    {as_yaml(name)}: {way}" for name, way in choice.objectives.items()]
+        lines += [f"    {_as_yaml(name)}: {way}" for name, way in choice.objectives.items()]
     if choice.design not in _DESIGNS:
         raise _refused("design", choice.design[:40], ", ".join(_DESIGNS), "choose one of them.")
     lines.append(f"  # {_DESIGNS[choice.design]}")
@@ -254,7 +254,7 @@ def study_text(choice: StudyChoice, case_text: str, case_path: str) -> str:
     return text
 
 
-def as_yaml(text: str) -> str:
+def _as_yaml(text: str) -> str:
     """YAML of a text: plain if that is the same, else in quotes."""
     plain = text.strip()
     if _PLAIN.fullmatch(plain) and not _is_number_like_word(plain):
@@ -347,7 +347,7 @@ def exchanged_text(text: str, path: str, place: Key, written: str) -> str:
     """
     data, lines = parse(text, Path(path))  # without the files that it includes
     tree = CaseTree(path=Path(path), text=text, data=data, lines=lines)
-    return with_values(tree, {place: _scalar(written, is_text=_takes_text(tree, place))})
+    return with_values(tree, {place: scalar_of(written, is_text=_takes_text(tree, place))})
 
 
 def form_of(case: Section, tree: CaseTree) -> Iterator[FormField]:
@@ -467,7 +467,7 @@ def _takes_text(tree: CaseTree, place: Key) -> bool:
     return info is not None and info.annotation in (str, str | None)
 
 
-def _scalar(text: str, *, is_text: bool) -> str:
+def scalar_of(text: str, *, is_text: bool = False) -> str:
     """YAML of typed text: plain where that means the same, else in quotes."""
     plain = text.strip()
     if is_text:

@@ -167,7 +167,7 @@ class NetworkPanel:
         self._make_ports(part)
 
     def _make_ports(self, part: NetworkPart) -> None:
-        known = self._ports()
+        known = self._ports(has_included=False)
         with ui.element("div").classes("k-pad k-net-ports"):
             heading("Ports", 3)
             for port in part.ports:
@@ -184,6 +184,8 @@ class NetworkPanel:
                         plain(f"{port.name} ").classes("k-title")
                         plain(f"{port.domain}, ").classes("k-soft")
                         plain(f"with {', '.join(port.joined)}" if port.joined else "open")
+                    if part.is_included:
+                        continue
                     with ui.element("div").classes("k-tools"):
                         choice_box(
                             {"": "connect to ..."} | {other: other for other in others},
