@@ -56,8 +56,8 @@ def _written(annotation: Any, quantity: str) -> str:
     if get_origin(kind) is Literal:
         return _in_yaml(get_args(kind)[0])
     if get_origin(kind) in (tuple, list, Sequence):
-        kinds = get_args(kind)
-        inside = kinds[:1] * 2 if kinds[-1] is Ellipsis or len(kinds) == 1 else kinds
+        items = get_args(kind)
+        inside = items[:1] * 2 if items[-1] is Ellipsis or len(items) == 1 else items
         return f"[{', '.join(_written(item, quantity) for item in inside)}]"
     if get_origin(kind) is Mapping:
         return f"{{name: {_written(get_args(kind)[-1], quantity)}}}"

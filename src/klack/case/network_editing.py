@@ -203,7 +203,7 @@ def _at(node: Any, key: Iterable[str]) -> Any:
     return node
 
 
-def _end(node: Node) -> int:
+def _end(node: Any) -> int:
     """End of what is written of a node: that of a block is behind the comments that follow it."""
     if isinstance(node, ScalarNode) or node.flow_style or not node.value:
         return int(node.end_mark.index)

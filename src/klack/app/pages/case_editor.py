@@ -112,8 +112,10 @@ class _Editor:
         with ui.element("div").classes("k-editor"):
             with ui.element("section"):
                 with ui.element("div").classes("k-steps") as self._sides:
-                    for word in ("Schematic", "Form"):
-                        button(word, partial(self._show_side, word))
+                    self._of_side = {
+                        word: button(word, partial(self._show_side, word))
+                        for word in ("Schematic", "Form")
+                    }
                 self._sides.set_visibility(False)
                 with ui.element("div") as self._schematic:
                     heading("Schematic").classes("k-sr")
@@ -150,8 +152,8 @@ class _Editor:
         """Show the schematic or the form beside the text."""
         self._schematic.set_visibility(side == "Schematic")
         self._of_form.set_visibility(side == "Form")
-        for found in self._sides.default_slot.children:
-            found.props["aria-pressed"] = "true" if found.text == side else "false"  # type: ignore[attr-defined]
+        for word, found in self._of_side.items():
+            found.props["aria-pressed"] = "true" if word == side else "false"
             found.update()
 
     # ----------------------------------------------------------------------- from the text

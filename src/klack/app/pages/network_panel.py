@@ -123,10 +123,9 @@ class NetworkPanel:
     def _part(self) -> NetworkPart | None:
         return next((part for part in self._view.parts if part.name == self._chosen), None)
 
-    def _ports(self) -> dict[str, NetworkPort]:
-        return {
-            f"{part.name}.{port.name}": port for part in self._view.parts for port in part.ports
-        }
+    def _ports(self, *, has_included: bool = True) -> dict[str, NetworkPort]:
+        parts = (part for part in self._view.parts if has_included or not part.is_included)
+        return {f"{part.name}.{port.name}": port for part in parts for port in part.ports}
 
     def _show_part(self) -> dict[str, FormField]:
         """Show the chosen component; make it again only if it has other keys or ports."""
