@@ -47,6 +47,8 @@ class NetworkPanel:
         self._drawn, self._width = "", 0.0  # the last picture
         self._chosen, self._port, self._wrong = "", "", ""
         self._shown: object = None
+        self._listed: tuple[list[str], str] | None = None
+        self._is_open = False  # what lists the further keys
         self._whole = self._is_old = False
 
     def build(self, listen: Callable[[ui.element], None]) -> None:
@@ -111,6 +113,10 @@ class NetworkPanel:
         self._cancel.set_visibility(bool(self._port))
 
     def _show_list(self, names: list[str]) -> None:
+        """Show the components and which is chosen; a list that is open stays if nothing changed."""
+        if self._listed == (names, self._chosen):
+            return
+        self._listed = names, self._chosen
         self._list.clear()
         with self._list:
             words = {"": "Component ..."} | {name: name for name in names}
@@ -159,11 +165,16 @@ class NetworkPanel:
         for item in written:
             field_row(item, _NAME)
         if further := [item for item in part.fields if not item.written]:
-            with ui.element("details").classes("k-pad"):
+            with ui.element("details").classes("k-pad") as fold:
+                fold.props["open"] = self._is_open
+                fold.on("toggle", self._note_open, js_handler="(e) => emit(e.target.open)")
                 plain(f"further keys: {len(further)}", "summary").classes("k-soft")
                 for item in further:
                     field_row(item, _NAME)
         self._make_ports(part)
+
+    def _note_open(self, event: Any) -> None:
+        self._is_open = bool(event.args)
 
     def _make_ports(self, part: NetworkPart) -> None:
         known = self._ports(has_included=False)
@@ -200,6 +211,7 @@ class NetworkPanel:
 
     async def _choose(self, name: str) -> None:
         self._chosen, self._port = name, ""
+        self._listed = self._listed and (self._listed[0], name)  # it is seen to be chosen
         self._draw()
         self._show_part()
         self._picture.client.run_javascript("window.klackShowChosen()")
@@ -263,9 +275,10 @@ class NetworkPanel:
             plain("Connections, run.lift, stops and the study get the new name as well.", "p")
 
     async def _choose_next(self, name: str) -> None:
-        self._show_list([part.name for part in self._view.parts])
-        await self._choose(name if any(part.name == name for part in self._view.parts) else "")
-        self._show_list([part.name for part in self._view.parts])
+        names = [part.name for part in self._view.parts]
+        self._chosen = name if name in names else ""
+        self._show_list(names)
+        await self._choose(self._chosen)
 
     async def _ask(self) -> None:
         """Ask for the type, the name and the keys of a new component."""
