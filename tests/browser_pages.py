@@ -96,7 +96,7 @@ def _component(page: Any) -> None:
     page.wait_for_selector(".k-net svg")
     page.get_by_label("Component", exact=True).select_option("armature_gap")
     page.wait_for_selector("text=armature_gap: annulus")
-    page.evaluate("window.scrollTo(0, document.querySelector('.k-editor').offsetTop - 70)")
+    page.evaluate("window.scrollTo(0, document.querySelector('.k-editor').offsetTop - 58)")
 
 
 def planned(step: int, **other: str) -> Callable[[Path], None]:
