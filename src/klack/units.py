@@ -25,6 +25,7 @@ __all__ = [
     "Angle",
     "AngularVelocity",
     "Area",
+    "BedStiffness",
     "Capacitance",
     "Compliance",
     "Conductivity",
@@ -140,6 +141,13 @@ SPEED = Kind("a speed", "m/s", "0.5 m/s", ("m/s", "mm/s", "km/h"), largest=1e6)
 TIME = Kind("a time", "s", "40 us", ("s", "ms", "us", "ns", "min"), smallest=1e-18, largest=1e9)
 FORCE = Kind("a force", "N", "12 N", ("N", "kN", "mN", "lbf"))
 STIFFNESS = Kind("a stiffness", "N/m", "5 N/mm", ("N/m", "N/mm", "N/um", "kN/mm"), largest=1e18)
+BED_STIFFNESS = Kind(
+    "a stiffness per area",
+    "N/m^3",
+    "20 N/mm^3",
+    ("N/m^3", "N/mm^3", "MPa/mm", "N/um/mm^2"),
+    largest=1e24,
+)
 _PRESSURES = ("Pa", "kPa", "MPa", "GPa", "bar", "N/mm^2", "psi")
 PRESSURE = Kind("a pressure", "Pa", "5 bar", _PRESSURES, smallest=1e-12)
 MODULUS = Kind("a modulus", "Pa", "210 GPa", _PRESSURES, smallest=1e-12)
@@ -244,6 +252,7 @@ KINDS = (
     TIME,
     FORCE,
     STIFFNESS,
+    BED_STIFFNESS,
     PRESSURE,
     MODULUS,
     DENSITY,
@@ -707,6 +716,7 @@ Speed = Annotated[float, *typed(SPEED)]
 Time = Annotated[float, *typed(TIME)]
 Force = Annotated[float, *typed(FORCE)]
 Stiffness = Annotated[float, *typed(STIFFNESS)]
+BedStiffness = Annotated[float, *typed(BED_STIFFNESS)]
 Pressure = Annotated[float, *typed(PRESSURE)]
 Modulus = Annotated[float, *typed(MODULUS)]
 Density = Annotated[float, *typed(DENSITY)]

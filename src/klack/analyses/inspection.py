@@ -8,8 +8,11 @@ import numpy as np
 
 from klack.analyses.valve_inspection import valve_rows
 from klack.assembling.assembled_bodies import assembled_body
+from klack.assembling.bodies import assemble_body, mesh_body
 from klack.assembling.fits import press_fits
 from klack.assembling.given_bodies import reduced_from_file
+from klack.assembling.layers import layer_states
+from klack.bodies.elasticity.eigen import eigenmodes
 from klack.bodies.model_files.matrices import MATRIX_FORMATS, read_matrix
 from klack.bodies.model_files.system_matrix import SystemMatrix, WhichMatrixError
 from klack.bodies.reduction.reduced_body import ReducedBody
@@ -179,6 +182,11 @@ def _drawn_rows(case: CaseFile, name: str, drawn: ProfileGeometry) -> Iterator[R
     for fit in press_fits(case, name):
         yield from (("press fit", fit.joint, f"{what}: {text}") for what, text in fit.rows())
         yield from (("doubt", fit.joint, doubt) for doubt in fit.doubts)
+    if case.bodies[name].layers:
+        body = assemble_body(case, name, mesh_body(case.bodies[name], name, ()))
+        for state in layer_states(body, eigenmodes(body, count=_MODES)):
+            yield from (("layer", state.name, f"{what}: {text}") for what, text in state.rows())
+            yield from (("doubt", state.name, doubt) for doubt in state.doubts)
 
 
 def _drawn_inertia(case: CaseFile, name: str, profiles: Mapping[str, Profile]) -> Iterator[Row]:
@@ -332,6 +340,7 @@ def _matrix_rows(found: SystemMatrix) -> Iterator[Row]:
         yield "note", "", note
 
 
+_MODES = 10  # that show a layer
 _WAYS = {1: "x", 2: "y", 3: "z", 4: "rx", 5: "ry", 6: "rz"}
 
 

@@ -3,6 +3,7 @@
 import warnings
 
 from klack.assembling.held_nodes import held_nodes
+from klack.assembling.layers import layers_of
 from klack.bodies.elasticity.fourier_body import FourierBody, fourier_body
 from klack.case.bodies import CaseFile
 from klack.errors import AccuracyWarning
@@ -35,4 +36,11 @@ def bending_body(case: CaseFile, name: str, mesh: Mesh) -> FourierBody | None:
             stacklevel=2,
         )
     materials = case.materials_of(name, mesh.solids)
-    return fourier_body(name, mesh, materials, order=1, fixed_nodes=held_nodes(body, mesh))
+    return fourier_body(
+        name,
+        mesh,
+        materials,
+        order=1,
+        fixed_nodes=held_nodes(body, mesh),
+        layers=layers_of(case, name),
+    )

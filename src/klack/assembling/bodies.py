@@ -23,6 +23,7 @@ from klack.assembling.generated_mesh import (
 )
 from klack.assembling.given_shapes import require_given_shapes, tell_effort
 from klack.assembling.held_nodes import held_nodes
+from klack.assembling.layers import layers_of
 from klack.assembling.placement import Touch, first_touch_of_meshes, first_touch_of_profiles
 from klack.bodies.elasticity.body import ElasticBody, elastic_body
 from klack.bodies.gauges.gauge import Gauge
@@ -41,6 +42,7 @@ from klack.input.problem import Key
 from klack.machine.progress import Progress
 from klack.mesh.files.mesh_file import read_mesh_file
 from klack.mesh.mesh import Mesh, Surface, solid_at
+from klack.mesh.parting import parted
 from klack.mesh.quality import PoorElementError
 from klack.mesh.rigid import Pose
 from klack.mesh.sizing import MeshSizing, Refinement
@@ -315,7 +317,13 @@ def assemble_body(case: CaseFile, name: str, mesh: Mesh) -> ElasticBody:
     for fit in press_fits(case, name):
         for doubt in fit.doubts:
             warnings.warn(doubt, AccuracyWarning, stacklevel=2)
-    return elastic_body(name, mesh, materials, fixed_nodes=held_nodes(body, mesh))
+    return elastic_body(
+        name,
+        mesh,
+        materials,
+        fixed_nodes=held_nodes(body, mesh),
+        layers=layers_of(case, name),
+    )
 
 
 def with_size(case: C, name: str, size: float) -> C:
@@ -333,7 +341,7 @@ def mesh_body(
     places: Places | None = None,
     places_at: Callable[[float], Places] | None = None,
 ) -> Mesh:
-    """Mesh one body.
+    """Mesh one body, parted at its layers.
 
     Parameters
     ----------
@@ -343,6 +351,16 @@ def mesh_body(
     places_at
         Places of a case with another general size [m].
     """
+    whole = _whole_mesh(body, name, places, places_at)
+    return parted(whole, body.layers or (), f"bodies.{name}.layers")
+
+
+def _whole_mesh(
+    body: CaseBody,
+    name: str,
+    places: Places | None,
+    places_at: Callable[[float], Places] | None,
+) -> Mesh:
     geometry = body.geometry
     if geometry.nodes is not None:
         return node_mesh(geometry.nodes, geometry.dimension, f"bodies.{name}.geometry.nodes")[0]

@@ -10,6 +10,7 @@ from klack.assembling.assembled_bodies import assembled_from_matrices
 from klack.assembling.bodies import assemble_body, mesh_body
 from klack.assembling.body_summary import BodySummary, summarise_body
 from klack.assembling.given_bodies import reduced_from_file
+from klack.assembling.layers import tell_layers
 from klack.assembling.modes import damping_of, mode_pool, selection_of
 from klack.assembling.reduced_pair import hertz_coefficient, impact_system
 from klack.bodies.elasticity.body import ElasticBody
@@ -122,6 +123,7 @@ def _side(case: Case, surface: SurfaceName, threads: int | None) -> tuple[Reduce
     flexibility = Flexibility(body, threads=threads, cache=result_cache())
     choice = selection_of(case.reduction.choice(body.name))
     pool = mode_pool(choice, body, flexibility)
+    tell_layers([body], {body.name: pool})
     correction = case.reduction.correction
     reduced = reduce_body(
         body,

@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.assembling.layers import tell_layers
 from klack.assembling.problem import ContactProblem, PlacedBodies
 from klack.bodies.elasticity.body import ElasticBody
 from klack.bodies.elasticity.eigen import Modes, eigenmodes
@@ -75,7 +76,9 @@ def mode_pools(
         at_once=placed.flexibility_upper.at_once,
     )
     progress("modes", 1.0)
-    return {body.name: pool for body, pool in zip(bodies, pools, strict=True)}
+    found = {body.name: pool for body, pool in zip(bodies, pools, strict=True)}
+    tell_layers(bodies, found)
+    return found
 
 
 def mode_pool(
@@ -158,5 +161,7 @@ def damping_of(damping: BodyDamping) -> Damping:
 
 
 def is_damped(case: Case, name: str) -> bool:
-    """Whether a body has damping."""
-    return bool(damping_of(case.bodies[name].damping).ratios([1.0])[0] > 0.0)
+    """Whether a body has damping, or a layer with loss."""
+    body = case.bodies[name]
+    lossy = any(row[-1] > 0.0 for layer in (body.layers or {}).values() for row in layer.rows)
+    return lossy or bool(damping_of(body.damping).ratios([1.0])[0] > 0.0)

@@ -8,6 +8,7 @@ import numpy as np
 
 from klack.arrays import Ints, Vector
 from klack.assembling.held_nodes import held_nodes
+from klack.assembling.layers import layers_of
 from klack.assembling.modes import damping_of
 from klack.bodies.elasticity.body import ElasticBody
 from klack.bodies.elasticity.eigen import Modes, eigenmodes
@@ -164,7 +165,12 @@ def _by_order(
     """Torsion, or tilts about x and about y, which no axisymmetric force excites."""
     materials = case.materials_of(body.name, body.mesh.solids)
     whole: FourierBody = fourier_body(
-        body.name, body.mesh, materials, order=order, fixed_nodes=_held(surfaces)
+        body.name,
+        body.mesh,
+        materials,
+        order=order,
+        fixed_nodes=_held(surfaces),
+        layers=layers_of(case, body.name),
     )
     found = []
     with Flexibility(whole, cache=flexibility.cache) as own:

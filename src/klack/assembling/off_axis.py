@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from klack.assembling.bodies import BodyPair, warn_far_touch
 from klack.assembling.held_nodes import held_nodes
+from klack.assembling.layers import layers_of
 from klack.assembling.modes import damping_of, selection_of
 from klack.assembling.problem import ContactProblem
 from klack.bodies.elasticity.body import ElasticBody
@@ -205,7 +206,10 @@ def turning_body(case: CaseFile, name: str, mesh: Mesh) -> Callable[[int], Fouri
             stacklevel=2,
         )
     materials, nodes = case.materials_of(name, mesh.solids), held_nodes(body, mesh)
-    return lambda order: fourier_body(name, mesh, materials, order=order, fixed_nodes=nodes)
+    layers = layers_of(case, name)
+    return lambda order: fourier_body(
+        name, mesh, materials, order=order, fixed_nodes=nodes, layers=layers
+    )
 
 
 def turned(

@@ -17,6 +17,7 @@ from klack.assembling.stops import StopContact
 from klack.bodies.elasticity.body import ElasticBody
 from klack.bodies.elasticity.eigen import Modes
 from klack.bodies.elasticity.statics import Flexibility
+from klack.bodies.reduction.damping import damping_ratios
 from klack.bodies.reduction.ports import Port
 from klack.bodies.reduction.reduce import kept_modes
 from klack.case.bodies import BodySurface
@@ -372,7 +373,12 @@ def build_spatial(
                 body=bodies[name],
                 flexibility=flexibilities[name],
                 modes=kept[name],
-                damping=damping_of(case.bodies[name].damping).ratios(kept[name].omega),
+                damping=damping_ratios(
+                    damping_of(case.bodies[name].damping),
+                    bodies[name],
+                    kept[name].omega,
+                    kept[name].shapes,
+                ),
             )
             for name in [needle, *(name for name in bodies if name != needle)]
         ],

@@ -17,6 +17,7 @@ from klack.assembling.bodies import (
 )
 from klack.assembling.candidates import likely_loads
 from klack.assembling.given_shapes import require_given_shapes, tell_effort
+from klack.assembling.layers import tell_layers
 from klack.assembling.modes import damping_of, mode_pool, selection_of
 from klack.assembling.spatial import build_spatial, check_heights
 from klack.assembling.spatial_rings import build_spatial_rings
@@ -273,7 +274,9 @@ def _mode_pools(
         at_once=all(item.at_once for item in flexibilities.values()),
     )
     progress("modes", 1.0)
-    return dict(zip(flexibilities, pools, strict=True))
+    found = dict(zip(flexibilities, pools, strict=True))
+    tell_layers(bodies.values(), found)
+    return found
 
 
 def _ports(case: ValveCase, body: ElasticBody, contacts: Mapping[str, StopContact]) -> list[Port]:

@@ -16,6 +16,7 @@ from pydantic import (
 
 from klack.case.foreign import Matrices, ReducedModel
 from klack.case.geometry import Geometry, MeshSettings, Support
+from klack.case.layers import CaseLayer
 from klack.case.origin import ExpandedCase
 from klack.case.parameters import PARAMETERS, Written
 from klack.case.plausible import GO_ON, Number
@@ -32,7 +33,7 @@ from klack.materials.hardening import (
 )
 from klack.materials.library import MATERIALS, find_material
 from klack.materials.material import Material
-from klack.mesh.joint import cylinder_joint
+from klack.mesh.joint import cylinder_joint, edges_of_two
 from klack.units import Density, Frequency, Length, Modulus, Rate, Ratio, Time, format_si
 
 __all__ = [
@@ -286,6 +287,11 @@ class CaseBody(Section):
         description="edge: press fit of the two parts of a profile that share it, a cylinder; "
         "klack inspect and klack impact show its pressure. Other shared edges are glued.",
     )
+    layers: dict[Name, CaseLayer] | None = Field(
+        default=None,
+        description="edge or face that two parts share: gasket, O-ring or adhesive there. Other "
+        "shared edges and faces are glued.",
+    )
 
     @field_validator("material", mode="before")
     @classmethod
@@ -306,6 +312,7 @@ class CaseBody(Section):
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         self._check_fits()
+        self._check_layers()
         if self.reduced is not None:
             self._refuse_with(
                 ("material", "mesh", "matrices", "fixed"),
@@ -377,6 +384,38 @@ class CaseBody(Section):
             except InputError as error:
                 raise CaseProblem(
                     ("fits", name),
+                    got=error.got,
+                    expected=error.expected,
+                    hint=error.hint,
+                    on_key=True,
+                ) from error
+
+    def _check_layers(self) -> None:
+        """Reject layers of what has no parts, and of edges that are not those of two parts."""
+        if not self.layers:
+            return
+        geometry = self.geometry
+        no_parts = geometry.is_absent or geometry.nodes is not None or self.matrices is not None
+        if no_parts or self.fits:
+            raise CaseProblem(
+                ("layers",),
+                got="a layer beside a press fit"
+                if self.fits
+                else "a layer in a body given by its matrices or as a reduced model",
+                expected="a body whose parts klack assembles, without 'fits'",
+                hint="remove 'fits': compute the press fit of the body without its layers."
+                if self.fits
+                else "include the layer in that model, and remove 'layers'.",
+                on_key=True,
+            )
+        if geometry.profile is None:
+            return
+        for name in self.layers:
+            try:
+                edges_of_two(geometry.profile.profiles(), name)
+            except InputError as error:
+                raise CaseProblem(
+                    ("layers", name),
                     got=error.got,
                     expected=error.expected,
                     hint=error.hint,

@@ -8,7 +8,7 @@ import numpy as np
 from klack.errors import InputError
 from klack.mesh.profile import SAME, Curve, Profile
 
-__all__ = ["Joint", "cylinder_joint"]
+__all__ = ["Joint", "cylinder_joint", "edges_of_two"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,25 +31,7 @@ class Joint:
 
 def cylinder_joint(profiles: Mapping[str, Profile], name: str) -> Joint:
     """Joint of all edges of one name; rejects what is no cylinder of exactly two solids."""
-    edges = {
-        solid: found
-        for solid, profile in profiles.items()
-        if (found := [curve for curve in profile.curves if curve.name == name])
-    }
-    if len(edges) != 2:
-        shared = [
-            other
-            for other in dict.fromkeys(c.name for p in profiles.values() for c in p.curves)
-            if other and sum(any(c.name == other for c in p.curves) for p in profiles.values()) == 2
-        ]
-        raise _error(
-            name,
-            f"a name of edges of {_listed(edges) or 'no part'}",
-            "the name of the edge that two parts share "
-            f"(here: {', '.join(shared) or 'none, no two parts have a name in common'})",
-            "give the shared edge this name in both parts.",
-        )
-    (one, own), (two, others) = edges.items()
+    (one, own), (two, others) = edges_of_two(profiles, name).items()
     size = max(abs(x) for c in (*own, *others) for x in (*c.start, *c.end))
     radii = [r for curve in (*own, *others) for r, _ in (curve.start, curve.end)]
     if min(radii) <= SAME * size:
@@ -83,6 +65,29 @@ def cylinder_joint(profiles: Mapping[str, Profile], name: str) -> Joint:
         radius=own[0].start[0],
         length=float(sum(curve.length for curve in own)),
     )
+
+
+def edges_of_two(profiles: Mapping[str, Profile], name: str) -> dict[str, list[Curve]]:
+    """Edges of this name, by solid; rejects what are not those of exactly two solids."""
+    edges = {
+        solid: found
+        for solid, profile in profiles.items()
+        if (found := [curve for curve in profile.curves if curve.name == name])
+    }
+    if len(edges) != 2:
+        shared = [
+            other
+            for other in dict.fromkeys(c.name for p in profiles.values() for c in p.curves)
+            if other and sum(any(c.name == other for c in p.curves) for p in profiles.values()) == 2
+        ]
+        raise _error(
+            name,
+            f"a name of edges of {_listed(edges) or 'no part'}",
+            "the name of the edge that two parts share "
+            f"(here: {', '.join(shared) or 'none, no two parts have a name in common'})",
+            "give the shared edge this name in both parts.",
+        )
+    return edges
 
 
 def _same(a: Curve, b: Curve, size: float) -> bool:

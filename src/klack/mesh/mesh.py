@@ -15,6 +15,7 @@ from klack.mesh.rigid import Pose
 __all__ = [
     "ElementBlock",
     "FaceBlock",
+    "FacePair",
     "FaceTable",
     "Mesh",
     "Surface",
@@ -83,6 +84,23 @@ class Surface:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class FacePair:
+    """Faces where two solids of a mesh meet with nodes of their own (:mod:`klack.mesh.parting`).
+
+    Parameters
+    ----------
+    solids
+        Names of both.
+    first, second
+        The faces, outwards from the first solid; node by node at the same places.
+    """
+
+    solids: tuple[str, str]
+    first: tuple[FaceBlock, ...]
+    second: tuple[FaceBlock, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Mesh:
     """Nodal mesh of one body, in metres.
 
@@ -91,12 +109,15 @@ class Mesh:
     points (n, 3) or (n, 2) [m]
         x, y, z of a solid; r, z of an axisymmetric body (axis r = 0).
     node_sets : mapping of str to int array
+    pairs
+        Where solids meet without shared nodes, by name.
     """
 
     points: NDArray[np.float64]
     blocks: tuple[ElementBlock, ...]
     surfaces: Mapping[str, Surface] = field(default_factory=dict)
     node_sets: Mapping[str, NDArray[np.int64]] = field(default_factory=dict)
+    pairs: Mapping[str, FacePair] = field(default_factory=dict)
 
     @property
     def dimension(self) -> int:
@@ -239,6 +260,11 @@ class FaceTable:
         return np.where(found, rows, -1)
 
     @cached_property
+    def twins(self) -> NDArray[np.int64]:
+        """First row of each face that two elements share; the next row is the other element."""
+        return np.flatnonzero((self.keys[1:] == self.keys[:-1]).all(axis=1))
+
+    @cached_property
     def _place(self) -> tuple[NDArray[np.int64], ...]:
         """Row of every face, by block (n_elements, n_sides)."""
         tables = []
@@ -264,9 +290,13 @@ class FaceTable:
 
 
 def outer_surface(mesh: Mesh, name: str = "skin") -> Surface:
-    """Surface of all faces of one element only."""
+    """Surface of all faces of one element only that meet no other solid."""
     table = FaceTable.of(mesh.blocks)
-    return table.surface(name, np.flatnonzero(~table.shared))
+    outer = ~table.shared
+    for pair in mesh.pairs.values():
+        for block in (*pair.first, *pair.second):
+            outer[table.find(block.connectivity[:, : FAMILIES[block.family].corners])] = False
+    return table.surface(name, np.flatnonzero(outer))
 
 
 def _corner_keys(corners: NDArray[np.int64]) -> NDArray[np.int64]:

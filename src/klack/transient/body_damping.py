@@ -30,7 +30,7 @@ from scipy.sparse import csr_array
 from klack.bodies.elasticity.body import ElasticBody
 from klack.bodies.elasticity.eigen import Modes
 from klack.bodies.elasticity.factorization import Factorization
-from klack.bodies.reduction.damping import Damping, RayleighDamping
+from klack.bodies.reduction.damping import Damping, LossFactor, RayleighDamping, damping_ratios
 from klack.errors import require_nonnegative
 from klack.transient.interface_solve import InterfaceSolve
 
@@ -66,7 +66,9 @@ class BodyDamping:
         require_nonnegative("BodyDamping.beta", self.beta, "s")
 
 
-def body_damping(damping: Damping, modes: Modes) -> BodyDamping | None:
+def body_damping(
+    damping: Damping, modes: Modes, body: ElasticBody | None = None
+) -> BodyDamping | None:
     """Damping of a whole body; None without any.
 
     Parameters
@@ -75,21 +77,20 @@ def body_damping(damping: Damping, modes: Modes) -> BodyDamping | None:
         Rayleigh damping acts on the whole body, a ratio or a loss factor on the modes.
     modes
         Elastic modes that the reduced levels keep.
+    body
+        With layers, whose loss acts on these modes as well.
     """
+    alpha, beta = 0.0, 0.0
     if isinstance(damping, RayleighDamping):
-        if damping.alpha == 0.0 == damping.beta:
-            return None
-        return BodyDamping(
-            shapes=modes.shapes[:, :0],
-            rate=np.zeros(0),
-            alpha=damping.alpha,
-            beta=damping.beta,
-        )
-    rate = 2.0 * damping.ratios(modes.omega) * modes.omega
+        alpha, beta, damping = damping.alpha, damping.beta, LossFactor(eta=0.0)
+    ratios = damping.ratios(modes.omega)
+    if body is not None:
+        ratios = damping_ratios(damping, body, modes.omega, modes.shapes)
+    rate = 2.0 * ratios * modes.omega
     damped = rate > 0.0
-    if not np.any(damped):
+    if not np.any(damped) and alpha == 0.0 == beta:
         return None
-    return BodyDamping(shapes=modes.shapes[:, damped], rate=rate[damped])
+    return BodyDamping(shapes=modes.shapes[:, damped], rate=rate[damped], alpha=alpha, beta=beta)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

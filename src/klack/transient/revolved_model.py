@@ -22,6 +22,7 @@ from threadpoolctl import threadpool_limits
 from klack.arrays import Floats
 from klack.bodies.elasticity.eigen import Modes, eigenmodes
 from klack.bodies.elasticity.fourier_body import FourierBody
+from klack.bodies.elasticity.layer import layer_damping
 from klack.bodies.elasticity.ring_points import (
     RingPoints,
     RingRows,
@@ -129,7 +130,7 @@ def reduce_revolved(
         Number of kept modes of the orders above, both motions of an order counted, those of the
         lowest frequencies; None: all with ``below``.
     damping
-        Ratios of modes with these angular frequencies.
+        Ratios of modes with these angular frequencies, without what layers add.
     loads (p, k) [N]
         For ``answers``.
     below [rad/s]
@@ -155,9 +156,10 @@ def reduce_revolved(
             first = body
     shapes = np.repeat(axial.shapes[::2] / 2.0, 3, axis=0)  # a = b = U / 2
     shapes[2::3] = axial.shapes[1::2]
-    blocks = [(0, omega, trace) for omega, trace in _columns(axial.omega, sums.read[0] @ shapes)]
+    blocks = [(0, *one) for one in _columns(first, axial.omega, shapes, sums.read[0])]
     blocks += pairs.lowest()
-    orders, omega, traces, moved = sums.modes(blocks)
+    orders, omega, traces, moved, by_layers = sums.modes(blocks)
+    ratios = damping(omega[len(sums.rigid) :]) + by_layers
     return RevolvedPoints(
         body=PointBody(
             name=first.name,
@@ -165,7 +167,7 @@ def reduce_revolved(
             centre=np.array([0.0, 0.0, first.centre_of_mass]),
             rigid=np.array(sums.rigid).reshape(-1, 6).T,
             omega=omega,
-            damping=np.concatenate([np.zeros(len(sums.rigid)), damping(omega[len(sums.rigid) :])]),
+            damping=np.concatenate([np.zeros(len(sums.rigid)), ratios]),
             traces=traces,
             observed=np.zeros((0, len(omega))),
             observed_static=np.zeros((0, len(points.row))),
@@ -178,8 +180,12 @@ def reduce_revolved(
     )
 
 
-def _columns(omega: Floats, traces: Floats) -> Iterator[tuple[float, Floats]]:
-    return zip((float(w) for w in omega), traces.T, strict=True)
+def _columns(
+    body: FourierBody, omega: Floats, shapes: Floats, rows: csr_array
+) -> Iterator[tuple[float, Floats, float]]:
+    """Angular frequency, traces, and damping ratio by layers of each mode."""
+    by_layers = layer_damping(body.layers, omega, shapes)
+    return zip(map(float, omega), (rows @ shapes).T, map(float, by_layers), strict=True)
 
 
 class _Orders:
@@ -228,10 +234,12 @@ class _Orders:
                 self._rigid.append((body.order, way, read[:, k]))
 
     def modes(
-        self, elastic: list[tuple[int, float, Floats]]
-    ) -> tuple[NDArray[np.int64], Floats, Floats, Floats]:
-        ways = [(n, way, read) for n, _, read in elastic for way in range(1 if n == 0 else 2)]
-        omega = [w for n, w, _ in elastic for _ in range(1 if n == 0 else 2)]
+        self, elastic: list[tuple[int, float, Floats, float]]
+    ) -> tuple[NDArray[np.int64], Floats, Floats, Floats, Floats]:
+        ways = [(n, way, read) for n, _, read, _ in elastic for way in range(1 if n == 0 else 2)]
+        omega, by_layers = (
+            [one[i] for one in elastic for _ in range(1 if one[0] == 0 else 2)] for i in (1, 3)
+        )
         all_modes = [*self._rigid, *ways]
         rows = self.rows.count
         traces = [
@@ -250,6 +258,7 @@ class _Orders:
             np.array([0.0] * len(self._rigid) + omega),
             np.ascontiguousarray(columns),
             moved,
+            np.array(by_layers, dtype=float),
         )
 
 
@@ -259,7 +268,7 @@ class _Pairs:
     def __init__(self, others: int | None, below: float, highest: int) -> None:
         self.count = sys.maxsize if others is None else others // 2
         self.below, self.highest = below, highest
-        self.found: list[tuple[int, float, Floats]] = []
+        self.found: list[tuple[int, float, Floats, float]] = []
         self.lowest_before = inf
         self.is_complete = self.count == 0
 
@@ -284,15 +293,15 @@ class _Pairs:
             self.is_complete = True
             return
         self.lowest_before = float(modes.omega[0])
-        self.found += [(order, *one) for one in _columns(modes.omega, rows @ modes.shapes)]
+        self.found += [(order, *one) for one in _columns(body, modes.omega, modes.shapes, rows)]
 
-    def lowest(self) -> list[tuple[int, float, Floats]]:
+    def lowest(self) -> list[tuple[int, float, Floats, float]]:
         low = [one for one in self.found if one[1] <= self.below]
         return sorted(low, key=lambda one: one[:2][::-1])[: self.count]
 
     def _cut(self, more: "Floats | list[float]") -> float:
         """Angular frequency of the last kept pair among those found so far."""
-        known = sorted([*(omega for _, omega, _ in self.found), *more])
+        known = sorted([*(one[1] for one in self.found), *more])
         last = float(known[self.count - 1]) if len(known) >= self.count else inf
         return min(last, self.below)
 

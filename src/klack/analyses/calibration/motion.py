@@ -73,7 +73,7 @@ class MotionModel:
     """A valve of which some numbers of the case are still open.
 
     ``parameters`` are those of the motion, ``channels`` recorded ones by role; ``record`` [s] is
-    the spacing of the records.
+    the spacing of the records; ``by_layers`` [-] are damping ratios by the layers of bodies.
     """
 
     tree: CaseTree
@@ -82,6 +82,7 @@ class MotionModel:
     roles: ValveRoles
     channels: Mapping[str, str]
     reduced: Mapping[str, ReducedBody]
+    by_layers: Mapping[str, NDArray[np.float64]]
     laws: Mapping[str, StopFaces]
     record: float
 
@@ -100,7 +101,11 @@ class MotionModel:
         """
         case = self.tree.case(self.changes(values))
         damped = {  # with the damping of the case; everything else of bodies is as it was
-            name: replace(body, damping=damping_of(case.bodies[name].damping).ratios(body.omega))
+            name: replace(
+                body,
+                damping=damping_of(case.bodies[name].damping).ratios(body.omega)
+                + self.by_layers.get(name, 0.0),
+            )
             for name, body in self.reduced.items()
         }
         network = filled_network(case, damped, self.laws)

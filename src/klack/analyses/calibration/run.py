@@ -27,6 +27,7 @@ from klack.analyses.calibration.record import (
 )
 from klack.analyses.comparison.strokes import require_same_way
 from klack.analyses.record import case_fields, run_fields
+from klack.assembling.modes import damping_of
 from klack.assembling.valve import build_valve
 from klack.case.any_case import CaseTree, read_valve_case
 from klack.case.free_parameters import FreeParameter, free_parameters
@@ -211,6 +212,11 @@ def _motion_model(
         roles=roles,
         channels=channel_names(valve.network, roles, tuple(wanted), f"{case.path or 'case'}"),
         reduced={name: replace(body, recovery=None) for name, body in valve.reduced.items()},
+        by_layers={
+            name: body.damping - damping_of(case.bodies[name].damping).ratios(body.omega)
+            for name, body in valve.reduced.items()
+            if case.bodies[name].layers
+        },
         laws=valve.laws,
         record=max(strokes.step / _FINER, _FINEST),
     )

@@ -157,6 +157,26 @@ _FIT = JsonForm(
         "Largest relative shift of a frequency by the stress, left out of the impact.",
     ),
 )
+_LAYER = JsonForm(
+    "LayerJson",
+    "A layer between two parts of a body, and the share that its modes have in it.",
+    Key("body", str),
+    Key("layer", str, of="name"),
+    Key("first", str),
+    Key("second", str),
+    Key("area_m2", Real, of="area"),
+    Key("normal_N_per_m", Real, "Of the whole area.", "normal"),
+    Key("tangential_N_per_m", Real, "Of the whole area.", "tangential"),
+    Key("stiffness_at_Hz", Real, "Null: of no frequency.", "taken"),
+    Key("frequency_Hz", list[Real], "Of the elastic modes.", "frequency"),
+    Key("energy_share", list[Real], "Of their strain energy, in the layer.", "share"),
+    Key("loss_factor", list[Real], "By the layer.", "loss"),
+    Key(
+        "shift",
+        list[Real],
+        "Relative, of each frequency, by the stiffness there; left out.",
+    ),
+)
 STUDY = JsonForm(
     "ImpactJson",
     "``klack impact`` and ``klack demo``.",
@@ -198,6 +218,7 @@ STUDY = JsonForm(
     ),
     Key("running_in", (_RUNNING_IN, None), "Null for one impact, or elastic faces."),
     Key("fits", [_FIT], "Press fits of both bodies."),
+    Key("layers", [_LAYER], "Gaskets, O-rings and adhesives of both bodies."),
     Key("warnings", list[str]),
 )
 
@@ -232,6 +253,9 @@ def study_told(study: ImpactStudy) -> Iterator[TextTable | str]:
     for fit in study.fits:
         heads = ("press fit", f"{fit.body}.{fit.joint}")
         yield TextTable(title="Press fit", columns=heads, rows=fit.rows())
+    for each in study.layers:
+        heads = ("layer", f"{each.body}.{each.name}")
+        yield TextTable(title="Layer", columns=heads, rows=each.rows())
 
 
 def compliance_line(study: ImpactStudy) -> str:

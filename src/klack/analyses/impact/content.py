@@ -242,6 +242,10 @@ def _computed(study: ImpactStudy) -> Section:
                 Table(columns=("press fit", f"{fit.body}.{fit.joint}"), rows=fit.rows(quantity))
                 for fit in study.fits
             ),
+            *(
+                Table(columns=("layer", f"{each.body}.{each.name}"), rows=each.rows(quantity))
+                for each in study.layers
+            ),
         ),
     )
 

@@ -182,7 +182,7 @@ def _known(problem: ContactProblem, kept: Mapping[str, Modes]) -> list[KnownBody
 def _damping(case: Case, body: ElasticBody, kept: Mapping[str, Modes]) -> BodyDamping | None:
     damping = None
     if is_damped(case, body.name):
-        damping = body_damping(damping_of(case.bodies[body.name].damping), kept[body.name])
+        damping = body_damping(damping_of(case.bodies[body.name].damping), kept[body.name], body)
     surface = case.bodies[body.name].non_reflecting
     if surface is None:
         return damping

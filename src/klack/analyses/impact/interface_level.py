@@ -19,7 +19,7 @@ from klack.assembling.problem import ContactProblem
 from klack.bodies.elasticity.body import ElasticBody
 from klack.bodies.elasticity.eigen import Modes
 from klack.bodies.elasticity.statics import Flexibility
-from klack.bodies.reduction.damping import RayleighDamping
+from klack.bodies.reduction.damping import RayleighDamping, damping_ratios
 from klack.bodies.reduction.ports import Port
 from klack.bodies.reduction.selection import ByCount, ByParticipation, ModeSelection, select
 from klack.case.guide import CaseGuide, LinearGuideLaw
@@ -309,10 +309,9 @@ def _ratios(
 ) -> NDArray[np.float64]:
     """Damping ratios; that of a case acts on its kept modes, as at the full order."""
     damping = damping_of(problem.case.bodies[body.name].damping)
-    ratios = damping.ratios(modes.omega)
-    if isinstance(damping, RayleighDamping):
-        return ratios
-    return np.where(np.isin(modes.omega, kept.omega), ratios, 0.0)
+    ratios = damping_ratios(damping, body, modes.omega, modes.shapes)
+    everywhere = damping.ratios(modes.omega) if isinstance(damping, RayleighDamping) else 0.0
+    return np.where(np.isin(modes.omega, kept.omega), ratios, everywhere)
 
 
 def _load(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from klack.analyses.record import CaseRecord
 from klack.assembling.body_summary import BodySummary
 from klack.assembling.fits import PressFit
+from klack.assembling.layers import LayerState
 from klack.bodies.gauges.gauge import GaugeRecord
 from klack.bodies.reduction.structure import Structure
 from klack.bodies.reduction.transfer import TransferComparison
@@ -503,8 +504,8 @@ class ImpactStudy(CaseRecord):
         Where faces yield and more than one impact was asked for.
     pictures
         Of both bodies; none in results of earlier versions.
-    fits
-        Press fits of both bodies.
+    fits, layers
+        Press fits and layers of both bodies.
     """
 
     speed: float
@@ -527,6 +528,7 @@ class ImpactStudy(CaseRecord):
     running_in: RunningIn | None = None
     pictures: tuple[BodyPicture, ...] = ()
     fits: tuple[PressFit, ...] = ()
+    layers: tuple[LayerState, ...] = ()
 
     @property
     def estimates_settled(self) -> bool:

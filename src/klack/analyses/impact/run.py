@@ -63,6 +63,7 @@ from klack.analyses.incomplete import Attempts, IncompleteImpactError, failure_n
 from klack.analyses.record import case_fields, run_fields
 from klack.assembling.body_summary import BodySummary, summarise_body
 from klack.assembling.fits import press_fits
+from klack.assembling.layers import layer_states
 from klack.assembling.modes import (
     PARTICIPATION_POOL,
     kept_modes,
@@ -487,6 +488,11 @@ class _Work:
             sections=self.sections,
             pictures=self.pictures,
             fits=tuple(fit for name in case.bodies for fit in press_fits(case, name)),
+            layers=tuple(
+                state
+                for body in (self.problem.pair.upper, self.problem.pair.lower)
+                for state in layer_states(body, self.pools[body.name])
+            ),
             warnings=(
                 *failure_notes(failures),
                 *dict.fromkeys([*self.bodies.notes, *notes]),

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
 from klack.bodies.elasticity.assembly import assemble
+from klack.bodies.elasticity.layer import Layer, LayerStiffness, layer_stiffness, with_layers
 from klack.bodies.elasticity.rigid_motions import (
     at_distant_nodes,
     held_best,
@@ -42,6 +43,8 @@ class ElasticBody:
     M (n_dof, n_dof) [kg]
     fixed
         Sorted degrees of freedom that are held at zero.
+    layers
+        Between its solids; their stiffness is in K.
     """
 
     name: str
@@ -49,6 +52,7 @@ class ElasticBody:
     K: csr_array
     M: csr_array
     fixed: NDArray[np.int64]
+    layers: tuple[LayerStiffness, ...] = ()
 
     @property
     def dimension(self) -> int:
@@ -135,6 +139,7 @@ def elastic_body(
     materials: Mapping[str, Material],
     *,
     fixed_nodes: Iterable[int] = (),
+    layers: Iterable[Layer] = (),
 ) -> ElasticBody:
     """Assemble a body and check its supports.
 
@@ -142,13 +147,23 @@ def elastic_body(
 
     Parameters
     ----------
+    layers
+        One for each pair of faces of the mesh.
     fixed_nodes
         Held in all directions; none: the body is free.  On the axis of a body of revolution
         the radial displacement is always fixed.
     """
     nodes = checked_nodes(name, mesh, fixed_nodes)
     K, M = assemble(mesh, materials)
-    body = ElasticBody(name=name, mesh=mesh, K=K, M=M, fixed=held_dofs(mesh, nodes))
+    found = tuple(layer_stiffness(name, mesh, layer, K) for layer in layers)
+    body = ElasticBody(
+        name=name,
+        mesh=mesh,
+        K=with_layers(K, found),
+        M=M,
+        fixed=held_dofs(mesh, nodes),
+        layers=found,
+    )
     if nodes.size:
         require_support(name, rigid_motions(mesh, body.centre_of_mass)[body.fixed])
     return body
@@ -190,6 +205,10 @@ def _check_one_piece(name: str, mesh: Mesh) -> None:
     pairs = [
         np.stack([np.repeat(b.connectivity[:, 0], b.connectivity.shape[1]), b.connectivity.ravel()])
         for b in mesh.blocks
+    ] + [
+        np.stack([one.connectivity.ravel(), other.connectivity.ravel()])
+        for pair in mesh.pairs.values()
+        for one, other in zip(pair.first, pair.second, strict=True)
     ]
     rows, columns = np.concatenate(pairs, axis=1)
     graph = coo_array(
@@ -242,6 +261,10 @@ class VibratingBody(Protocol):
 
     @property
     def free(self) -> NDArray[int64]:
+        """As of :class:`ElasticBody`."""
+
+    @property
+    def layers(self) -> tuple[LayerStiffness, ...]:
         """As of :class:`ElasticBody`."""
 
     @property

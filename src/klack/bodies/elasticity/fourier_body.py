@@ -29,6 +29,7 @@ from scipy.sparse import csr_array, eye_array, kron
 
 from klack.bodies.elasticity.assembly import assemble_order
 from klack.bodies.elasticity.body import checked_nodes, require_support
+from klack.bodies.elasticity.layer import Layer, LayerStiffness, layer_stiffness, with_layers
 from klack.bodies.elasticity.rigid_motions import held_best, on_axis, orthonormal_in_mass
 from klack.errors import InputError
 from klack.materials.material import Material
@@ -50,6 +51,8 @@ class FourierBody:
     M (n_dof, n_dof) [kg]
     fixed
         Sorted degrees of freedom held at zero, those on the axis included.
+    layers
+        As of :class:`~klack.bodies.elasticity.body.ElasticBody`.
     """
 
     name: str
@@ -58,6 +61,7 @@ class FourierBody:
     K: csr_array
     M: csr_array
     fixed: NDArray[np.int64]
+    layers: tuple[LayerStiffness, ...] = ()
 
     @property
     def dimension(self) -> int:
@@ -142,6 +146,7 @@ def fourier_body(
     *,
     order: int,
     fixed_nodes: Iterable[int] = (),
+    layers: Iterable[Layer] = (),
 ) -> FourierBody:
     """Assemble a body of revolution in one Fourier order and check its supports.
 
@@ -156,6 +161,8 @@ def fourier_body(
         n, 0 or more; 1 is bending.
     fixed_nodes
         Held in all directions, all round; none: the body is free.
+    layers
+        As of :func:`~klack.bodies.elasticity.body.elastic_body`.
     """
     where = f"body '{name}': Fourier order {order}"
     if mesh.dimension != 2:
@@ -174,11 +181,18 @@ def fourier_body(
         )
     nodes = checked_nodes(name, mesh, fixed_nodes)
     K, M = assemble_order(mesh, materials, order)
+    found = tuple(layer_stiffness(name, mesh, layer, K, order) for layer in layers)
     held = (3 * nodes[:, None] + np.arange(3)).ravel()
     moving = {0: [0, 1], 1: [1, 2]}.get(order, [0, 1, 2])
     axis = (3 * on_axis(mesh)[:, None] + np.array(moving)).ravel()
     body = FourierBody(
-        name=name, mesh=mesh, order=order, K=K, M=M, fixed=np.union1d(held, axis).astype(np.int64)
+        name=name,
+        mesh=mesh,
+        order=order,
+        K=with_layers(K, found),
+        M=M,
+        fixed=np.union1d(held, axis).astype(np.int64),
+        layers=found,
     )
     if nodes.size and order < 2:
         require_support(name, body.rigid_motions[body.fixed])

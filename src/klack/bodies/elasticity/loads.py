@@ -5,7 +5,7 @@ r"""Nodal forces that do the same work as a traction on a surface.
 On a body of revolution dA = 2 pi r ds: the full circle.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +15,10 @@ from klack.bodies.elasticity.quadrature import quadrature
 from klack.bodies.elasticity.shape_functions import shape_functions
 from klack.mesh.mesh import FaceBlock, Mesh, Surface
 
-__all__ = ["NearLoads", "face_dashpots", "order_load", "traction_load"]
+__all__ = ["NearLoads", "face_dashpots", "face_points", "order_load", "over_faces", "traction_load"]
 
+
+Floats = NDArray[np.float64]
 
 Traction = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
 
@@ -31,7 +33,7 @@ def traction_load(mesh: Mesh, surface: Surface, traction: Traction) -> NDArray[n
     """
     load = np.zeros((mesh.node_count, mesh.dimension))
     for block in surface.blocks:
-        N, x, size, normal = _face_points(mesh, block)
+        N, x, size, normal = face_points(mesh, block)
         t = traction(x.reshape(-1, mesh.dimension), normal.reshape(-1, mesh.dimension))
         forces = np.einsum("qi,fqa,fq->fia", N, t.reshape(x.shape), size)
         np.add.at(load, block.connectivity, forces)
@@ -53,7 +55,7 @@ def order_load(mesh: Mesh, surface: Surface, traction: Traction, order: int) -> 
     circle = 0.5 if order > 0 else 1.0
     load = np.zeros((mesh.node_count, 3))
     for block in surface.blocks:
-        N, x, size, normal = _face_points(mesh, block)
+        N, x, size, normal = face_points(mesh, block)
         t = traction(x.reshape(-1, 2), normal.reshape(-1, 2)).reshape(*size.shape, 3)
         radial, around, axial = np.moveaxis(t, -1, 0)
         along = np.stack([radial - around, radial + around, axial], axis=-1)
@@ -78,21 +80,40 @@ def face_dashpots(mesh: Mesh, surface: Surface, resistance: float) -> csr_array:
         z.
     """
     d = mesh.dimension
-    rows, columns, values = [], [], []
+    parts = []
     for block in surface.blocks:
-        N, _, size, normal = _face_points(mesh, block)
+        N, _, size, normal = face_points(mesh, block)
         along = np.einsum("qi,fqa->fqia", N, normal).reshape(*size.shape, -1)
-        matrices = resistance * np.einsum("fqi,fqj,fq->fij", along, along, size)
-        dofs = (d * block.connectivity[..., None] + np.arange(d)).reshape(len(matrices), -1)
+        parts.append((block.connectivity, along, resistance * size))
+    return over_faces(parts, mesh.node_count, d)
+
+
+def over_faces(
+    parts: Iterable[tuple[NDArray[np.int64], Floats, Floats]], node_count: int, per_node: int
+) -> csr_array:
+    r"""Matrix of integrals over faces, shape (per_node node_count,) twice.
+
+    .. math:: A_{ij} = \int a_i a_j \, dA
+
+    Parameters
+    ----------
+    parts
+        Of each block of faces: nodes (faces, n), values of a (faces, q, per_node n) at the points,
+        and the weights (faces, q) of these.
+    """
+    rows, columns, values = [], [], []
+    for nodes, along, weight in parts:
+        matrices = np.einsum("fqi,fqj,fq->fij", along, along, weight)
+        dofs = (per_node * nodes[..., None] + np.arange(per_node)).reshape(len(matrices), -1)
         rows.append(np.repeat(dofs, dofs.shape[1], axis=1).ravel())
         columns.append(np.tile(dofs, dofs.shape[1]).ravel())
         values.append(matrices.ravel())
     entries = (np.concatenate(rows), np.concatenate(columns))
-    shape = (mesh.dof_count, mesh.dof_count)
+    shape = (per_node * node_count,) * 2
     return csr_array(coo_array((np.concatenate(values), entries), shape=shape))
 
 
-def _face_points(mesh: Mesh, block: FaceBlock) -> tuple[NDArray[np.float64], ...]:
+def face_points(mesh: Mesh, block: FaceBlock) -> tuple[NDArray[np.float64], ...]:
     """Shape functions (q, n), points (faces, q, d), weights (faces, q) and outward normals."""
     xi, w = quadrature(block.family, "mass")
     N, dN = shape_functions(block.family, xi)
@@ -114,8 +135,6 @@ _CLOSE = 1e-3
 
 _MOST = 48
 """Answers kept; then it starts again."""
-
-Floats = NDArray[np.float64]
 
 
 class NearLoads:

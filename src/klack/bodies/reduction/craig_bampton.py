@@ -38,7 +38,7 @@ from klack.arrays import Ints, Matrix, Vector
 from klack.bodies.elasticity.body import VibratingBody
 from klack.bodies.elasticity.eigen import Modes, block_lanczos
 from klack.bodies.elasticity.statics import Flexibility
-from klack.bodies.reduction.damping import Damping
+from klack.bodies.reduction.damping import Damping, damping_ratios
 from klack.bodies.reduction.reduce import at_ports
 from klack.machine.cache.entry import Entry
 
@@ -259,14 +259,14 @@ def craig_bampton(
     K_b = (K_b + K_b.T) / 2.0
     return CraigBampton(
         omega=modes.omega,
-        damping=damping.ratios(modes.omega),
+        damping=damping_ratios(damping, body, modes.omega, modes.shapes),
         mounts=tuple(part.mount for part in interfaces for _ in part.directions),
         directions=tuple(d for part in interfaces for d in part.directions),
         references=np.vstack([np.tile(p.reference, (len(p.directions), 1)) for p in interfaces]),
         participation=modes.shapes.T @ (body.M @ Psi),
         mass=M_b,
         stiffness=K_b,
-        loss=_viscous(M_b, K_b, rigid.shape[1], damping),
+        loss=_viscous(body, Psi, M_b, K_b, rigid.shape[1], damping),
         port_names=tuple(port_names),
         port_shapes=at_ports(modes.shapes, ports),
         port_motion=Psi.T @ ports,
@@ -300,10 +300,13 @@ def _static_motion(
     )
 
 
-def _viscous(M: Matrix, K: Matrix, rigid: int, damping: Damping) -> Matrix:
+def _viscous(
+    body: VibratingBody, Psi: Matrix, M: Matrix, K: Matrix, rigid: int, damping: Damping
+) -> Matrix:
     """``M V 2 zeta omega V^T M`` with the modes V of M and K; none for the rigid motions."""
     squares, V = scipy.linalg.eigh(K, M)
     squares[:rigid] = 0.0
     omega = np.sqrt(np.maximum(squares, 0.0))
     MV = M @ V
-    return np.asarray((MV * (2.0 * damping.ratios(omega) * omega)) @ MV.T)
+    ratios = damping_ratios(damping, body, omega, Psi @ V)
+    return np.asarray((MV * (2.0 * ratios * omega)) @ MV.T)

@@ -1,4 +1,4 @@
-"""Modal damping: a small viscous ratio for each mode.
+"""Modal damping: a small viscous ratio for each mode, and what layers add to it.
 
 Mode by mode, ``q'' + 2 zeta omega q' + omega^2 q = phi^T F``. Rigid modes (``omega = 0``) are
 never damped: drag belongs to the fluid.
@@ -9,9 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from klack.bodies.elasticity.body import VibratingBody
+from klack.bodies.elasticity.layer import layer_damping
 from klack.errors import InputError, require_nonnegative
 
-__all__ = ["Damping", "LossFactor", "ModalDamping", "RayleighDamping"]
+__all__ = ["Damping", "LossFactor", "ModalDamping", "RayleighDamping", "damping_ratios"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -107,3 +109,25 @@ class LossFactor:
 
 
 Damping = ModalDamping | RayleighDamping | LossFactor
+
+
+def damping_ratios(
+    damping: Damping, body: VibratingBody, omega: NDArray[np.float64], *shapes: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Damping ratios [-] of modes of a body, those by its layers included.
+
+    Parameters
+    ----------
+    omega (m,) [rad/s]
+    shapes (n_dof, k)
+        Of unit modal mass, m columns in all.
+    """
+    ratios = damping.ratios(omega)
+    if not body.layers:
+        return ratios
+    ends = np.cumsum([0, *(part.shape[1] for part in shapes)])
+    own = [
+        layer_damping(body.layers, omega[a:b], part)
+        for a, b, part in zip(ends, ends[1:], shapes, strict=False)
+    ]
+    return ratios + np.concatenate(own)

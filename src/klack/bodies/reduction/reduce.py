@@ -21,7 +21,7 @@ from klack.bodies.elasticity.eigen import Modes, eigenmodes
 from klack.bodies.elasticity.factorization import Backend
 from klack.bodies.elasticity.statics import Flexibility
 from klack.bodies.reduction.attachment import residual_attachment, shifted_attachment
-from klack.bodies.reduction.damping import Damping
+from klack.bodies.reduction.damping import Damping, damping_ratios
 from klack.bodies.reduction.ports import Observer, Port
 from klack.bodies.reduction.reduced_body import Recovery, ReducedBody, surface_faces
 from klack.bodies.reduction.selection import ByCount, ByFrequency, ModeSelection, select
@@ -96,7 +96,7 @@ def reduce_body(
         name=body.name,
         mass=float(body.mass),
         omega=omega,
-        damping=damping.ratios(omega),
+        damping=damping_ratios(damping, body, omega, *shapes),
         port_names=tuple(port.name for port in ports),
         port_shapes=np.vstack([at_ports(part, patterns) for part in shapes]),
         observer_names=tuple(observer.name for observer in observers),

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from klack.bodies.elasticity.body import ElasticBody
 from klack.bodies.elasticity.eigen import Modes
 from klack.bodies.reduction.craig_bampton import CRAIG_BAMPTON_UNITS, CraigBampton
-from klack.bodies.reduction.damping import Damping
+from klack.bodies.reduction.damping import Damping, damping_ratios
 from klack.bodies.reduction.ports import Port, face_samples
 from klack.bodies.reduction.reduce import at_ports
 from klack.bodies.reduction.reduced_body import port_among
@@ -208,7 +208,7 @@ def build_structure(
         mass=float(body.mass),
         dimension=body.dimension,
         omega=modes.omega,
-        damping=damping.ratios(modes.omega),
+        damping=damping_ratios(damping, body, modes.omega, modes.shapes),
         port_names=tuple(p.port.name for p in ports),
         port_stops=tuple(p.stop for p in ports),
         port_signs=np.array([p.sign for p in ports], dtype=float),
