@@ -8,6 +8,7 @@ from typing import Any
 
 from ruamel.yaml import YAML
 
+from klack.case import Case, load_case
 from klack.case.any_case import load_valve_case
 from klack.simulation.network_result import NetworkResult
 from klack.simulation.network_run import simulate_network
@@ -15,6 +16,23 @@ from klack.simulation.network_run import simulate_network
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 HOW_TO = DOCS / "how-to"
+
+
+def changed_case(folder: Path, page_case: str, *changes: tuple[Any, ...]) -> Case:
+    """Case of a page with values in other places, (*keys, value) each; None removes a key."""
+    yaml = YAML(typ="safe")
+    tree = yaml.load(HOW_TO / page_case)
+    for *path, key, value in changes:
+        place = tree
+        for step in path:
+            place = place[step]
+        if value is None:
+            del place[key]
+        else:
+            place[key] = value
+    with (folder / "case.yaml").open("w", encoding="utf-8") as stream:
+        yaml.dump(tree, stream)
+    return load_case(folder / "case.yaml")
 
 
 def blocks(page: str, word: str) -> list[str]:

@@ -5,11 +5,10 @@ Truth: one clear error or doubt for each mistake; the numbers themselves are in
 """
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from draws import each
-from pages import blocks, numbers
+from pages import HOW_TO, blocks, changed_case, numbers
 from ruamel.yaml import YAML
 
 from klack.analyses.impact.analysis import IMPACT
@@ -20,27 +19,14 @@ from klack.assembling.fits import press_fits
 from klack.case import load_case
 from klack.errors import InputError
 
-HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
 NEEDLE = ("bodies", "needle")
 FIT = (*NEEDLE, "fits", "joint")
 PARTS = (*NEEDLE, "geometry", "profile", "parts")
 
 
-def changed(folder, *changes, source="pressed_armature.yaml"):
+def changed(folder, *changes):
     """The case of the page with values in other places; None removes a key."""
-    yaml = YAML(typ="safe")
-    tree = yaml.load(HOW_TO / source)
-    for *path, key, value in changes:
-        place = tree
-        for step in path:
-            place = place[step]
-        if value is None:
-            del place[key]
-        else:
-            place[key] = value
-    with (folder / "case.yaml").open("w", encoding="utf-8") as stream:
-        yaml.dump(tree, stream)
-    return load_case(folder / "case.yaml")
+    return changed_case(folder, "pressed_armature.yaml", *changes)
 
 
 @each(

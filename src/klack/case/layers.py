@@ -1,5 +1,6 @@
 """Layers between two parts of a body: gaskets, O-rings, adhesives."""
 
+from itertools import pairwise
 from typing import Self
 
 import numpy as np
@@ -50,8 +51,8 @@ class _Numbers(Section):
                 (),
                 got=f"{given} with {'no' if thickness is None else 'a'} thickness",
                 expected="thickness, modulus and shear_modulus, or normal and tangential alone",
-                hint="a modulus over the thickness is a stiffness per area; a gasket that its bolts "
-                "keep from sliding has a shear modulus of a third of the modulus or more.",
+                hint="a modulus over the thickness is a stiffness per area; the shear modulus of "
+                "rubber is about a third of its modulus without lateral constraint.",
             )
         scale = 1.0 if thickness is None else thickness
         first, second = (getattr(self, name) / scale for name in expected)
@@ -106,7 +107,7 @@ class CaseLayer(_Numbers):
                     hint=problem.hint,
                 ) from problem
         at = [row.frequency for row in self.table]
-        if any(b <= a for a, b in zip(at, at[1:], strict=False)):
+        if any(b <= a for a, b in pairwise(at)):
             raise CaseProblem(
                 ("table",),
                 got="frequencies " + ", ".join(format_si(f, "Hz", 4) for f in at),

@@ -44,6 +44,14 @@ def calculix_impact(case: Case, progress: Progress) -> CalculixImpact:
             expected="faces as drawn: a deck holds the meshes alone",
             hint="draw the crown as an arc or the tilt as a placement, and remove the key.",
         )
+    layered = next((name for name, body in case.bodies.items() if body.layers), None)
+    if layered is not None:
+        raise InputError(
+            f"{case.path or 'case'}: bodies.{layered}.layers",
+            got="a layer between two parts, which the meshes do not have",
+            expected="parts that are glued: a deck holds the meshes alone",
+            hint="draw the layer as a thin part with a material of its own, and remove the key.",
+        )
     left_out = [name for name in ("guide", "opposite") if getattr(case, name) is not None]
     if left_out:
         warnings.warn(

@@ -12,6 +12,7 @@ from klack.bodies.elasticity.body import ElasticBody, elastic_body
 from klack.bodies.elasticity.eigen import eigenmodes, rigid_frequencies
 from klack.bodies.elasticity.factorization import available_backends
 from klack.bodies.elasticity.fourier_body import FourierBody, fourier_body
+from klack.bodies.elasticity.layer import Layer
 from klack.bodies.elasticity.loads import order_load, traction_load
 from klack.bodies.elasticity.press_fit import pressed_state
 from klack.bodies.elasticity.statics import Flexibility
@@ -20,6 +21,7 @@ from klack.materials.material import Material
 from klack.mesh.joint import cylinder_joint
 from klack.mesh.meridian import mesh_meridian
 from klack.mesh.mesh import Mesh
+from klack.mesh.parting import parted
 from klack.mesh.profile import Line, Profile
 from klack.mesh.sizing import MeshSizing
 from klack.verification.check import Check, ComparedCurve, check
@@ -54,6 +56,7 @@ def checks() -> list[Check]:
         *fourier_checks(),
         *_thick_cylinder(),
         *_press_fit(),
+        *_layer(),
         *_free_rod(),
         *_bent_beam(),
         *_solvers(),
@@ -188,6 +191,42 @@ def _press_fit() -> Iterator[Check]:
         computed=state.stress["ring"],
         tolerance=1e-2,
         source=f"{source}; hoop stress p (b^2 + R^2)/(b^2 - R^2), radial -p",
+    )
+
+
+def _layer() -> Iterator[Check]:
+    """Two equal rods of length l on a layer: E q tan(q l) = 2 k in modes that strain it."""
+    radius, length, stiffness, loss = 0.3e-3, _LENGTH / 2, 1e13, 0.05
+    profiles = {}
+    for name, low, high in (("lower", -length, 0.0), ("upper", 0.0, length)):
+        edges = (
+            Line((radius, low), "" if low else "joint"),
+            Line((radius, high), "side"),
+            Line((0.0, high), "" if high else "joint"),
+            Line((0.0, low), "axis"),
+        )
+        profiles[name] = Profile((0.0, low), edges)
+    mesh = parted(mesh_meridian(profiles, MeshSizing(size=radius)), ["joint"])
+    given = Layer(name="joint", table=np.array([[1.0, stiffness, stiffness, loss]]), frequency=1.0)
+    body = elastic_body("rods", mesh, dict.fromkeys(profiles, _BAR), layers=[given])
+    modes = eigenmodes(body, count=1)
+    x = brentq(lambda x: _BAR.young * x * np.tan(x) - 2 * stiffness * length, 1e-6, 1.5707)
+    source = "waves in a rod, E q tan(q l) = 2 k"
+    yield check(
+        "two rods on a layer, first frequency [Hz]",
+        expected=x / length * np.sqrt(_BAR.young / _BAR.density) / (2 * np.pi),
+        computed=float(modes.frequency[0]),
+        tolerance=1e-6,
+        source=source,
+    )
+    # share of energy in the layer: derivative of the frequency by the stiffness
+    share = 2.0 / (1.0 + 2.0 * x / np.sin(2.0 * x))
+    yield check(
+        "two rods on a layer, loss factor of the first mode [-]",
+        expected=loss * share,
+        computed=float(body.layers[0].loss(modes.omega, modes.shapes)[0]),
+        tolerance=1e-6,
+        source=f"{source}; loss factor times 2 dln w / dln k (Johnson & Kienholz 1982)",
     )
 
 
