@@ -309,8 +309,10 @@ def test_layers_that_cannot_be_are_refused():
         InputError, match=r"parted\.seam: got a name of no face between two solids.*here: joint"
     ):
         parted(mesh, ["seam"])
-    for stiffness, said in ((1e24, "times as stiff"), (1.0, "times as soft")):
-        with pytest.raises(InputError, match=r"bodies\.rods\.layers\.joint: .*" + said):
-            elastic_body(
-                "rods", parted(mesh, ["joint"]), MATERIALS, layers=[layer(stiffness, stiffness)]
-            )
+    for numbers, said in (
+        ((1e24, 1e13), "normal stiffness .* times as stiff"),
+        ((1.0, 1e13), "normal stiffness .* times as soft"),
+        ((1e13, 1.0), "tangential stiffness .* times as soft"),
+    ):
+        with pytest.raises(InputError, match=r"bodies\.rods\.layers\.joint: got a " + said):
+            elastic_body("rods", parted(mesh, ["joint"]), MATERIALS, layers=[layer(*numbers)])

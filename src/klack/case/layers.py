@@ -1,15 +1,17 @@
 """Layers between two parts of a body: gaskets, O-rings, adhesives."""
 
 from itertools import pairwise
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from klack.bodies.elasticity.layer import Layer
 from klack.input.problem import CaseProblem
 from klack.input.section import Section
 from klack.units import BedStiffness, Frequency, Length, Modulus, Ratio, format_si
+
+if TYPE_CHECKING:
+    from klack.bodies.elasticity.layer import Layer
 
 __all__ = ["CaseLayer", "LayerRow"]
 
@@ -134,6 +136,8 @@ class CaseLayer(_Numbers):
             return (self.row(1.0, self.thickness),)
         return tuple(row.row(row.frequency, self.thickness) for row in self.table)
 
-    def named(self, name: str) -> Layer:
+    def named(self, name: str) -> "Layer":
         """As the finite elements need it."""
+        from klack.bodies.elasticity.layer import Layer  # loads the solvers: not to read a case
+
         return Layer(name=name, table=np.array(self.rows), frequency=self.frequency or 1.0)

@@ -160,24 +160,20 @@ def layer_stiffness(
         normal=normal,
         across=across,
     )
-    own, solid = result.matrix.diagonal(), K.diagonal()
-    ratio = float((own / np.where(own > 0.0, solid, 1.0)).max())
-    if not _SOFTEST <= ratio <= _STIFFEST:
-        way, times, most, hint = (
-            ("stiff", ratio, _STIFFEST, "remove the layer: the parts are glued then.")
-            if ratio > 1.0
-            else (
-                "soft",
-                1.0 / ratio,
-                1.0 / _SOFTEST,
-                "check its unit; parts that nothing holds together are bodies of their own.",
-            )
-        )
+    for way, matrix in (("normal", normal), ("tangential", across)):
+        own = matrix.diagonal()
+        beside = float((own / np.where(own > 0.0, K.diagonal(), 1.0)).max())
+        if _SOFTEST <= beside <= _STIFFEST:
+            continue
+        soft = beside < 1.0
         raise InputError(
             f"bodies.{body}.layers.{layer.name}",
-            got=f"a layer {times:.2g} times as {way} as one row of elements beside it",
-            expected=f"at most {most:g} times",
-            hint=hint,
+            got=f"a {way} stiffness {1 / beside if soft else beside:.2g} times as "
+            f"{'soft' if soft else 'stiff'} as one row of elements beside it",
+            expected=f"at most {1 / _SOFTEST if soft else _STIFFEST:g} times",
+            hint="check its unit; parts that nothing holds together are bodies of their own."
+            if soft
+            else "check its unit; without the layer the parts are glued.",
         )
     return result
 
