@@ -79,7 +79,12 @@ def test_bodies_without_parts_and_with_fits_have_no_layers(tmp_path):
     ):
         changed_case(tmp_path, "pressed_armature.yaml", (*LAYERS, {"joint": STIFF}))
     given = {
-        "reduced": {"kind": "klack", "file": "a.npz", "units": "m kg s"},
+        "reduced": {
+            "kind": "klack",
+            "file": "a.npz",
+            "units": "m kg s",
+            "ports": {"tip": {"input": "tip", "output": "tip"}},
+        },
         "layers": {"joint": STIFF},
     }
     (tmp_path / "a.npz").write_text("")
