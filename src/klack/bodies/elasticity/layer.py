@@ -120,7 +120,8 @@ class LayerStiffness:
         """Relative shift of each frequency by the stiffness at that frequency, shape (m,)."""
         own, taken = self.layer.at(omega / (2.0 * np.pi)), self.layer.at(self.layer.frequency)
         shares = self.shares(omega, shapes)
-        return 0.5 * sum((own[i] / taken[i] - 1.0) * share for i, share in enumerate(shares))
+        moved = [(own[i] / taken[i] - 1.0) * share for i, share in enumerate(shares)]
+        return 0.5 * (moved[0] + moved[1])
 
 
 def layer_stiffness(
