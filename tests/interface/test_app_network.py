@@ -79,12 +79,13 @@ def test_a_bleed_is_added_connected_renamed_removed_and_all_is_undone(editor):
     editor.locator(".target[data-port='chamber.fluid']").first.click()
     require_line(editor, "face.fluid, bleed.a]")
     texts.append(text_of(editor))
-    editor.wait_for_selector("text=the port bleed.b in no connection")
+    editor.wait_for_selector("text=with chamber.fluid, bores.a, face.fluid")  # drawn before
     editor.locator(".target[data-port='bleed.b']").click()
     editor.wait_for_selector("text=bleed.b: click the port")
     editor.get_by_label("connect bleed.b to").select_option("ambient")
     require_line(editor, "[bleed.b, ambient]")
     editor.wait_for_selector("text=valid stroke, not saved")
+    editor.wait_for_selector("text=with ambient")
     texts.append(text_of(editor))
 
     box = editor.locator("[id='n-network.components.bleed.diameter']")
@@ -97,6 +98,7 @@ def test_a_bleed_is_added_connected_renamed_removed_and_all_is_undone(editor):
     dialog.get_by_role("button", name="Rename", exact=True).click()
     require_line(editor, "[leak.b, ambient]")
     dialog.wait_for(state="detached")
+    editor.wait_for_selector("text=leak: orifice")
     texts.append(text_of(editor))
     editor.get_by_role("button", name="Remove leak").click()
     require_text(editor, texts[0])

@@ -145,7 +145,7 @@ class _Editor:
 
     def _listen(self, boxes: ui.element) -> None:
         # not to each box: what one tells as its part is made again would be dropped
-        for event in ("change", "focusout"):
+        for event in ("change", "focusout", "keydown.enter"):
             boxes.on(event, self._changed, js_handler="(e) => window.klackChanged(e, emit)")
 
     def _show_side(self, side: str) -> None:
