@@ -39,6 +39,7 @@ def brick_view(face: str = "top") -> View:
                 gap=2e-6,
             ),
         ),
+        facts=(("end stops", (("end-stop", "seat", f"block.bottom on brick.{face}: gap 2 um"),)),),
         time=time,
         transfer=(
             Curve(
@@ -83,6 +84,12 @@ def _body(name: str, place: np.ndarray, face: str) -> BodyView:
     return BodyView(
         name=name,
         about="one element",
+        rows=(
+            ("mass", "", "0.2 g of steel"),
+            ("surface", face, "30 mm^2, z 5 mm"),
+            ("edges", "", "2 um"),
+        ),
+        centre=mesh.points.mean(axis=0),
         skin=skin,
         held=np.zeros(len(skin.points), dtype=bool),
         section=np.empty((0, 2, 3)),

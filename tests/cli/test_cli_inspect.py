@@ -288,8 +288,12 @@ def bricks_case(folder: Path) -> Path:
 
 def test_a_case_shows_of_a_file_only_the_solids_that_a_body_takes(tmp_path: Path, capsys):
     assert main(["inspect", str(bricks_case(tmp_path))]) == 0
-    pin, block = " ".join(capsys.readouterr().out.split()).split("block what")
-    for words in ("volume 1 mm^3", "mass 0.00785 g of steel", "UPPER"):
+    told, impact = " ".join(capsys.readouterr().out.split()).split("case: impact")
+    assert "contact pin.END_UPPER on block.END_LOWER: gap 0 m, starts with 1 m/s" in impact
+    pin, block = told.split("block what")
+    # a cube of 1 mm: its inertia is m a^2 / 6 about each axis
+    inertia = f"inertia {0.00785 / 6:.5g} g mm^2 about the axis, {0.00785 / 6:.5g} g mm^2 across"
+    for words in ("volume 1 mm^3", "mass 0.00785 g of steel", inertia, "UPPER"):
         assert words in pin
     assert "LOWER" not in pin
     assert "UPPER" not in block

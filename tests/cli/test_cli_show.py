@@ -2,9 +2,11 @@
 
 import json
 import re
+from base64 import b64decode
 from pathlib import Path
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 from json_schema_check import require_documented
 
@@ -13,6 +15,7 @@ from klack.case.reader import find_case
 from klack.cli.main import main
 from klack.mesh.solid import write_step_revolved
 from klack.network.catalogue import type_words
+from klack.report.wording import spelled
 from klack.viewer.source import view_of_source
 
 HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
@@ -63,6 +66,28 @@ def test_a_page_of_a_case_goes_into_the_current_folder(tmp_path, capsys):
     said = capsys.readouterr()
     assert "2 bodies, 1 contact." in said.out
     assert "Page: tiny_rods.html" in said.out
+
+
+def test_its_page_says_what_inspect_says(tmp_path, capsys):
+    assert main(["show", str(RODS), "-q"]) == 0
+    assert main(["inspect", str(RODS), "-q", "--json", "told.json"]) == 0
+
+    payload = payload_of(tmp_path / "tiny_rods.html")
+    told = json.loads((tmp_path / "told.json").read_text())["parts"]
+    for title, rows in [(body["name"], body["rows"]) for body in payload["bodies"]] + [
+        (f"case: {part['title']}", part["rows"]) for part in payload["facts"]
+    ]:
+        assert rows == [
+            [row["what"], row["name"], spelled(row["content"])] for row in told.pop(title)
+        ]
+    assert told == {}
+    for body in payload["bodies"]:  # a rod of one density: halfway
+        heights = unpacked(body["points"])[:, 2]
+        assert body["centre"][2] == pytest.approx(0.5 * (heights.min() + heights.max()), abs=1e-6)
+
+
+def unpacked(packed: dict) -> np.ndarray:
+    return np.frombuffer(b64decode(packed["data"]), "<f4").reshape(packed["shape"])
 
 
 def test_a_valve_without_shapes_is_its_network(tmp_path, capsys):

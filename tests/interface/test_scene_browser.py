@@ -179,6 +179,41 @@ def test_a_click_on_a_peak_shows_its_mode(browser, file):
         )
 
 
+def test_centres_of_gravity_stand_in_the_middle_of_their_bodies(browser, file):
+    """Two equal bricks, one on the other: halfway between both centres is the middle of the view.
+
+    The camera is orthographic, so that halves stay halves; one pixel for the frame.
+    """
+    places = """() => { const box = document.querySelector('.ks-view').getBoundingClientRect();
+        return [...document.querySelectorAll('.ks-over .ks-centre:not([hidden])')].map(sign => {
+            const own = sign.getBoundingClientRect();
+            return [own.x + own.width / 2 - box.x - box.width / 2,
+                    own.y + own.height / 2 - box.y - box.height / 2]; }); }"""
+    with Opened(browser, file) as opened:
+        page = opened.page
+        upper, lower = page.evaluate(places)
+        assert [a + b for a, b in zip(upper, lower, strict=True)] == pytest.approx([0, 0], abs=2.0)
+        assert upper[1] < lower[1] - 50  # above it on the page
+        page.get_by_label("brick", exact=True).uncheck()
+        page.evaluate(DRAWN)
+        assert page.evaluate(places) == [lower]
+        page.get_by_label("Centres of gravity").uncheck()
+        page.evaluate(DRAWN)
+        assert page.evaluate(places) == []
+
+
+def test_a_stop_names_its_faces_and_a_name_lightens_both_of_its_buttons(browser, file):
+    with Opened(browser, file) as opened:
+        page = opened.page
+        line = page.locator(".ks-said-of")
+        assert line.inner_text().startswith("seat: block.bottom on brick.top: gap 2")
+        line.locator("button").nth(1).focus()
+        hot = "[...document.querySelectorAll('.ks-hot')].map(e => e.textContent)"
+        assert page.evaluate(hot) == ["brick.top", "brick.top"]
+        row = page.locator(".ks-faces div", has_text="brick.top")
+        assert "30 mm²" in row.inner_text().replace("\xa0", " ")
+
+
 def test_arrow_keys_turn_the_bodies(browser, file):
     with Opened(browser, file) as opened:
         page = opened.page

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from viewer_case import brick_view
 
+from klack.report.wording import spelled
 from klack.viewer.view import page_of, payload_of
 
 KINDS = {"f4": "<f4", "i2": "<i2", "i1": "<i1", "u1": "<u1", "u2": "<u2", "u4": "<u4"}
@@ -65,12 +66,23 @@ def test_arrays_come_back_from_the_payload_in_millimetres():
     assert payload["time"]["shape"] == [3]
 
 
+def test_what_is_told_of_bodies_and_stops_is_in_the_payload_with_signs_of_a_page():
+    payload = payload_of(brick_view())
+
+    assert payload["bodies"][0]["rows"][1] == ["surface", "top", spelled("30 mm^2, z 5 mm")]
+    assert payload["bodies"][0]["centre"] == pytest.approx([1.0, 1.5, 2.5])
+    (section,) = payload["facts"]
+    assert section["title"] == "end stops"
+    assert section["rows"][0][2] == spelled("block.bottom on brick.top: gap 2 um")
+
+
 EVIL = "</script><script>alert(1)</script><!--"
 
 
 def test_words_of_a_case_stay_words():
     view = brick_view(face=EVIL)
-    view = replace(view, title=EVIL, source=f"case {EVIL}", notes=(EVIL,))
+    facts = ((EVIL, ((EVIL, EVIL, EVIL),)),)
+    view = replace(view, title=EVIL, source=f"case {EVIL}", notes=(EVIL,), facts=facts)
     elements = Elements(page_of(view))
     assert [tag for tag, _ in elements.tags].count("script") == 2
     assert "alert(1)" not in elements.scripts[1]

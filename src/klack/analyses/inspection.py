@@ -1,7 +1,7 @@
 """Content of a file of another program."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +21,7 @@ from klack.case.geometry import ProfileGeometry
 from klack.case.key_path import kind_at, node_at, written_at
 from klack.case.origin import ExpandedCase
 from klack.case.parameters import ParameterValue
+from klack.case.schema import Case
 from klack.case.surface_names import require_surface_names
 from klack.case.valve import ValveCase
 from klack.errors import InputError
@@ -31,12 +32,22 @@ from klack.mesh.files.catalogue import MESH_FORMATS, STEP_ENDINGS, format_of
 from klack.mesh.files.mesh_file import read_mesh_file
 from klack.mesh.files.mesh_model import MeshModel
 from klack.mesh.mesh import Mesh
+from klack.mesh.moments import Moments
 from klack.mesh.profile import Profile
-from klack.mesh.quality import corner_volume, mesh_summary
+from klack.mesh.quality import corner_moments, corner_volume, mesh_summary
 from klack.mesh.step_content import StepContent, StepPart, step_content
 from klack.units import format_si, parse_quantity
 
-__all__ = ["INSPECTED", "Row", "inspect_case", "inspect_file"]
+__all__ = [
+    "INSPECTED",
+    "Inspected",
+    "Row",
+    "expanded_rows",
+    "inspect_bodies",
+    "inspect_case",
+    "inspect_file",
+    "meeting_rows",
+]
 
 
 Row = tuple[str, str, str]
@@ -136,17 +147,63 @@ def inspect_file(
 def inspect_case(case: CaseFile) -> Iterator[tuple[str, tuple[Row, ...]]]:
     """Parameters, parts and bodies of a case, their files checked as in a run.
 
-    Yields the rows of :func:`expanded_rows`, then the name of each body and its rows; after those
-    of all bodies it refuses a surface that the case names and its file does not have.  Of a valve,
-    then, what moves and what meets.
+    Yields the rows of :func:`expanded_rows`, then the name of each body and its rows, then what
+    moves and what meets.
     """
     yield from expanded_rows(case)
+    bodies = {}
+    for name, body in inspect_bodies(case):
+        yield name, body.rows
+        bodies[name] = body
+    yield from meeting_rows(case, bodies)
+
+
+def meeting_rows(
+    case: CaseFile, bodies: "Mapping[str, Inspected]"
+) -> Iterator[tuple[str, tuple[Row, ...]]]:
+    """What moves and what meets in a case: pairs, travels, and speeds before a run."""
+    if isinstance(case, ValveCase):
+        masses = {name: body.mass for name, body in bodies.items() if body.mass is not None}
+        yield from valve_rows(case, masses)
+    elif isinstance(case, Case):
+        yield "case: impact", tuple(_impact_rows(case))
+
+
+def _impact_rows(case: Case) -> Iterator[Row]:
+    contact, above = case.contact, case.opposite
+    gap = "gap as drawn" if contact.gap is None else f"gap {format_si(contact.gap, 'm', 4)}"
+    speed = format_si(case.motion.speed, "m/s", 4)
+    yield "contact", "", f"{contact.moving} on {contact.stop}: {gap}, starts with {speed}"
+    if above is not None:
+        travel = format_si(above.gap, "m", 4)
+        yield "upper stop", "", f"{above.stop} on {above.moving}: {travel} above the start"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Inspected:
+    """A body in words.
+
+    Parameters
+    ----------
+    mass [kg], centre (3,) [m]
+        Of gravity, in the drawing; None where they are not known.
+    """
+
+    rows: tuple[Row, ...]
+    mass: float | None = None
+    centre: np.ndarray | None = None
+
+
+def inspect_bodies(case: CaseFile) -> Iterator[tuple[str, Inspected]]:
+    """Each body of a case; at the end, a surface that is named but not there is an error."""
     known: dict[str, tuple[str, ...]] = {}
     for name, body in case.bodies.items():
         if body.reduced is not None:
-            yield name, tuple(_reduced_rows(reduced_from_file(case, name)))
+            reduced = reduced_from_file(case, name)
+            mass = reduced.mass if reduced.rigid_count else None
+            yield name, Inspected(rows=tuple(_reduced_rows(reduced)), mass=mass)
         elif body.matrices is not None:
-            yield name, assembled_body(case, name).rows()
+            yield name, Inspected(rows=assembled_body(case, name).rows())
         elif body.geometry.mesh is not None:
             mesh = body.geometry.mesh
             solids = tuple(body.material) if isinstance(body.material, dict) else None
@@ -154,22 +211,23 @@ def inspect_case(case: CaseFile) -> Iterator[tuple[str, tuple[Row, ...]]]:
                 mesh.file, mesh.unit, solids=solids, solids_only=mesh.solids_only
             )
             known[name] = tuple(model.mesh.surfaces)
-            yield name, (*_mesh_rows(Path(mesh.file), model), _mass(case, name, _volumes(model)))
+            yield name, _weighed(case, name, _mesh_rows(Path(mesh.file), model), _moments(model))
         elif body.geometry.step is not None:
             content = step_content(body.geometry.step.file)
             known[name] = tuple(face.name for face in content.faces)
-            volumes = {solid.name: solid.size for solid in content.solids}
-            yield name, (*_step_rows(content), _mass(case, name, volumes))
+            moments = {solid.name: solid.moments for solid in content.solids if solid.moments}
+            yield name, _weighed(case, name, _step_rows(content), moments)
         elif body.geometry.profile is not None:
-            yield name, tuple(_drawn_rows(case, name, body.geometry.profile))
+            profiles = body.geometry.profile.profiles()
+            rows = _drawn_rows(body.geometry.profile, profiles)
+            drawn = {solid: profile.moments for solid, profile in profiles.items()}
+            found = _weighed(case, name, rows, drawn)
+            yield name, replace(found, rows=(*found.rows, *_fit_rows(case, name)))
     require_surface_names(case, known)
-    if isinstance(case, ValveCase):
-        yield from valve_rows(case)
 
 
-def _drawn_rows(case: CaseFile, name: str, drawn: ProfileGeometry) -> Iterator[Row]:
-    """Solids and edges of a drawing; volume and mass of the body of revolution."""
-    profiles = drawn.profiles()
+def _drawn_rows(drawn: ProfileGeometry, profiles: Mapping[str, Profile]) -> Iterator[Row]:
+    """Solids and edges of a drawing."""
     yield "geometry", "", "drawn; meshed by klack when the case runs"
     for solid, profile in profiles.items():
         yield "solid", solid, f"{profile.volume * 1e9:.6g} mm^3"
@@ -177,8 +235,9 @@ def _drawn_rows(case: CaseFile, name: str, drawn: ProfileGeometry) -> Iterator[R
         curves = [c for p in profiles.values() for c in p.curves if c.name == edge]
         points = np.concatenate([c.at(np.linspace(0.0, 1.0, 65)) for c in curves])
         yield "surface", edge, f"z {_range(points[:, 1])}, r {_range(points[:, 0])}"
-    yield _mass(case, name, {solid: profile.volume for solid, profile in profiles.items()})
-    yield from _drawn_inertia(case, name, profiles)
+
+
+def _fit_rows(case: CaseFile, name: str) -> Iterator[Row]:
     for fit in press_fits(case, name):
         yield from (("press fit", fit.joint, f"{what}: {text}") for what, text in fit.rows())
         yield from (("doubt", fit.joint, doubt) for doubt in fit.doubts)
@@ -189,41 +248,52 @@ def _drawn_rows(case: CaseFile, name: str, drawn: ProfileGeometry) -> Iterator[R
             yield from (("doubt", state.name, doubt) for doubt in state.doubts)
 
 
-def _drawn_inertia(case: CaseFile, name: str, profiles: Mapping[str, Profile]) -> Iterator[Row]:
-    """Centre of gravity and moments of inertia about it; nothing without a material."""
+def _weighed(
+    case: CaseFile, name: str, rows: Iterable[Row], shapes: Mapping[str, Moments]
+) -> Inspected:
+    """Rows, then mass, centre of gravity and inertia from the moments of each solid."""
+    rows = tuple(rows)
     try:
-        materials = case.materials_of(name, {solid: p.volume for solid, p in profiles.items()})
-    except InputError:
-        return
-    parts = [(materials[solid].density, profile) for solid, profile in profiles.items()]
-    mass = sum(density * profile.volume for density, profile in parts)
-    centre = sum(density * profile.volume * profile.centre for density, profile in parts) / mass
-    axial, across = (
-        sum(density * profile.second_moments[i] for density, profile in parts) for i in (0, 1)
-    )
-    yield "centre of gravity", "", f"z {1e3 * centre:.5g} mm"
-    across -= mass * centre**2
-    words = f"{1e9 * axial:.5g} g mm^2 about the axis, {1e9 * across:.5g} g mm^2 across"
-    yield "inertia", "", words
-
-
-def _mass(case: CaseFile, name: str, volumes: Mapping[str, float]) -> Row:
-    try:
-        materials = case.materials_of(name, volumes)
+        materials = case.materials_of(name, {solid: one.volume for solid, one in shapes.items()})
     except InputError as error:  # what there is shall be shown all the same
-        return "mass", "", error.got
-    mass = sum(volume * materials[solid].density for solid, volume in volumes.items())
-    kinds = ", ".join(dict.fromkeys(material.name for material in materials.values()))
-    return "mass", "", f"{1e3 * mass:.6g} g of {kinds}"
+        return Inspected(rows=(*rows, ("mass", "", error.got)))
+    whole = Moments.together((materials[solid].density, one) for solid, one in shapes.items())
+    kinds = ", ".join(dict.fromkeys(materials[solid].name for solid in shapes))
+    weighed = (
+        ("mass", "", f"{1e3 * whole.volume:.6g} g of {kinds}"),
+        ("centre of gravity", "", _place_words(whole.centre)),
+        ("inertia", "", _inertia_words(whole.inertia)),
+    )
+    return Inspected(rows=(*rows, *weighed), mass=whole.volume, centre=whole.centre)
 
 
-def _volumes(model: MeshModel) -> dict[str, float]:
+_ROUND = 1e-4  # of the largest; meshes of turned bodies are round to this
+
+
+def _place_words(place: np.ndarray) -> str:
+    x, y, z = (round(1e3 * float(v), 4) for v in place)
+    side = f"x {x:.5g}, y {y:.5g}, " if x or y else ""
+    return f"{side}z {z:.5g} mm"
+
+
+def _inertia_words(inertia: np.ndarray) -> str:
+    """About the centre of gravity."""
+    tensor = 1e9 * inertia
+    xx, yy, zz = tensor.diagonal()
+    small = _ROUND * tensor.max()
+    sides = {"xy": tensor[0, 1], "xz": tensor[0, 2], "yz": tensor[1, 2]}
+    sides = {axes: value for axes, value in sides.items() if abs(value) > small}
+    if not sides and abs(xx - yy) <= small:
+        return f"{zz:.5g} g mm^2 about the axis, {0.5 * (xx + yy):.5g} g mm^2 across"
+    more = "".join(f", {axes} {value:.4g}" for axes, value in sides.items())
+    return f"xx {xx:.5g}, yy {yy:.5g}, zz {zz:.5g}{more} g mm^2"
+
+
+def _moments(model: MeshModel) -> dict[str, Moments]:
+    blocks = model.mesh.blocks
     return {
-        solid: corner_volume(
-            replace(
-                model.mesh,
-                blocks=tuple(block for block in model.mesh.blocks if block.solid == solid),
-            )
+        solid: corner_moments(
+            replace(model.mesh, blocks=tuple(block for block in blocks if block.solid == solid))
         )
         for solid in model.mesh.solids
     }

@@ -23,12 +23,12 @@ Rows = Iterator[tuple[str, tuple[Row, ...]]]
 _CLOSED = 1e-9  # [m] of a gap between bodies at the ends of their travels, which are rounded
 
 
-def valve_rows(case: ValveCase) -> Rows:
-    """Rows of bodies that move and of end stops, as of ``inspect_case``."""
+def valve_rows(case: ValveCase, drawn: Mapping[str, float]) -> Rows:
+    """Rows of bodies that move and of end stops; ``drawn`` are masses of elastic bodies [kg]."""
     network = case.network.network()
     meetings = find_meetings(network)
     travel = travel_of(case, network, meetings)
-    masses = _masses(case, network)
+    masses = _masses(network, drawn)
     bodies = [
         name
         for name, part in network.components.items()
@@ -42,18 +42,15 @@ def valve_rows(case: ValveCase) -> Rows:
         yield "case: first estimate of closing", speeds
 
 
-def _masses(case: ValveCase, network: Network) -> dict[str, float]:
-    """Masses of rigid bodies and of drawn ones [kg]."""
+def _masses(network: Network, drawn: Mapping[str, float]) -> dict[str, float]:
+    """Masses of rigid and of elastic bodies [kg]."""
     found = {}
     for name, part in network.components.items():
+        body = str(getattr(part, "body", ""))
         if isinstance(part, RigidMass):
             found[name] = part.mass
-        drawn = case.bodies.get(str(getattr(part, "body", "")))
-        if drawn is None or drawn.geometry is None or drawn.geometry.profile is None:
-            continue
-        volumes = {solid: p.volume for solid, p in drawn.geometry.profile.profiles().items()}
-        materials = case.materials_of(str(getattr(part, "body", "")), volumes)
-        found[name] = sum(volume * materials[s].density for s, volume in volumes.items())
+        elif body in drawn:
+            found[name] = drawn[body]
     return found
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
+from klack.mesh.moments import Moments
 
 __all__ = ["Arc", "Curve", "Line", "Profile", "on_axis"]
 
@@ -256,10 +257,11 @@ class Profile:
         return self._integral(1, 1) / self._integral(1, 0)
 
     @cached_property
-    def second_moments(self) -> tuple[float, float]:
-        """Moments of inertia over density, about the axis and across it at z = 0 [m^5]."""
-        polar = 2 * np.pi * self._integral(3, 0)
-        return polar, 0.5 * polar + 2 * np.pi * self._integral(1, 2)
+    def moments(self) -> Moments:
+        """Of the body of revolution."""
+        across, along = np.pi * self._integral(3, 0), 2 * np.pi * self._integral(1, 2)
+        first = np.array([0.0, 0.0, self.volume * self.centre])
+        return Moments.about_origin(self.volume, first, np.diag([across, across, along]))
 
     def surface_area(self, name: str) -> float:
         """Area swept by the edges called ``name`` [m^2]."""

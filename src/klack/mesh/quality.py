@@ -6,7 +6,7 @@ serendipity element depends on the edge only, :math:`t = 4 x_m - 3 x_0 - x_1` (l
 :math:`x_1 - x_0`), so it is exact for every family.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,10 +17,12 @@ from scipy.sparse import coo_array
 from klack.errors import InputError
 from klack.mesh.families import ElementFamily
 from klack.mesh.mesh import ElementBlock, Mesh
+from klack.mesh.moments import Moments
 
 __all__ = [
     "MeshSummary",
     "PoorElementError",
+    "corner_moments",
     "corner_volume",
     "edge_lengths",
     "mesh_summary",
@@ -142,10 +144,58 @@ def edge_lengths(mesh: Mesh) -> NDArray[np.float64]:
 def corner_volume(mesh: Mesh) -> float:
     """Volume [m^3] of elements with straight edges; a plane mesh is turned."""
     total = 0.0
+    for part in _simplices(mesh):
+        determinant = np.linalg.det(part[:, 1:] - part[:, :1])
+        if part.shape[2] == 2:
+            total += float(np.sum(np.pi * determinant * part[:, :, 0].mean(axis=1)))
+        else:
+            total += float(determinant.sum() / 6)
+    return total
+
+
+def _simplices(mesh: Mesh) -> Iterator[NDArray[np.float64]]:
+    """Corners (n, d + 1, d) of the triangles or tetrahedra that fill straight-edged elements."""
     for block in mesh.blocks:
         x = mesh.points[block.connectivity[:, : block.topology.corners]]
-        total += _linear_volume(x, _shape(block.family))
-    return total
+        for corners in _SPLIT[_shape(block.family)]:
+            yield x[:, list(corners)]
+
+
+def corner_moments(mesh: Mesh) -> Moments:
+    r"""Of elements with straight edges; a plane mesh is turned.
+
+    Exact integrals of products over simplices, as of three linear functions over a triangle:
+    :math:`\int fgh = A/60\,(F G H + F\,\Sigma gh + G\,\Sigma fh + H\,\Sigma fg + 2\,\Sigma fgh)`,
+    with sums over the corners and :math:`F = \Sigma f`.
+    """
+    volume, first, second = 0.0, np.zeros(3), np.zeros((3, 3))
+    for x in _simplices(mesh):
+        size = np.linalg.det(x[:, 1:] - x[:, :1])
+        total = x.sum(axis=1)
+        if x.shape[2] == 3:
+            volume += float(size.sum()) / 6.0
+            first += size @ total / 24.0
+            pairs = np.einsum("nci,ncj->nij", x, x) + total[:, :, None] * total[:, None, :]
+            second += np.einsum("n,nij->ij", size, pairs) / 120.0
+            continue
+        ring, (r, z) = np.pi * size, (x[:, :, 0], x[:, :, 1])  # twice the area, times 2 pi / 2
+        volume += float(ring @ total[:, 0]) / 3.0
+        first[2] += ring @ _product(r, z) / 12.0
+        rr, zz = ring @ _product(r, r, r) / 60.0, ring @ _product(r, z, z) / 60.0
+        second += np.diag([0.5 * rr, 0.5 * rr, zz])
+    return Moments.about_origin(volume, first, second)
+
+
+def _product(
+    f: NDArray[np.float64], g: NDArray[np.float64], h: NDArray[np.float64] | None = None
+) -> NDArray[np.float64]:
+    """Symmetric sum of linear functions over corners (n, corners), as above, without ``A``."""
+    F, G, fg = f.sum(axis=1), g.sum(axis=1), (f * g).sum(axis=1)
+    if h is None:
+        return F * G + fg
+    H = h.sum(axis=1)
+    mixed = F * (g * h).sum(axis=1) + G * (f * h).sum(axis=1) + H * fg
+    return F * G * H + mixed + 2.0 * (f * g * h).sum(axis=1)
 
 
 # Simplices that fill the straight-edged element.
@@ -159,18 +209,6 @@ _SPLIT = {
         *((1, 5, 7, 4), (1, 2, 7, 6), (1, 6, 7, 5)),
     ),
 }
-
-
-def _linear_volume(x: NDArray[np.float64], shape: str) -> float:
-    total = 0.0
-    for corners in _SPLIT[shape]:
-        part = x[:, list(corners)]
-        determinant = np.linalg.det(part[:, 1:] - part[:, :1])
-        if x.shape[2] == 2:
-            total += float(np.sum(np.pi * determinant * part[:, :, 0].mean(axis=1)))
-        else:
-            total += float(determinant.sum() / 6)
-    return total
 
 
 def _worst(mesh: Mesh) -> tuple[float, int, ElementBlock, NDArray[np.float64]]:

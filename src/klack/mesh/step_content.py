@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.mesh.moments import Moments
 from klack.mesh.occ import MM, box_mm
 from klack.mesh.solid import face_names, read_step, solid_names
 
@@ -30,6 +31,8 @@ class StepPart:
         Total.
     low, high (3,) [m]
         Corners of the box around all.
+    moments
+        Of solids.
     """
 
     name: str
@@ -38,6 +41,7 @@ class StepPart:
     size: float
     low: NDArray[np.float64]
     high: NDArray[np.float64]
+    moments: Moments | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,6 +76,19 @@ def _parts(shapes: list, names: tuple[str, ...], unit: float) -> tuple[StepPart,
                 size=sum(shape.mass for shape in here) / unit,
                 low=np.round(low / _BOX_MARGIN) * _BOX_MARGIN / MM,
                 high=np.round(high / _BOX_MARGIN) * _BOX_MARGIN / MM,
+                moments=_moments(here) if unit == MM**3 else None,
             )
         )
     return tuple(parts)
+
+
+def _moments(solids: list) -> Moments:
+    """OpenCASCADE's tensor of inertia is about the centre."""
+    parts = []
+    for solid in solids:
+        tensor, centre = solid.inertia, solid.center
+        inertia = np.array([[tensor[i, j] for j in range(3)] for i in range(3)]) / MM**5
+        second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+        at = np.array([centre.x, centre.y, centre.z]) / MM
+        parts.append((1.0, Moments(volume=solid.mass / MM**3, centre=at, second=second)))
+    return Moments.together(parts)

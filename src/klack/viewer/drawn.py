@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from klack import __version__
 from klack.analyses.impact.body_picture import section_lines
 from klack.analyses.impact.record import BodyPicture, ImpactStudy
+from klack.analyses.inspection import Inspected, Row, expanded_rows, inspect_bodies, meeting_rows
 from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
 from klack.assembling.bodies import place_meshes
 from klack.assembling.body_row import row_as_valve
@@ -26,18 +28,20 @@ from klack.errors import InputError
 from klack.machine.progress import Progress, silent
 from klack.mesh.mesh import Mesh
 from klack.mesh.quality import edge_lengths
+from klack.mesh.rigid import Pose
 from klack.mesh.skin import skin_of_mesh
 from klack.network.component import Component
 from klack.report.looks import thinned
 from klack.schematic.picture import schematic_svg
 from klack.units import format_si
-from klack.viewer.view import BodyView, ContactView, Curve, MotionView, View
+from klack.viewer.view import BodyView, ContactView, Curve, Facts, MotionView, View
 
 __all__ = ["body_view", "view_of_case", "view_of_mesh", "view_of_result"]
 
 
 def view_of_case(case: Case | ValveCase, progress: Progress = silent) -> View:
     """Bodies of a case in their places, with their supports, contacts and network."""
+    told = dict(inspect_bodies(case))
     view = View(
         name=case.name,
         title=case.title or case.name,
@@ -45,9 +49,10 @@ def view_of_case(case: Case | ValveCase, progress: Progress = silent) -> View:
         description=case.description.strip(),
         version=__version__,
         bodies=(),
+        facts=_facts(case, told),
     )
     if isinstance(case, ValveCase):
-        return _valve_view(case, view, progress)
+        return _valve_view(case, view, told, progress)
     if not case.has_surfaces:
         raise InputError(
             f"{case.path or 'case'}: bodies",
@@ -67,10 +72,32 @@ def view_of_case(case: Case | ValveCase, progress: Progress = silent) -> View:
         (str(moving), str(stop)),
         case.contact.gap,
     )
-    return replace(view, bodies=_bodies(case, meshes), contacts=(contact,))
+    pose = placed.pose
+    if placed.upper.dimension == 2:  # drawn upright on the axis
+        pose = Pose.along_z(float(pose.shift[2]))
+    bodies = _bodies(case, meshes, told, {moving.body: pose})
+    return replace(view, bodies=bodies, contacts=(contact,), notes=_raised(moving.body, pose))
 
 
-def _valve_view(case: ValveCase, view: View, progress: Progress) -> View:
+_RAISED = 0.5e-6  # [m]; five digits of a place do not show less
+
+
+def _raised(name: str, pose: Pose) -> tuple[str, ...]:
+    rise = float(pose.shift[2])
+    if abs(rise) < _RAISED:
+        return ()
+    way = f"{format_si(abs(rise), 'm', 3)} {'above' if rise > 0 else 'below'}".replace("um", "µm")
+    return (f"{name} stands {way} its drawing; numbers beside it are those of the drawing.",)
+
+
+def _facts(case: CaseFile, told: Mapping[str, Inspected]) -> Facts:
+    rows = (*expanded_rows(case), *meeting_rows(case, told))
+    return tuple((title.removeprefix("case: "), each) for title, each in rows)
+
+
+def _valve_view(
+    case: ValveCase, view: View, told: Mapping[str, Inspected], progress: Progress
+) -> View:
     notes, drawn = [], {}
     shaped = {name for name, body in case.bodies.items() if body.has_surfaces}
     if shaped == set(case.bodies) and shaped:
@@ -93,34 +120,47 @@ def _valve_view(case: ValveCase, view: View, progress: Progress) -> View:
         notes.append("Bodies stand as drawn; gaps of the stops come from the network.")
     return replace(
         view,
-        bodies=_bodies(case, drawn),
+        bodies=_bodies(case, drawn, told),
         contacts=tuple(contacts),
         schematic=schematic_svg(case.network.network(), ""),
         notes=tuple(notes),
     )
 
 
-def view_of_mesh(mesh: Mesh, source: str, note: str = "") -> View:
-    """The body of a mesh or CAD file, as it is."""
+def view_of_mesh(mesh: Mesh, source: str, rows: tuple[Row, ...], note: str = "") -> View:
+    """The body of a mesh or CAD file, as it is; ``rows`` of ``inspect_file``."""
     name = Path(source).stem
+    body = body_view(name, mesh, np.empty(0, dtype=np.int64), _mesh_words(mesh))
     return View(
         name=name,
         title=source,
         source=source,
         description="",
         version=__version__,
-        bodies=(body_view(name, mesh, np.empty(0, dtype=np.int64), _mesh_words(mesh)),),
+        bodies=(replace(body, rows=rows),),
         notes=(note,) if note else (),
     )
 
 
-def _bodies(case: CaseFile, meshes: Mapping[str, Mesh]) -> tuple[BodyView, ...]:
+def _bodies(
+    case: CaseFile,
+    meshes: Mapping[str, Mesh],
+    told: Mapping[str, Inspected],
+    poses: Mapping[str, Pose] = MappingProxyType({}),
+) -> tuple[BodyView, ...]:
+    """Bodies with what is told of them; ``poses`` of those that do not stand as drawn."""
     found = []
     for name, mesh in meshes.items():
-        given = case.bodies[name]
+        given, pose = case.bodies[name], poses.get(name, _AS_DRAWN)
         words = f"{_source(given)}; {_mesh_words(mesh)}"
-        found.append(body_view(name, mesh, held_nodes(given, mesh), words))
+        body = body_view(name, mesh, held_nodes(given, mesh), words)
+        centre = told[name].centre
+        at = None if centre is None else pose.of(centre)
+        found.append(replace(body, rows=told[name].rows, centre=at))
     return tuple(found)
+
+
+_AS_DRAWN = Pose.along_z(0.0)
 
 
 def body_view(name: str, mesh: Mesh, held: NDArray[np.int64], about: str) -> BodyView:
@@ -220,7 +260,14 @@ def _impact_view(study: ImpactStudy, folder: Path, progress: Progress) -> View:
     notes = []
     if study.pictures:
         kept, left_out = _kept_shapes(study.pictures)
-        bodies = tuple(_pictured(study, one, kept[one.body]) for one in study.pictures)
+        told, facts = _told(study, folder)
+        bodies = tuple(
+            replace(
+                _pictured(study, one, kept[one.body]),
+                rows=told[one.body].rows if one.body in told else (),
+            )
+            for one in study.pictures
+        )
         contacts = _touching(study)
         view = View(
             name="",
@@ -230,6 +277,7 @@ def _impact_view(study: ImpactStudy, folder: Path, progress: Progress) -> View:
             version=__version__,
             bodies=bodies,
             contacts=contacts,
+            facts=facts,
         )
         if left_out:
             notes.append(
@@ -255,6 +303,16 @@ def _impact_view(study: ImpactStudy, folder: Path, progress: Progress) -> View:
         histories=_impact_histories(study),
         notes=(*view.notes, *notes),
     )
+
+
+def _told(study: ImpactStudy, folder: Path) -> tuple[dict[str, Inspected], Facts]:
+    """As of ``klack inspect``; nothing where files of the case are not beside the result."""
+    try:
+        case = read_case(study.case_text, _place_of_case(study, folder))
+        told = dict(inspect_bodies(case))
+    except InputError:
+        return {}, ()
+    return told, _facts(case, told)
 
 
 def _kept_shapes(pictures: tuple[BodyPicture, ...]) -> tuple[dict[str, NDArray[np.int64]], int]:

@@ -50,7 +50,19 @@ const STYLE = `
 .ks-soft{color:var(--soft);font-size:12.5px;overflow-wrap:anywhere}
 .ks-faces{display:flex;flex-wrap:wrap;gap:4px}
 .ks-faces button{padding:2px 8px;min-height:26px;font-size:12.5px;overflow-wrap:anywhere;text-align:left}
-.ks-faces button.ks-hot{border-color:var(--accent);background:var(--back)}
+.ks-faces button.ks-hot,.ks-said-of button.ks-hot{border-color:var(--accent);background:var(--back)}
+.ks-faces{flex-direction:column}
+.ks-faces div{display:flex;flex-wrap:wrap;gap:2px 7px;align-items:center}
+.ks dl{margin:2px 0 6px;font-size:12.5px}
+.ks dt{color:var(--soft);float:left;clear:left;margin-right:6px}
+.ks dd{margin:0;overflow-wrap:anywhere;font-variant-numeric:tabular-nums}
+.ks-said-of{margin:5px 0;overflow-wrap:anywhere;font-variant-numeric:tabular-nums;font-size:12.5px}
+.ks-said-of b{font-weight:600}
+.ks-said-of button{padding:0 5px;min-height:24px;font-size:12.5px;overflow-wrap:anywhere}
+.ks summary{cursor:pointer;min-height:26px;font-size:12.5px;color:var(--soft)}
+.ks summary:focus-visible{outline:2px solid var(--accent);outline-offset:2px}
+.ks-centre{position:absolute;width:18px;height:18px;margin:-9px 0 0 -9px}
+.ks-row .ks-centre{position:static;margin:0}
 .ks-charts{grid-column:1;border-top:1px solid var(--line);display:grid;grid-template-columns:repeat(auto-fit,minmax(min(168px,100%),1fr));background:var(--panel);max-height:46vh;overflow:auto}
 .ks-narrow .ks-charts{max-height:none}
 .ks-chart{position:relative;min-width:0;padding:6px 6px 0}
@@ -71,6 +83,7 @@ const STYLE = `
 
 const BODY_COLOURS = [['#9db8d2', '#86a8c9'], ['#d8bd95', '#bd9c6b'], ['#a9c6a4', '#86ab80'], ['#c8b3d3', '#a78db6'], ['#c9c9c4', '#a3a39d']];
 const CONTACT_COLOUR = '#d55e00', HELD_COLOUR = '#0a7f5f', RING_COLOUR = '#c2185b';
+const WEIGHED = ['solid', 'volume', 'mass', 'centre of gravity', 'inertia', 'press fit', 'doubt'];
 const TURN = Math.PI / 180;
 const UNNAMED = 65535;
 const STRESS_DECADES = 3; // of the colours: the contact has a hundred times the stress of the rest
@@ -384,6 +397,14 @@ function ringMesh(points, closed) {
   return mesh;
 }
 
+// the sign of drawings: a disc in quarters, with a rim in the colour of its body
+function centreSign(colour) {
+  const sign = svgEl('svg', {class: 'ks-centre', viewBox: '-9 -9 18 18', 'aria-hidden': 'true'});
+  sign.append(svgEl('circle', {r: 7, fill: '#ffffff', stroke: '#111418', 'stroke-width': 3.4}), svgEl('circle', {r: 7, fill: 'none', stroke: colour, 'stroke-width': 1.6}),
+    svgEl('path', {d: 'M0 0V-5.6A5.6 5.6 0 0 1 5.6 0ZM0 0V5.6A5.6 5.6 0 0 1-5.6 0Z', fill: '#111418'}));
+  return sign;
+}
+
 // ---------------------------------------------------------------------------------------- charts
 
 class Chart {
@@ -558,7 +579,8 @@ class SceneView {
     this.bar = el('div', {class: 'ks-bar'}, el('span'), el('i'));
     this.axes = svgEl('svg', {class: 'ks-axes', viewBox: '-38 -38 76 76', 'aria-hidden': 'true'});
     this.legend = el('div', {class: 'ks-legend', hidden: ''}, el('span'), el('canvas', {width: 180, height: 1}), el('div', {}, el('span'), el('span')));
-    this.over.append(this.bar, this.axes, this.legend, this.tip, this.said);
+    this.centres = this.bodies.map((body, i) => ({body, sign: centreSign(BODY_COLOURS[i % BODY_COLOURS.length][0])})).filter(({body}) => body.packed.centre);
+    this.over.append(...this.centres.map(({sign}) => sign), this.bar, this.axes, this.legend, this.tip, this.said);
     this.view.append(this.canvas, this.over);
     this.world = new THREE.Scene();
     for (const body of this.bodies) this.world.add(body.group);
@@ -887,13 +909,15 @@ class SceneView {
         this.axes.append(svgEl('text', {x: 31 * at.x, y: -31 * at.y + 4, 'text-anchor': 'middle'}, name));
       }
     }
-    for (const {label, at} of this.dimensions) {
-      label.hidden = !this.dimensionLines.visible;
-      if (label.hidden) continue;
-      const p = at.clone().project(this.camera), x = (p.x + 1) / 2 * this.width, y = (1 - p.y) / 2 * this.height;
-      label.hidden = x < 0 || y < 0 || x > this.width || y > this.height;
-      label.style.left = `${x}px`; label.style.top = `${y}px`;
-    }
+    for (const {label, at} of this.dimensions) this.pin(label, at, this.dimensionLines.visible);
+    for (const {sign, body} of this.centres) this.pin(sign, new THREE.Vector3(...body.packed.centre), body.group.visible && this.state.motion === 'still' && this.centresShown);
+  }
+
+  // an element of the page over a place of the scene
+  pin(node, at, shown) {
+    const p = at.clone().project(this.camera), x = (p.x + 1) / 2 * this.width, y = (1 - p.y) / 2 * this.height;
+    node.toggleAttribute('hidden', !shown || x < 0 || y < 0 || x > this.width || y > this.height);
+    node.style.left = `${x}px`; node.style.top = `${y}px`;
   }
 
   // ---- panel
@@ -937,19 +961,26 @@ class SceneView {
       this.cutBox = this.check('Cut open', false, on => this.setCut(on));
       this.meshBox = this.check('Mesh lines', false, on => { this.mesh = on; this.linesVisible(); this.invalidate(); });
       this.dimensionBox = this.check('Dimensions', true, on => { this.dimensionLines.visible = on; this.invalidate(); });
-      panel.append(el('div', {class: 'ks-row'}, this.cutBox, this.meshBox, this.dimensionBox));
+      this.centresShown = true;
+      const centreBox = this.centres.length ? this.check('Centres of gravity', true, on => { this.centresShown = on; this.invalidate(); }) : null;
+      panel.append(el('div', {class: 'ks-row'}, this.cutBox, this.meshBox, this.dimensionBox, ...[centreBox].filter(Boolean)));
       this.linesVisible();
       panel.append(el('h3', {text: 'Bodies'}));
       this.bodies.forEach((body, i) => {
         panel.append(this.check(body.name, true, on => { body.group.visible = on; this.invalidate(); }, BODY_COLOURS[i % BODY_COLOURS.length][0]),
-          el('div', {class: 'ks-soft', text: body.packed.about}));
+          el('div', {class: 'ks-soft', text: body.packed.about}), ...this.aboutBody(body));
       });
       const keys = [];
       if (payload.contacts.length) keys.push([CONTACT_COLOUR, 'faces in contact']);
       if (this.rings.length) keys.push([RING_COLOUR, 'first touch']);
       if (payload.bodies.some(b => array(b.held).some(x => x))) keys.push([HELD_COLOUR, 'held']);
       if (keys.length) panel.append(el('div', {class: 'ks-row'}, ...keys.map(([colour, text]) => el('span', {class: 'ks-row'}, el('span', {class: 'ks-chip', style: `background:${colour}`}), el('span', {text})))));
-      for (const c of payload.contacts) panel.append(el('div', {class: 'ks-soft', text: `${c.name}: ${c.upper} on ${c.lower}${c.gap === null ? '' : `, gap ${millimetres(c.gap)}`}`}));
+      if (this.centres.length) panel.lastChild.append(el('span', {class: 'ks-row'}, centreSign('#ffffff'), el('span', {text: 'centre of gravity'})));
+      if (!payload.facts.length) for (const c of payload.contacts) panel.append(el('div', {class: 'ks-soft', text: `${c.name}: ${c.upper} on ${c.lower}${c.gap === null ? '' : `, gap ${millimetres(c.gap)}`}`}));
+    }
+    for (const {title, rows} of payload.facts) {
+      panel.append(el('h3', {text: title[0].toUpperCase() + title.slice(1)}));
+      for (const row of rows) panel.append(this.sentence(row));
     }
     this.buildColour();
     this.buildMotion();
@@ -958,11 +989,8 @@ class SceneView {
       for (const body of this.bodies) {
         const list = el('div', {class: 'ks-faces'});
         body.faces.forEach((face, i) => {
-          const name = `${body.name}.${face}`, hit = {body, face: i};
-          const node = el('button', {type: 'button', text: name, onclick: () => this.pick(name), onmouseenter: () => this.hover(hit), onmouseleave: () => this.hover(null),
-            onfocus: () => this.hover(hit), onblur: () => this.hover(null)});
-          this.faceButtons.push({node, body, face: i});
-          list.append(node);
+          const row = body.packed.rows.find(([what, of]) => what === 'surface' && of === face);
+          list.append(el('div', {}, this.faceButton(`${body.name}.${face}`, {body, face: i}), row ? el('span', {class: 'ks-soft', text: row[2]}) : null));
         });
         panel.append(el('div', {class: 'ks-row'}, list));
       }
@@ -983,6 +1011,39 @@ class SceneView {
       panel.append(el('h3', {text: 'Notes'}));
       for (const note of payload.notes) panel.append(el('div', {class: 'ks-soft', text: note}));
     }
+  }
+
+  // what klack inspect tells of a body; its surfaces stand in the list of names
+  aboutBody(body) {
+    const list = rows => {
+      const node = el('dl');
+      for (const [what, name, content] of rows) {
+        const kind = what === 'solid' && content.includes('mm³') ? 'volume' : what;
+        node.append(el('dt', {text: name && name !== body.name ? `${kind} ${name}` : kind}), el('dd', {text: content || name}));
+      }
+      return node;
+    };
+    const rows = body.packed.rows.filter(([what, of]) => what !== 'geometry' && !(what === 'surface' && body.faces.includes(of)));
+    const first = rows.filter(([what]) => WEIGHED.includes(what)), others = rows.filter(([what]) => !WEIGHED.includes(what));
+    const more = others.length ? el('details', {}, el('summary', {text: `More of ${body.name}`}), list(others)) : null;
+    return [first.length ? list(first) : null, more].filter(Boolean);
+  }
+
+  // a row, whose names of faces lighten them
+  sentence([what, name, content]) {
+    const line = el('div', {class: 'ks-said-of'}, el('b', {text: `${name || what}: `}));
+    for (const part of content.split(/([^\s:,;]+\.[^\s:,;]+)/)) {
+      const hit = this.hitOf(part);
+      line.append(hit ? this.faceButton(part, hit) : part);
+    }
+    return line;
+  }
+
+  faceButton(name, hit) {
+    const node = el('button', {type: 'button', text: name, onclick: () => this.pick(name), onmouseenter: () => this.hover(hit), onmouseleave: () => this.hover(null),
+      onfocus: () => this.hover(hit), onblur: () => this.hover(null)});
+    this.faceButtons.push({node, ...hit});
+    return node;
   }
 
   buildColour() {

@@ -36,6 +36,7 @@ def view_of_source(
     ``source`` is a case file or shipped case, mesh or STEP file, or folder of a result;
     ``unit_length`` [m] that of a mesh file without it.
     """
+    from klack.analyses.inspection import inspect_file
     from klack.viewer.drawn import view_of_case, view_of_mesh, view_of_result
 
     ending = source.suffix.lower()
@@ -45,7 +46,7 @@ def view_of_source(
         from klack.mesh.files.mesh_file import read_mesh_file
 
         model = read_mesh_file(source, unit_length, solids_only=True)
-        return view_of_mesh(model.mesh, source.name)
+        return view_of_mesh(model.mesh, source.name, inspect_file(source, unit_length))
     if unit_length is not None:
         raise InputError(
             "--unit",
@@ -68,22 +69,23 @@ def named_case(source: Path, components: Iterable[type[Component]] = ()) -> Valv
 
 def _step_view(source: Path) -> "View":
     """A turned part as its half section, in a tenth of the time; others as solids."""
+    from klack.analyses.inspection import inspect_file
     from klack.mesh.step_content import step_content
     from klack.mesh.step_profile import NotTurnedError, profiles_of_step
     from klack.viewer.drawn import view_of_mesh
 
-    content = step_content(source)
+    content, rows = step_content(source), inspect_file(source)
     longest = max(max(b - a for a, b in zip(s.low, s.high, strict=True)) for s in content.solids)
     note = "Meshed coarsely for this picture alone."
     try:
         profiles = profiles_of_step(source)
     except (NotTurnedError, InputError):  # or an outline that crosses itself, by a flaw of the file
-        return view_of_mesh(_solid_mesh(source, longest), source.name, note=note)
+        return view_of_mesh(_solid_mesh(source, longest), source.name, rows, note)
     from klack.mesh.meridian import mesh_meridian
     from klack.mesh.sizing import MeshSizing
 
     mesh = mesh_meridian(profiles, MeshSizing(size=longest / _SIDES_ACROSS))
-    return view_of_mesh(mesh, source.name, note=f"A turned part, from its half section. {note}")
+    return view_of_mesh(mesh, source.name, rows, f"A turned part, from its half section. {note}")
 
 
 def _solid_mesh(source: Path, longest: float) -> "Mesh":

@@ -14,12 +14,26 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from numpy.typing import NDArray
 
+from klack.analyses.inspection import Row
 from klack.mesh.skin import Skin
+from klack.report.wording import spelled
 
-__all__ = ["BodyView", "ContactView", "Curve", "MotionView", "View", "page_of", "payload_of"]
+__all__ = [
+    "BodyView",
+    "ContactView",
+    "Curve",
+    "Facts",
+    "MotionView",
+    "View",
+    "page_of",
+    "payload_of",
+]
 
 
 Floats = NDArray[np.float64]
+
+Facts = tuple[tuple[str, tuple[Row, ...]], ...]
+"""Titles with their rows, as of ``klack inspect``."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -92,6 +106,10 @@ class BodyView:
         Shortest side of an element.
     travel (frames,) [m]
         Of the body as a whole along z, over ``time`` of the page, or empty.
+    rows
+        As of ``klack inspect``: what, its name, its numbers.
+    centre (3,) [m]
+        Of gravity, as it stands; None where it is not known.
     """
 
     name: str
@@ -102,6 +120,8 @@ class BodyView:
     finest: float
     travel: Floats = field(default_factory=lambda: np.empty(0))
     motion: MotionView | None = None
+    rows: tuple[Row, ...] = ()
+    centre: Floats | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -137,6 +157,8 @@ class View:
         Of the motion, or empty.
     notes
         What is not shown, and why.
+    facts
+        What moves and what meets.
     """
 
     name: str
@@ -151,6 +173,7 @@ class View:
     histories: tuple[Curve, ...] = ()
     schematic: str = ""
     notes: tuple[str, ...] = ()
+    facts: Facts = ()
 
 
 _MM = 1e3
@@ -175,6 +198,7 @@ def payload_of(view: View) -> dict[str, Any]:
         "transfer": [_curve(curve) for curve in view.transfer],
         "histories": [_curve(curve) for curve in view.histories],
         "schematic": view.schematic,
+        "facts": [{"title": title, "rows": _rows(rows)} for title, rows in view.facts],
     }
 
 
@@ -191,9 +215,15 @@ def _body(body: BodyView) -> dict[str, Any]:
         "held": _array(body.held, "u1"),
         "section": _array(body.section * _MM, "f4"),
         "travel": _array(body.travel * _MM, "f4"),
+        "rows": _rows(body.rows),
+        "centre": None if body.centre is None else [float(_MM * x) for x in body.centre],
         **_skin(body.skin),
         "motion": None if body.motion is None else _motion(body.motion, body.skin),
     }
+
+
+def _rows(rows: tuple[Row, ...]) -> list[list[str]]:
+    return [[what, name, spelled(content)] for what, name, content in rows]
 
 
 def _skin(skin: Skin) -> dict[str, Any]:
