@@ -1,6 +1,6 @@
-"""Make the pictures of the pages of ``klack app``: ``python docs/app_pictures.py``.
+"""Make the pictures of ``klack app`` and ``klack show``: ``python docs/app_pictures.py``.
 
-The pages are those of ``tests/browser_pages.py`` that name a picture, of a folder that is computed
+The pages are those of ``PICTURED`` in ``tests/browser_pages.py``, of a folder that is computed
 for them.  What has to be on each picture, its headings, buttons and boxes, is kept in
 ``images/app-pictures.json``; ``tests/interface/test_app_pages.py`` compares that with the pages.
 Pixels are not compared: letters differ from machine to machine.
@@ -19,12 +19,12 @@ from playwright.sync_api import sync_playwright
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-from browser_pages import PAGES, controls, launched, made_folder
+from browser_pages import PICTURED, controls, launched, made_folder
 from served_app import Served
 
 IMAGES = Path(__file__).parent / "images"
 SIZE = {"width": 1120, "height": 800}
-COLOURS = 128
+COLOURS = 256
 
 
 def main() -> None:
@@ -40,12 +40,14 @@ def main() -> None:
         with Served(folder) as server:
             page.goto(server.address)
             page.wait_for_selector("#k-body")
-            for item in (item for item in PAGES if item.picture):
+            for item in PICTURED:
+                page.emulate_media(reduced_motion="no-preference")
                 item.open(page, server.base, folder)
                 page.wait_for_timeout(3000)  # charts and scenes are drawn
                 seen[item.picture] = controls(page)
                 drawn = Image.open(io.BytesIO(page.screenshot()))
-                drawn.quantize(COLOURS).save(IMAGES / f"{item.picture}.png", optimize=True)
+                drawn = drawn.convert("RGB").quantize(COLOURS, Image.Quantize.MAXCOVERAGE)
+                drawn.save(IMAGES / f"{item.picture}.png", optimize=True)
         browser.close()
     text = json.dumps(seen, indent=1, ensure_ascii=False)
     (IMAGES / "app-pictures.json").write_text(text + "\n", encoding="utf-8")

@@ -9,6 +9,7 @@ from typing import Any
 
 __all__ = [
     "PAGES",
+    "PICTURED",
     "Place",
     "chromium",
     "controls",
@@ -118,6 +119,29 @@ def _unplanned(folder: Path) -> None:
     (folder / ".klack-app" / "new-valve.json").unlink(missing_ok=True)
 
 
+def _to_contact(page: Any) -> None:
+    page.get_by_role("button", name="To the contact", exact=True).click()
+    page.get_by_label("Mesh lines").check()
+
+
+def _in_mode(page: Any) -> None:
+    page.emulate_media(reduced_motion="reduce")  # at its largest, and still
+    page.locator(".ks-mark").first.click()
+
+
+def _at_peak(page: Any) -> None:
+    page.emulate_media(reduced_motion="reduce")
+    page.get_by_role("button", name="Impact", exact=True).click()
+    page.get_by_role("checkbox", name="Cut open").check()
+    page.get_by_label("Colour", exact=True).select_option("stress")
+    page.get_by_label("Time", exact=True).fill("330")  # of 1000, near the highest force
+
+
+def _without_needle(page: Any) -> None:
+    page.get_by_role("checkbox", name="Cut open").check()
+    page.get_by_role("checkbox", name="needle", exact=True).uncheck()
+
+
 _REPORT = "/report?path=klack-results/{}/report.html"
 _STROKE = "/case?path=stroke/case.yaml"
 _BOTH = "a=klack-results/impact&b=klack-results/impact"
@@ -164,6 +188,36 @@ PAGES = (
 )
 
 
+PICTURED = (
+    *(place for place in PAGES if place.picture),
+    *(
+        Place(
+            f"new valve, {picture}", "/new", ".ks-view canvas", then, planned(1, **other), picture
+        )
+        for picture, then, other in (
+            ("new-valve-seat", _without_needle, {"housing_contact": "", "needle_contact": ""}),
+        )
+    ),
+    Place(
+        "result, moving",
+        "/show?path=klack-results/impact",
+        ".ks-view canvas",
+        _at_peak,
+        picture="new-valve-show",
+    ),
+    *(
+        Place(picture, f"file:show-{name}.html", ".ks-panel h3", then, picture=picture)
+        for picture, name, then in (
+            ("show-case", "stroke", lambda page: None),
+            ("show-contact", "impact", _to_contact),
+            ("show-mode", "impact", _in_mode),
+            ("show-impact", "impact", _at_peak),
+        )
+    ),
+)
+"""Places of pictures; those of :data:`PAGES` and more, which show a page in another state."""
+
+
 # charts of thousands of points, drawn in two dimensions, would take that renderer 15 s
 SOFTWARE_GL = (
     "--use-gl=angle",
@@ -184,7 +238,7 @@ def launched(library: Any) -> Any:
 
 
 _CONTROLS = """() => [
-  ...document.querySelectorAll("#k-body :is(h1, h2, h3, button, a.k-btn, .k-tick)")
+  ...document.querySelectorAll(":is(#k-body, #scene) :is(h1, h2, h3, button, a.k-btn, .k-tick)")
 ].filter(e => e.checkVisibility()).map(e => e.innerText.trim()).filter(word => word)"""
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from app_browser import LONG, server, settle
-from browser_pages import PAGES, Place, controls, made_folder, watched
+from browser_pages import PAGES, PICTURED, Place, controls, made_folder, watched
 from page_rules import (
     HAS_AXE,
     SCHEMES,
@@ -124,11 +124,10 @@ def test_the_pictures_of_the_documentation_have_what_the_pages_have(page, server
     """Headings, buttons and boxes of each picture, as they were when it was made."""
     known = json.loads(Path("docs/images/app-pictures.json").read_text("utf-8"))
     seen = {}
-    for place in PAGES:
-        if place.picture:
-            place.open(page, server.base, folder)
-            settle(page)
-            seen[place.picture] = controls(page)
+    for place in PICTURED:
+        place.open(page, server.base, folder)
+        settle(page)
+        seen[place.picture] = controls(page)
 
     assert seen == known  # else: python docs/app_pictures.py
 
