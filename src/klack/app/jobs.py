@@ -6,6 +6,7 @@ again::
     job.json       what was asked for: command, case, folder of the result
     process.json   number of the process and when it began
     progress.json  stage, fraction and seconds of earlier stages; of a study also its points
+    curves.json    curves so far, of commands that draw them
     live           record of a study that runs or was stopped
     ending.json    exit code, when it ended
     cancelled      empty: it was asked to stop
@@ -28,13 +29,14 @@ from pathlib import Path
 from threading import Lock
 from typing import Any, Literal
 
+import numpy as np
 import psutil
 
 from klack.app.folder import OWN, OpenFolder, replace_file, result_names
 from klack.errors import InputError
 from klack.files.held import HeldFolder
-from klack.machine.progress import PointCount, duration_text
-from klack.terminal.progress import PROGRESS_FILE
+from klack.machine.progress import PointCount, SoFar, duration_text
+from klack.terminal.progress import CURVES_FILE, PROGRESS_FILE
 
 __all__ = ["COMMANDS", "LIVE", "OF_STUDIES", "Job", "Jobs", "State"]
 
@@ -232,6 +234,14 @@ class Jobs:
         """Record folder of a running or stopped study."""
         return self._place / _require_name(name) / LIVE
 
+    def curves(self, name: str) -> tuple[SoFar, ...]:
+        """What a run has drawn so far."""
+        told = self._read(_require_name(name), CURVES_FILE).get("curves", [])
+        try:
+            return tuple(_curve(one) for one in told)
+        except (KeyError, TypeError, ValueError):  # not of this version
+            return ()
+
     def of_result(self, out: str) -> Job | None:
         """Latest run for a result of a study."""
         return next(
@@ -340,6 +350,14 @@ def _points(told: Any) -> PointCount | None:
         left=None if left is None or not isfinite(left) else float(left),
         best=str(told["best"]),
     )
+
+
+def _curve(told: Mapping[str, Any]) -> SoFar:
+    x, y = (np.asarray(told[key], dtype=float) for key in ("x", "y"))
+    if x.ndim != 1 or x.shape != y.shape:
+        raise ValueError("x and y of one length")
+    words = {key: str(told[key]) for key in ("title", "x_label", "name")}
+    return SoFar(x=x, y=y, dots=bool(told["dots"]), **words)
 
 
 def _require_name(name: str) -> str:

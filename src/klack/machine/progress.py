@@ -1,9 +1,25 @@
 """Progress reports of a long step."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-__all__ = ["PointCount", "Progress", "counted", "duration_text", "per_hour", "remark", "silent"]
+if TYPE_CHECKING:  # numpy takes a quarter of a second
+    import numpy as np
+    from numpy.typing import NDArray
+
+__all__ = [
+    "PointCount",
+    "Progress",
+    "SoFar",
+    "StageProgress",
+    "counted",
+    "drawn",
+    "duration_text",
+    "per_hour",
+    "remark",
+    "silent",
+]
 
 Progress = Callable[[str, float], None]
 """Called with stage and fraction, 0 to 1."""
@@ -39,6 +55,54 @@ def counted(progress: Progress, count: PointCount) -> None:
     show = getattr(progress, "counted", None)
     if show is not None:
         show(count)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SoFar:
+    """A curve of work that is not at its end.
+
+    Parameters
+    ----------
+    title
+        What is drawn, with its unit; curves of one title share a chart.
+    x, y (n,)
+        In the units of the labels.
+    x_label
+        With its unit.
+    name
+        Of the curve in its chart.
+    dots
+        Points without a line.
+    """
+
+    title: str
+    x: "NDArray[np.float64]"
+    y: "NDArray[np.float64]"
+    x_label: str
+    name: str = ""
+    dots: bool = False
+
+
+def drawn(progress: object, curves: Callable[[], Sequence[SoFar]]) -> None:
+    """Draw curves so far, if the reporter has ``drawn``; it makes them once a second at most."""
+    draw = getattr(progress, "drawn", None)
+    if draw is not None:
+        draw(curves)
+
+
+class StageProgress:
+    """Progress of one stage, called with its fraction; what is drawn goes to the same reporter."""
+
+    def __init__(self, progress: Progress, stage: str) -> None:
+        self._progress, self._stage = progress, stage
+
+    def __call__(self, fraction: float) -> None:
+        """Report it of the stage."""
+        self._progress(self._stage, fraction)
+
+    def drawn(self, curves: Callable[[], Sequence[SoFar]]) -> None:
+        """See :func:`drawn`."""
+        drawn(self._progress, curves)
 
 
 def silent(stage: str, fraction: float) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from klack.errors import AccuracyWarning, InputError, KlackError
 from klack.machine.cache.result_cache import ResultCache
-from klack.machine.progress import PointCount, Progress, counted, remark
+from klack.machine.progress import PointCount, Progress, SoFar, counted, drawn, remark
 
 Found = TypeVar("Found")
 
@@ -63,6 +63,10 @@ class StageClock:
     def counted(self, count: PointCount) -> None:
         """Pass a count of points on."""
         counted(self._progress, count)
+
+    def drawn(self, curves: Callable[[], Sequence[SoFar]]) -> None:
+        """Pass curves so far on."""
+        drawn(self._progress, curves)
 
     def _book(self) -> None:
         now = perf_counter()

@@ -16,6 +16,7 @@ from klack.contact.step_constants import LAW_RUBBING, LAW_YIELDING
 from klack.contact.yielding_law import YieldingLaw
 from klack.errors import AccuracyWarning, ConvergenceError, InputError, require_positive
 from klack.hydraulics.fluid_table import fluid_at
+from klack.machine.progress import SoFar, drawn
 from klack.network.accuracy import Accuracy
 from klack.network.rows import BranchRow, ElementRow, Rows
 from klack.simulation import energy_balance
@@ -410,10 +411,25 @@ def _run(
                 except ConvergenceError as error:  # of an FMU: what there is is kept
                     failure = error
         progress(recorder.looked / looks)
+        drawn(progress, partial(_so_far, recorder, grid, int(clock[0])))
         now = grid.look_steps * grid.step * recorder.looked
         if failure is not None or (grid.watch and grid.watch.enough(now, finder.settled)):
             return failure
     return None
+
+
+def _so_far(recorder: Recorder, grid: Grid, step: int) -> list[SoFar]:
+    """All channels up to a step, in SI: a reporter chooses."""
+    records = recorder.looked // grid.looks
+    if records < 2:
+        return []
+    first = step - recorder.looked * grid.look_steps
+    steps = first + np.arange(records + 1) * (grid.looks * grid.look_steps)
+    time = np.asarray(grid.step * steps, dtype=float)
+    return [
+        SoFar(title=name, x=time, y=channel.values, x_label="time [s]")
+        for name, channel in recorder.channels(records).items()
+    ]
 
 
 def _up_to(

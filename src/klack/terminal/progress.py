@@ -5,7 +5,7 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from functools import partial
@@ -14,17 +14,23 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from klack.machine.progress import PointCount, Progress, silent
+from klack.machine.progress import PointCount, Progress, SoFar, silent
 
-__all__ = ["PROGRESS_FILE", "show_progress"]
+__all__ = ["CURVES_FILE", "PROGRESS_FILE", "show_progress"]
 
 PROGRESS_FILE = "KLACK_PROGRESS_FILE"
 """Variable: file for the progress instead of the terminal."""
+
+CURVES_FILE = "curves.json"
+"""Beside that file: curves so far."""
 
 _PATIENCE = 2.0  # s that a stage may take without a line
 _LASTS = 5.0  # s after which a stage that has not ended is named
 _AGAIN = 30.0  # s between two lines of a stage that lasts
 _OFTEN = 0.2  # s between two lines of one stage in a file
+_DRAWN = 1.0  # s between two drawings
+_SHARE = 0.005  # of the time of a run that drawing may take
+_COLUMNS = 300  # of a drawing
 _SOON = 0.5  # s until the bar is there
 _KINDS = {
     "klack:wait": "waiting for another process that compiles",
@@ -60,6 +66,7 @@ class _ToFile:
         self._path, self._stage, self._next = path, "", 0.0
         self._points: dict[str, Any] = {}
         self._since, self._spent = time.time(), dict[str, float]()
+        self._draws = time.monotonic() + _DRAWN
 
     def counted(self, count: PointCount) -> None:
         """Points that go with the next stage or fraction."""
@@ -76,11 +83,29 @@ class _ToFile:
             self._since = clock
         self._stage, self._next = stage, now + _OFTEN
         told = {"stage": stage, "fraction": fraction, "since": self._since, "spent": self._spent}
-        text = json.dumps(told | self._points)
-        new = self._path.with_suffix(".new")
+        self._write(self._path, told | self._points)
+
+    def drawn(self, curves: Callable[[], Sequence[SoFar]]) -> None:
+        """Curves so far, thinned; so rarely that the work is hardly slower for it."""
+        if time.monotonic() < self._draws:
+            return
+        from klack.report.looks import thinned
+
+        begin = time.monotonic()  # the import is once
+        told = []
+        for one in curves():
+            x, y = thinned(one.x, one.y, columns=_COLUMNS)
+            told.append(vars(one) | {"x": x.tolist(), "y": y.tolist()})
+        self._write(self._path.with_name(CURVES_FILE), {"curves": told})
+        end = time.monotonic()
+        self._draws = end + max(_DRAWN, (end - begin) / _SHARE)
+
+    @staticmethod
+    def _write(path: Path, told: Any) -> None:
+        new = path.with_suffix(".new")
         with suppress(OSError):  # the work goes on without being watched
-            new.write_text(text, encoding="utf-8")
-            new.replace(self._path)
+            new.write_text(json.dumps(told), encoding="utf-8")
+            new.replace(path)
 
 
 class _Lines:

@@ -61,6 +61,7 @@ from klack.contact.mortar import ContactSpace
 from klack.contact.statics import ReachError
 from klack.errors import ConvergenceError, InputError, require_nonnegative, require_positive
 from klack.machine.cores import share_of
+from klack.machine.progress import SoFar, drawn
 from klack.simulation import energy_balance
 from klack.simulation.finite import require_finite
 from klack.transient.body_damping import BodyDamping
@@ -564,6 +565,12 @@ class _Record:
         self.keep_velocity(run)
         self.keep_energy(run)
 
+    def so_far(self, step: float) -> list[SoFar]:
+        """Contact force over time."""
+        force = np.array(self.force)
+        time = np.asarray(1e6 * step * np.arange(1, force.size + 1), dtype=float)
+        return [SoFar(title="contact force [N]", x=time, y=force, x_label="time [us]")]
+
     def keep_velocity(self, run: _Run) -> None:
         velocity = [body.centre_velocity(run.y) for body in run.bodies]
         if not np.all(np.isfinite(velocity)):
@@ -640,6 +647,7 @@ def _march(
             record.keep_energy(run)
         if progress is not None and number % 10 == 0:
             progress(number / steps)
+            drawn(progress, partial(record.so_far, run.step))
         if record.touched and record.quiet > patience:
             break
         if known is not None and record.touched and record.quiet % _LOOK_STEPS == 1:

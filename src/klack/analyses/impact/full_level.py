@@ -22,7 +22,7 @@ from klack.contact.face_friction import FaceFriction
 from klack.contact.history import BodyEnergy
 from klack.contact.mortar import ContactSpace
 from klack.contact.statics import ReachError
-from klack.machine.progress import Progress
+from klack.machine.progress import Progress, StageProgress
 from klack.transient.body_damping import BodyDamping, body_damping
 from klack.transient.full_body import KnownBody
 from klack.transient.full_order import simulate_full_order
@@ -90,7 +90,7 @@ def simulate_in_full(
         longest_period=longest_period,
         precision="single",
         threads=threads or 2,
-        progress=lambda fraction: progress("full order", fraction),
+        progress=StageProgress(progress, "full order"),
         snapshots=snapshots,
     )
 

@@ -40,7 +40,7 @@ from klack.case.schema import Case
 from klack.case.shots import Shots, StrokeShots
 from klack.errors import ConvergenceError
 from klack.machine.cache.result_cache import result_cache
-from klack.machine.progress import Progress, silent
+from klack.machine.progress import Progress, SoFar, drawn, silent
 from klack.machine.stages import StageClock, collected_warnings, trial
 from klack.units import format_si
 
@@ -203,6 +203,7 @@ def _one_after_another(
             log.add(draw.index, unwrapped(f"shot {draw.index}", found))
         outcomes.append(log.done[draw.index])
         progress("shots", len(outcomes) / len(draws))
+        drawn(progress, partial(_so_far, log))
     return tuple(outcomes)
 
 
@@ -214,6 +215,26 @@ def run_shots_on(
         progress("shots", len(log.done) / len(draws))
         for _ in work.completed({draw.index: draw for draw in draws}):
             progress("shots", len(log.done) / len(draws))
+            drawn(progress, partial(_so_far, log))
+
+
+def _so_far(log: ShotLog) -> list[SoFar]:
+    """Rebound and peak force of the shots that are done, by their numbers."""
+    done = [log.done[index] for index in sorted(log.done)]
+    shot = np.array([outcome.index for outcome in done])
+    return [
+        SoFar(
+            title=title,
+            x=shot,
+            y=factor * np.array([outcome.numbers[key] for outcome in done]),
+            x_label="shot",
+            dots=True,
+        )
+        for title, key, factor in (
+            ("rebound [um]", "rebound_height", 1e6),
+            ("peak force [N]", "peak_force", 1.0),
+        )
+    ]
 
 
 def judge_rule(shots: ShotColumns, centric: ShotColumns, highest: int) -> RuleVerdict:

@@ -40,7 +40,7 @@ from klack.contact.rubbing_law import RubbingLaw
 from klack.contact.yielding_law import YieldingLaw
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.machine.cache.result_cache import result_cache
-from klack.machine.progress import Progress, silent
+from klack.machine.progress import Progress, SoFar, StageProgress, drawn, silent
 from klack.machine.stages import StageClock, collected_warnings, show, trial
 from klack.magnetics.driver import Driver
 from klack.mechanics.end_stop import EndStop
@@ -328,6 +328,7 @@ def one_variant(
         Before the first record.
     """
     begin = perf_counter()
+    progress = _LiftAndForces(progress, roles, str(name))
     asked = valve.case.run.check_steps
     checked = sizes is None and (check if asked is None else asked)
     progress(f"run {name}", 0.0)
@@ -358,6 +359,33 @@ def one_variant(
     return VariantRun(variant=variant, rows=run.rows, failure=run.failure, steps=steps)
 
 
+class _LiftAndForces:
+    """Progress that draws lift and forces of stops from all channels of a run so far."""
+
+    def __init__(self, progress: Progress, roles: ValveRoles, variant: str) -> None:
+        self._progress, self._variant = progress, variant
+        self._lift = f"{roles.needle}.{roles.point} displacement"
+
+    def __call__(self, stage: str, fraction: float) -> None:
+        self._progress(stage, fraction)
+
+    def drawn(self, channels: Callable[[], Sequence[SoFar]]) -> None:
+        """Lift in um, forces in N, over ms."""
+        drawn(self._progress, lambda: [*self._chosen(channels())])
+
+    def _chosen(self, channels: Sequence[SoFar]) -> Iterator[SoFar]:
+        for one in channels:
+            stop = one.title.removesuffix(" peak force")
+            if one.title == self._lift:
+                title, name, y = "lift [um]", "", 1e6 * one.y
+            elif stop != one.title:
+                title, name, y = "forces of the stops [N]", stop, one.y
+            else:
+                continue
+            title = f"{self._variant}: {title}"
+            yield SoFar(title=title, name=name, x=1e3 * one.x, y=y, x_label="time [ms]")
+
+
 class _Attempt(NamedTuple):
     rows: Rows
     result: NetworkResult
@@ -381,7 +409,7 @@ def _attempt(
         result = run_variant(
             valve.case,
             rows,
-            lambda fraction: progress(stage, fraction),
+            StageProgress(progress, stage),
             state=None if after is None else after.state,
             spatial=valve.spatial,
             sizes=sizes,

@@ -2,6 +2,7 @@
 
 import pickle
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 
@@ -42,7 +43,9 @@ from klack.machine.cache.result_cache import result_cache
 from klack.machine.progress import (
     PointCount,
     Progress,
+    SoFar,
     counted,
+    drawn,
     duration_text,
     remark,
     silent,
@@ -227,7 +230,7 @@ def _complete(
         for start in items
     }
     for key in work.completed(tasks):
-        pace.tell(key, len(work.log.done))
+        pace.tell(key, work.log)
 
 
 class _Pace:
@@ -237,9 +240,9 @@ class _Pace:
         self._progress, self._total, self._before = progress, total, before
         self._begin = perf_counter()
 
-    def tell(self, key: StrokeKey, done: int) -> None:
-        """A line for a stroke, one of so many that are done."""
-        variant, index = key
+    def tell(self, key: StrokeKey, log: StrokeLog) -> None:
+        """A line for a stroke, the last of those that are done."""
+        (variant, index), done = key, len(log.done)
         each = (perf_counter() - self._begin) / max(done - self._before, 1)
         left = max(self._total - done, 0)
         which = "centred stroke" if index == CENTRED else f"stroke {index}"
@@ -249,6 +252,20 @@ class _Pace:
         counted(self._progress, PointCount(done=done, most=self._total, left=each * left))
         remark(self._progress, text)
         self._progress("strokes", min(done / self._total, 1.0))
+        drawn(self._progress, partial(_so_far, log))
+
+
+def _so_far(log: StrokeLog) -> list[SoFar]:
+    """First peak force of each stop in the strokes that are done, by their numbers."""
+    found: dict[str, list[tuple[int, float]]] = {}
+    for (variant, index), outcome in sorted(log.done.items()):
+        for stop, numbers in outcome.stops.items() if index != CENTRED else ():
+            found.setdefault(f"{stop} ({variant})", []).append((index, numbers["peak_force"]))
+    curves = {name: np.array(each).T for name, each in found.items()}
+    return [
+        SoFar(title="peak force [N]", x=x, y=y, x_label="stroke", name=name, dots=True)
+        for name, (x, y) in curves.items()
+    ]
 
 
 def _variant(setup: StrokeSetup, name: Variant, count: int, log: StrokeLog) -> VariantShots:

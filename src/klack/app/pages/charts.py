@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -24,12 +25,14 @@ from klack.app.pages.frame import (
     table,
 )
 from klack.app.state import State
+from klack.machine.progress import SoFar
 from klack.report.spoken import spoken
 
 __all__ = [
     "EMPTY",
     "TITLES",
     "DescribedChart",
+    "GrowingCharts",
     "answer_figures",
     "comparing_page",
     "spectrogram_figure",
@@ -208,6 +211,38 @@ class DescribedChart:
         """Draw another one, and tell it."""
         self.plot.update_figure(figure)
         self._words.set_text(_told(figure))
+
+
+class GrowingCharts:
+    """Charts of a run that is not at its end, below each other on a narrow page."""
+
+    def __init__(self) -> None:
+        self._box = ui.element("div").classes("k-growing")
+        self._charts: dict[str, DescribedChart] = {}
+
+    def show(self, curves: Sequence[SoFar]) -> None:
+        """Draw what there is; the first chart loads the library."""
+        figures = {one.title: _so_far_figure(one.title, curves) for one in curves}
+        if [*figures] != [*self._charts]:
+            self._box.clear()
+            with self._box:
+                self._charts = {
+                    title: DescribedChart(title, figure) for title, figure in figures.items()
+                }
+            return
+        for title, figure in figures.items():
+            self._charts[title].update_figure(figure)
+
+
+def _so_far_figure(title: str, curves: Sequence[SoFar]) -> dict[str, Any]:
+    lines = []
+    shown = [one for one in curves if one.title == title]
+    for one, colour in zip(shown, cycle(_COLOURS), strict=False):
+        line = _line(Curve(name=one.name, x=one.x, y=one.y), colour, one.name)
+        lines.append(line | {"mode": "markers" if one.dots else "lines"})
+    figure = _figure(lines, shown[0].x_label, "")
+    figure["layout"]["showlegend"] = len(shown) > 1
+    return figure
 
 
 def _told(figure: dict[str, Any]) -> str:

@@ -14,6 +14,7 @@ from nicegui import ui
 from klack.app.answers import Checked, ResultCard
 from klack.app.folder import RESULT_NAME, Found
 from klack.app.jobs import OF_STUDIES, Job
+from klack.app.pages.charts import GrowingCharts
 from klack.app.pages.frame import (
     address,
     asking,
@@ -76,6 +77,7 @@ class _Overview:
         self._seen: tuple[tuple[str, str], ...] = ()
         self._ended: set[str] | None = None
         self._progress: dict[str, Callable[[Job], None]] = {}
+        self._charts: dict[str, GrowingCharts] = {}
         self._most = _AT_ONCE
         self._found, self._sought = _NONE, ""
 
@@ -136,6 +138,10 @@ class _Overview:
             for job in jobs:
                 if job.name in self._progress:
                     self._progress[job.name](job)
+        for name, charts in tuple(self._charts.items()):
+            curves = await asyncio.to_thread(self._state.jobs.curves, name)
+            if curves and self._charts.get(name) is charts:
+                charts.show(curves)
         has_new = self._ended is not None and not ended <= self._ended
         self._seen, self._ended = states, ended
         if has_new:  # the cases stay under the pointer
@@ -149,6 +155,7 @@ class _Overview:
         found = self._state.jobs.all() if jobs is None else jobs
         self._jobs.clear()
         self._progress.clear()
+        self._charts.clear()
         if not found:
             return
         with self._jobs:
@@ -156,6 +163,8 @@ class _Overview:
             with ui.element("div").classes("k-sheet"):
                 for job in found[:12]:
                     self._show_job(job)
+                    if job.name in self._progress:
+                        self._charts[job.name] = GrowingCharts()
 
     def _show_job(self, job: Job) -> None:
         with ui.element("div").classes("k-row"):
