@@ -102,8 +102,9 @@ def packed_scene(view: View) -> bytes:
         for line in view.histories
     )
     bodies = tuple(replace(body, about=typed(body.about)) for body in view.bodies)
-    view = replace(view, histories=histories, bodies=bodies)
-    text = json.dumps(payload_of(view), separators=(",", ":"), allow_nan=False)
+    notes = tuple(typed(note) for note in view.notes)
+    view = replace(view, histories=histories, bodies=bodies, notes=notes)
+    text = json.dumps(payload_of(view, typed), separators=(",", ":"), allow_nan=False)
     if len(text) > LARGEST_SCENE:
         raise InputError(
             f"bodies of {view.name}",

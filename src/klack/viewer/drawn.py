@@ -41,6 +41,13 @@ __all__ = ["body_view", "view_of_case", "view_of_mesh", "view_of_result"]
 
 def view_of_case(case: Case | ValveCase, progress: Progress = silent) -> View:
     """Bodies of a case in their places, with their supports, contacts and network."""
+    if isinstance(case, Case) and not case.has_surfaces:
+        raise InputError(
+            f"{case.path or 'case'}: bodies",
+            got="reduced models, or nodes without elements",
+            expected="bodies with surfaces",
+            hint="klack inspect lists what is in such a case.",
+        )
     told = dict(inspect_bodies(case))
     view = View(
         name=case.name,
@@ -53,15 +60,8 @@ def view_of_case(case: Case | ValveCase, progress: Progress = silent) -> View:
     )
     if isinstance(case, ValveCase):
         return _valve_view(case, view, told, progress)
-    if not case.has_surfaces:
-        raise InputError(
-            f"{case.path or 'case'}: bodies",
-            got="reduced models, or nodes without elements",
-            expected="bodies with surfaces",
-            hint="klack inspect lists what is in such a case.",
-        )
     if case.backing is not None:
-        return _valve_view(row_as_valve(case), view, progress)
+        return _valve_view(row_as_valve(case), view, told, progress)
     placed = place_meshes(case, progress)
     moving, stop = case.contact.moving, case.contact.stop
     meshes = {moving.body: placed.upper, stop.body: placed.lower}

@@ -1018,7 +1018,7 @@ class SceneView {
     const list = rows => {
       const node = el('dl');
       for (const [what, name, content] of rows) {
-        const kind = what === 'solid' && content.includes('mm³') ? 'volume' : what;
+        const kind = what === 'solid' && /mm(³|\^3)/.test(content) ? 'volume' : what;
         node.append(el('dt', {text: name && name !== body.name ? `${kind} ${name}` : kind}), el('dd', {text: content || name}));
       }
       return node;

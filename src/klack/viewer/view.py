@@ -3,6 +3,7 @@
 import json
 import re
 from base64 import b64encode
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files
@@ -180,10 +181,11 @@ _MM = 1e3
 _TYPES = {"f4": "<f4", "i2": "<i2", "i1": "<i1", "u1": "<u1", "u2": "<u2", "u4": "<u4"}
 
 
-def payload_of(view: View) -> dict[str, Any]:
+def payload_of(view: View, words: Callable[[str], str] = spelled) -> dict[str, Any]:
     """Plain data of a view, which JSON can carry; ``scene.js`` draws it.
 
-    Lengths are in millimetres; the type of an array stands beside it.
+    Lengths are in millimetres; the type of an array stands beside it.  ``words`` spells numbers of
+    rows, ``z 5 mm^2``, as the page does.
     """
     return {
         "schema": "klack-scene/1",
@@ -192,13 +194,13 @@ def payload_of(view: View) -> dict[str, Any]:
         "description": view.description,
         "version": view.version,
         "notes": list(view.notes),
-        "bodies": [_body(body) for body in view.bodies],
+        "bodies": [_body(body, words) for body in view.bodies],
         "contacts": [_contact(contact) for contact in view.contacts],
         "time": _array(view.time * 1e6, "f4"),
         "transfer": [_curve(curve) for curve in view.transfer],
         "histories": [_curve(curve) for curve in view.histories],
         "schematic": view.schematic,
-        "facts": [{"title": title, "rows": _rows(rows)} for title, rows in view.facts],
+        "facts": [{"title": title, "rows": _rows(rows, words)} for title, rows in view.facts],
     }
 
 
@@ -207,7 +209,7 @@ def _array(values: NDArray[Any], kind: str) -> dict[str, Any]:
     return {"type": kind, "shape": list(data.shape), "data": b64encode(data.tobytes()).decode()}
 
 
-def _body(body: BodyView) -> dict[str, Any]:
+def _body(body: BodyView, words: Callable[[str], str]) -> dict[str, Any]:
     return {
         "name": body.name,
         "about": body.about,
@@ -215,15 +217,15 @@ def _body(body: BodyView) -> dict[str, Any]:
         "held": _array(body.held, "u1"),
         "section": _array(body.section * _MM, "f4"),
         "travel": _array(body.travel * _MM, "f4"),
-        "rows": _rows(body.rows),
+        "rows": _rows(body.rows, words),
         "centre": None if body.centre is None else [float(_MM * x) for x in body.centre],
         **_skin(body.skin),
         "motion": None if body.motion is None else _motion(body.motion, body.skin),
     }
 
 
-def _rows(rows: tuple[Row, ...]) -> list[list[str]]:
-    return [[what, name, spelled(content)] for what, name, content in rows]
+def _rows(rows: tuple[Row, ...], words: Callable[[str], str]) -> list[list[str]]:
+    return [[what, name, words(content)] for what, name, content in rows]
 
 
 def _skin(skin: Skin) -> dict[str, Any]:
