@@ -140,7 +140,7 @@ class _Overview:
                     self._progress[job.name](job)
         for name, charts in tuple(self._charts.items()):
             curves = await asyncio.to_thread(self._state.jobs.curves, name)
-            if curves and self._charts.get(name) is charts:
+            if curves and self._charts.get(name) is charts and not self._jobs.is_deleted:
                 charts.show(curves)
         has_new = self._ended is not None and not ended <= self._ended
         self._seen, self._ended = states, ended
