@@ -117,6 +117,8 @@ def test_a_result_is_stored_shown_and_has_no_sound(tmp_path, monkeypatch, capsys
     assert "--level reduced,full" not in page
     assert main(["show", "out", "--out", "page.html"]) == 0
     assert "3 bodies, 2 contacts" in capsys.readouterr().out
+    assert main(["inspect", str(CASE)]) == 0
+    assert "insert.foot on housing.ledge: clamped with 500 N" in capsys.readouterr().out
     others = (["noise", "out"], ["noise", str(CASE)], ["advise", str(CASE)], ["reduce", str(CASE)])
     compared = (["compare", "out", way, "out.json"] for way in ("--measurement", "--calculix"))
     for command in (*others, *compared):

@@ -170,13 +170,18 @@ def meeting_rows(
 
 
 def _impact_rows(case: Case) -> Iterator[Row]:
-    contact, above = case.contact, case.opposite
+    contact, above, below = case.contact, case.opposite, case.backing
     gap = "gap as drawn" if contact.gap is None else f"gap {format_si(contact.gap, 'm', 4)}"
     speed = format_si(case.motion.speed, "m/s", 4)
     yield "contact", "", f"{contact.moving} on {contact.stop}: {gap}, starts with {speed}"
     if above is not None:
         travel = format_si(above.gap, "m", 4)
         yield "upper stop", "", f"{above.stop} on {above.moving}: {travel} above the start"
+    if below is not None:
+        upper, lower = below.between
+        gap = f"gap {format_si(below.gap, 'm', 4)}"
+        state = f"clamped with {format_si(below.preload, 'N', 4)}" if below.preload else gap
+        yield "contact below", "", f"{upper} on {lower}: {state}"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
