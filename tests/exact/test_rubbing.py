@@ -12,7 +12,7 @@ import pytest
 from draws import each
 
 from klack.transient.active_set import solve_active
-from klack.transient.interface_arrays import ActiveSet, Closed
+from klack.transient.interface_arrays import ActiveSet, Closed, Rings
 from klack.transient.rubbing import OPEN, SLIP, STICK, solve_rubbing
 
 pytestmark = pytest.mark.slow
@@ -26,7 +26,7 @@ def solved(A, q, mu, guess=None, closed=None):
     lam = np.zeros(len(q)) if guess is None else guess.copy()
     w, doing = np.zeros(len(q)), np.zeros(len(mu), dtype=np.int64)
     closed = Closed.none(len(mu), len(q) // len(mu) - 1) if closed is None else closed
-    rounds = solve_rubbing(A, q, mu, closed, lam, w, doing, TOLERANCE)
+    rounds = solve_rubbing(A, q, mu, closed, Rings.none(), lam, w, doing, TOLERANCE)
     assert rounds != 0
     return lam, w, doing, rounds
 
@@ -234,13 +234,13 @@ def test_faces_that_close_and_turn_round_as_a_whole_take_few_rounds():
     gap = 1.0 * (at - 0.45) ** 2
     q = np.concatenate([gap - 0.5, np.full(16, -0.5)])
     lam, w, doing = np.zeros(32), np.empty(32), np.zeros(16, dtype=np.int64)
-    assert 0 < solve_rubbing(A, q, mu, Closed.none(16, 1), lam, w, doing, 1e-12) < 10
+    assert 0 < solve_rubbing(A, q, mu, Closed.none(16, 1), Rings.none(), lam, w, doing, 1e-12) < 10
     closed = lam[:16] > 0
     assert 4 < closed.sum() < 16  # the rest opens on the way
     np.testing.assert_allclose(lam[16:], mu * lam[:16], atol=1e-12)
     for move, state in ((0.01, STICK), (1.0, SLIP)):
         again, back = lam.copy(), np.concatenate([q[:16], move - kernel @ lam[16:]])
-        assert 0 < solve_rubbing(A, back, mu, Closed.none(16, 1), again, w, doing, 1e-12) < 10
+        assert 0 < solve_rubbing(A, back, mu, Closed.none(16, 1), Rings.none(), again, w, doing, 1e-12) < 10
         assert np.any(doing == state)
         if state == SLIP:
             np.testing.assert_allclose(again[16:], -mu * again[:16], atol=1e-12)

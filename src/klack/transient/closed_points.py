@@ -85,14 +85,17 @@ def _leave(closed: Closed, number: int) -> None:
     inverse, unknown, row = closed.inverse, closed.unknown, closed.row
     last, at = closed.counts[1] - 1, row[number]
     if at != last:
-        for i in range(last + 1):
-            inverse[at, i], inverse[last, i] = inverse[last, i], inverse[at, i]
-        for i in range(last + 1):
-            inverse[i, at], inverse[i, last] = inverse[i, last], inverse[i, at]
+        if closed.counts[2] >= 0:
+            for i in range(last + 1):
+                inverse[at, i], inverse[last, i] = inverse[last, i], inverse[at, i]
+            for i in range(last + 1):
+                inverse[i, at], inverse[i, last] = inverse[i, last], inverse[i, at]
         unknown[at] = unknown[last]
         row[unknown[at]] = at
     row[number] = -1
     closed.counts[1] = last
+    if closed.counts[2] < 0:
+        return
     share = 1.0 / inverse[last, last]
     for i in range(last):
         a = share * inverse[i, last]
@@ -262,6 +265,7 @@ def invert(closed: Closed, fine: bool) -> None:
     for i in range(m):
         for j in range(m):
             closed.inverse[i, j] = inverse[i, j]
+    closed.counts[2] = 0
 
 
 @inner

@@ -37,6 +37,7 @@ __all__ = [
     "Outside",
     "Pressed",
     "Record",
+    "Rings",
     "Rubbing",
     "State",
     "Step",
@@ -99,6 +100,33 @@ class Layer(NamedTuple):
     energy: Vector  # (m,) [J/m^2]
 
 
+class Rings(NamedTuple):
+    """Orders of the compliance of n = R N points at N angles on rings, in three directions.
+
+    Numbers of rows are R c + r in direction c; of the m chosen rings, m c + their place.
+    """
+
+    around: Cube  # (2, N, N) orthonormal functions of the angle: of the plane, along the ring
+    back: Cube  # (2, N, N) the same transposed
+    start: Index  # (K + 1,) first function of each order
+    compliance: Cube  # (K, 3 R, 3 R) [m/N] of each order
+    place: Index  # (R,) of a ring among the chosen ones, -1: it is not
+    ring: Index  # (R,) the first ``count[0]`` are chosen
+    count: Index  # (1,)
+    soft: Vector  # the compliance of the chosen ones, (K, 3 m, 3 m) in the first entries
+    stiff: Vector  # its inverse, order by order
+    grid: Matrix  # (N, 3 R) forces and displacements of the chosen ones
+    waves: Matrix  # (N, 3 R) by the functions
+    answers: Matrix  # (N, 3 R)
+
+    @classmethod
+    def none(cls) -> Self:
+        """Return no ring."""
+        cube, index, grid = np.zeros((0, 0, 0)), np.zeros(0, dtype=np.int64), np.zeros((0, 0))
+        vector = np.zeros(0)
+        return cls(cube, cube, index, cube, index, index, index, vector, vector, grid, grid, grid)
+
+
 class Grip(NamedTuple):
     """Friction between the faces at the points."""
 
@@ -107,6 +135,7 @@ class Grip(NamedTuple):
     static: Vector  # (n,) [-] coefficients of friction
     kinetic: Vector  # (n,) [-]
     fade: Vector  # (n,) [m] slip within a step over which the first fades to the second
+    rings: Rings  # on which the points lie, or none
 
 
 class Others(NamedTuple):
@@ -246,7 +275,8 @@ class Closed(NamedTuple):
     unknown: NDArray[np.int64]  # (d n,) numbers of the first ``counts[1]`` unknown forces
     row: NDArray[np.int64]  # (d n,) of an unknown force in the inverse, -1: it is not one
     inverse: Matrix  # (d n, d n) [N/m]
-    counts: NDArray[np.int64]  # points, unknown forces, rounds beyond two since a fresh inverse
+    counts: NDArray[np.int64]  # points, unknown forces, rounds beyond two since a fresh inverse; the
+    # last is -1 where the unknown forces are listed without an inverse
 
     @classmethod
     def none(cls, points: int, ways: int) -> Self:

@@ -170,6 +170,7 @@ def rub(points: ContactPoints, grip: Grip, state: State, step: Step, tolerance: 
         step.free,
         step.mu,
         rubbing.closed,
+        grip.rings,
         rubbing.forces,
         step.motion,
         rubbing.doing,

@@ -210,6 +210,8 @@ class InterfaceModel:
         On the points of the only contact, without friction or yield; None: smooth.
     others
         Further bodies that move.
+    angles
+        Of the points of every ring, which follow each other; 0: not on whole rings.
     """
 
     bodies: tuple[str, ...]
@@ -239,6 +241,7 @@ class InterfaceModel:
     limit: PressureLimit | None = None
     layer: AsperityLayer | None = None
     others: tuple[MovingBody, ...] = ()
+    angles: int = 0
 
     @property
     def moving(self) -> tuple[MovingBody, ...]:

@@ -20,6 +20,7 @@ from klack.errors import ConvergenceError, InputError, require_nonnegative, requ
 from klack.simulation import energy_balance
 from klack.simulation.finite import require_finite
 from klack.simulation.propagator import damping_loss, modal_propagator
+from klack.transient.closed_rings import rings_of
 from klack.transient.interface_arrays import (
     CONTACT_STEPS,
     DAMPING,
@@ -205,8 +206,9 @@ def contact_points(
     static, kinetic, fade = np.repeat(
         [(f.static, f.kinetic, f.speed * step) for f in model.friction], counts, axis=0
     ).T
+    A = contact_compliance(model.compliance, rows, B1, push, spring)
     return ContactPoints(
-        contact_compliance(model.compliance, rows, B1, push, spring),
+        A,
         model.traces,
         model.gap,
         model.axial,
@@ -217,6 +219,7 @@ def contact_points(
             np.ascontiguousarray(static),
             np.ascontiguousarray(kinetic),
             np.ascontiguousarray(fade),
+            rings_of(A, model.angles),
         ),
     )
 

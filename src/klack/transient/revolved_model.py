@@ -425,13 +425,22 @@ def model_of_reduced(
     reduced: Sequence[RevolvedPoints], loads: Floats, contacts: Sequence[RingContact]
 ) -> InterfaceModel:
     """Interface model of the results of :func:`reduced_bodies` for these contacts."""
-    return model_at_points(
+    model = model_at_points(
         [item.body for item in reduced],
         [_point_contact(contact, reduced[0].body.name) for contact in contacts],
         np.sum([item.compliance for item in reduced], axis=0),
         loads,
         np.sum([item.answers for item in reduced], axis=0),
     )
+    return replace(model, angles=_angles([contact.space for contact in contacts]))
+
+
+def _angles(spaces: Sequence[RingSpace]) -> int:
+    """Angles of the points, 0 where some ring has not all of them in their order."""
+    count = spaces[0].count
+    turn = np.concatenate([space.turn for space in spaces])
+    is_whole = len(turn) % count == 0 and bool(np.all(turn == np.arange(len(turn)) % count))
+    return count if is_whole else 0
 
 
 def _rings(contacts: Sequence[tuple[RingContact, bool]]) -> tuple[RingRows, RingPoints]:

@@ -52,7 +52,13 @@ from klack.transient.closed_points import (
     multiply_even,
     soften,
 )
-from klack.transient.interface_arrays import Closed
+from klack.transient.closed_rings import (
+    answer_on_rings,
+    choose_rings,
+    multiply_on_rings,
+    solve_on_rings,
+)
+from klack.transient.interface_arrays import Closed, Rings
 
 __all__ = ["OPEN", "SLIP", "STICK", "RubbingPoints", "solve_rubbing"]
 
@@ -85,6 +91,9 @@ _SOFTER = 0.2
 
 _MANY = 8
 """The inverse is recomputed where one of so many unknowns comes or goes."""
+
+_ENOUGH, _BELOW = 1e-2, 0.3
+"""Share of what is missed that a round on rings leaves, and share of the tolerance."""
 
 _PRICE, _PER_ROUND = 4, 6
 """Rounds that cost as much as a new inverse: the first, and one for each so many unknowns."""
@@ -255,16 +264,11 @@ def _face(closed: Closed, s: int, mu: float, yields: float, along: Matrix) -> No
     closed.bound[s], closed.yields[s] = mu, yields
 
 
-@inner
-def _start_afresh(
-    closed: Closed,
-    d: int,
-    mu: Vector,
-    doing: Ints,
-    along: Matrix,
-    stiffer: Vector,
-    fine: bool,
+@phase
+def _list_unknowns(
+    closed: Closed, d: int, mu: Vector, doing: Ints, along: Matrix, stiffer: Vector
 ) -> None:
+    """List the unknown forces, without an inverse."""
     m = 0
     for s in range(closed.counts[0]):
         wanted = _wanted(d, mu[s], doing[s])
@@ -275,8 +279,7 @@ def _start_afresh(
                 closed.row[d * s + kind] = m
                 closed.unknown[m] = d * s + kind
                 m += 1
-    closed.counts[1], closed.counts[2] = m, 0
-    invert(closed, fine)
+    closed.counts[1], closed.counts[2] = m, -1
 
 
 @inner
@@ -407,8 +410,19 @@ def _sweep(closed: Closed, d: int, mu: Vector, lam: Vector, w: Vector) -> None:
 
 
 @inner
+def _multiply(closed: Closed, rings: Rings, on_rings: bool, x: Vector, out: Vector) -> None:
+    """Product of the compliance of the closed points with a vector."""
+    if on_rings:
+        multiply_on_rings(rings, closed, x, out)
+    else:
+        multiply_even(closed.block, len(x), x, out)
+
+
+@inner
 def _rounds(
     closed: Closed,
+    rings: Rings,
+    on_rings: bool,
     mu: Vector,
     lam: Vector,
     w: Vector,
@@ -430,32 +444,47 @@ def _rounds(
     for rounds in range(1, _ROUNDS):
         worst = _judge(closed, d, mu, lam, w, doing, along, stiffer)
         if worst <= tolerance:
-            closed.counts[2] += max(0, rounds - 3)
+            if not on_rings:
+                closed.counts[2] += max(0, rounds - 3)
             return rounds
         if rounds == 1:
             _as_before(closed, d, lam, doing, along, stiffer)
-        _place(closed, d, mu, lam, w, doing, along, _LEAST * worst, change)
-        ratio = worst / last if rounds > 2 else 0.0
-        lost = worst * ratio ** (2 + closed.counts[1] // _PER_ROUND) > tolerance
-        paid = closed.counts[2] + rounds - 3 > _PRICE + closed.counts[1] // _PER_ROUND
-        slow = ratio > _SLOW
-        if lost or paid or not _follow(closed, d, mu, doing, along, stiffer, slow):
-            _start_afresh(closed, d, mu, doing, along, stiffer, fresh > 0)
-            fresh += 1
-            if fresh > _FRESH:
-                return -rounds
+        _place(closed, d, mu, lam, w, doing, along, np.inf if on_rings else _LEAST * worst, change)
+        if on_rings:
+            _multiply(closed, rings, on_rings, change, moved)
+            for i in range(size):
+                w[i] += moved[i]
+                change[i] = 0.0
+            _list_unknowns(closed, d, mu, doing, along, stiffer)
+        else:
+            ratio = worst / last if rounds > 2 else 0.0
+            lost = worst * ratio ** (2 + closed.counts[1] // _PER_ROUND) > tolerance
+            paid = closed.counts[2] + rounds - 3 > _PRICE + closed.counts[1] // _PER_ROUND
+            lost = lost or paid or closed.counts[2] < 0
+            if lost or not _follow(closed, d, mu, doing, along, stiffer, ratio > _SLOW):
+                _list_unknowns(closed, d, mu, doing, along, stiffer)
+                invert(closed, fresh > 0)
+                fresh += 1
+                if fresh > _FRESH:
+                    return -rounds
         last = worst
         _missed(closed, d, lam, w, doing, along, stiffer, missed)
-        multiply(closed.inverse, closed.counts[1], missed, found)
+        if on_rings:
+            share = max(_ENOUGH, _BELOW * tolerance / worst)
+            solve_on_rings(rings, closed, missed, share, found)
+        else:
+            multiply(closed.inverse, closed.counts[1], missed, found)
         _change(closed, d, mu, doing, along, found, change, lam)
-        multiply_even(closed.block, size, change, moved)
+        _multiply(closed, rings, on_rings, change, moved)
         for i in range(size):
             w[i] += moved[i]
     return -_ROUNDS
 
 
 @inner
-def _tame(closed: Closed, q: Vector, lam: Vector, w: Vector) -> None:
+def _tame(
+    closed: Closed, rings: Rings, on_rings: bool, q: Vector, lam: Vector, w: Vector
+) -> None:
     """Restart from no force, with gaps and slips, where Newton's method has found none."""
     size = len(closed.row) // len(closed.points) * closed.counts[0]
     total = 0.0
@@ -464,7 +493,7 @@ def _tame(closed: Closed, q: Vector, lam: Vector, w: Vector) -> None:
     for i in range(size):
         if not total < 1e300:
             lam[i] = 0.0
-    multiply_even(closed.block, size, lam, w)
+    _multiply(closed, rings, on_rings, lam, w)
     for i in range(size):
         w[i] += q[i]
 
@@ -472,6 +501,8 @@ def _tame(closed: Closed, q: Vector, lam: Vector, w: Vector) -> None:
 @inner
 def _settle(
     closed: Closed,
+    rings: Rings,
+    on_rings: bool,
     q: Vector,
     mu: Vector,
     lam: Vector,
@@ -487,13 +518,13 @@ def _settle(
     """
     d = len(closed.row) // len(closed.points)
     sweeps, rounds = 0, 0
-    _tame(closed, q, lam, w)
+    _tame(closed, rings, on_rings, q, lam, w)
     for _ in range(_CALMS):
-        more = _rounds(closed, mu, lam, w, doing, along, stiffer, tolerance)
+        more = _rounds(closed, rings, on_rings, mu, lam, w, doing, along, stiffer, tolerance)
         rounds += abs(more)
         if more > 0:
             return -rounds - sweeps if sweeps else rounds
-        _tame(closed, q, lam, w)
+        _tame(closed, rings, on_rings, q, lam, w)
         for _ in range(_SWEEPS):
             _sweep(closed, d, mu, lam, w)
         sweeps += _SWEEPS
@@ -512,7 +543,14 @@ def _settle(
 
 @inner
 def _solve_closed(
-    closed: Closed, q: Vector, mu: Vector, lam: Vector, doing: Ints, tolerance: float
+    closed: Closed,
+    rings: Rings,
+    on_rings: bool,
+    q: Vector,
+    mu: Vector,
+    lam: Vector,
+    doing: Ints,
+    tolerance: float,
 ) -> int:
     """Forces of the closed points alone; returns as :func:`solve_rubbing`."""
     n, m = len(closed.points), closed.counts[0]
@@ -524,7 +562,9 @@ def _solve_closed(
         own[s] = mu[k]
         for c in range(d):
             mine[d * s + c], forces[d * s + c] = q[c * n + k], lam[c * n + k]
-    rounds = _settle(closed, mine, own, forces, w, what, along, stiffer, tolerance)
+    rounds = _settle(
+        closed, rings, on_rings, mine, own, forces, w, what, along, stiffer, tolerance
+    )
     for s in range(m):
         k = closed.points[s]
         doing[k] = what[s]
@@ -540,6 +580,7 @@ def solve_rubbing(
     q: Vector,
     mu: Vector,
     closed: Closed,
+    rings: Rings,
     lam: Vector,
     w: Vector,
     doing: Ints,
@@ -559,6 +600,8 @@ def solve_rubbing(
     mu (n,) [-]
     closed
         Of the step before, for the same A; changed in place.
+    rings
+        Of the same A, or none.
     lam (d n,) [N]
         In: first guess, out: the solution.
     w (d n,) [m]
@@ -582,13 +625,17 @@ def solve_rubbing(
             admit(A, closed, k)
     more = True
     while more:
+        on_rings = choose_rings(rings, closed)
         if closed.counts[0] > 0:
-            rounds = _solve_closed(closed, q, mu, lam, doing, tolerance)
+            rounds = _solve_closed(closed, rings, on_rings, q, mu, lam, doing, tolerance)
             if rounds == 0:
                 return 0
             total += abs(rounds)
             in_turn = in_turn or rounds < 0
-        _answer(A, q, closed, lam, w)
+        if on_rings:
+            answer_on_rings(rings, closed, q, lam, w)
+        else:
+            _answer(A, q, closed, lam, w)
         more = False
         for k in range(n):
             if closed.place[k] < 0 and w[k] < -tolerance * A[k, k]:
@@ -687,7 +734,7 @@ class RubbingPoints:
         least = _LEAST_GAP / float(np.mean(self._own))
         try:
             rounds = solve_rubbing(
-                self._A, q, mu, self._closed, lam, w, doing, max(_PRECISION * needed, least)
+                self._A, q, mu, self._closed, Rings.none(), lam, w, doing, max(_PRECISION * needed, least)
             )
         except np.linalg.LinAlgError:
             rounds = 0

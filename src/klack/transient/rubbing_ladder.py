@@ -30,7 +30,7 @@ from klack.contact.face_friction import FaceFriction, lifted_offset
 from klack.contact.rubbing_fit import Loop
 from klack.contact.statics import StaticContact, check_rim
 from klack.errors import ConvergenceError, InputError
-from klack.transient.interface_arrays import Closed
+from klack.transient.interface_arrays import Closed, Rings
 from klack.transient.rubbing import solve_rubbing
 
 __all__ = ["LockedError", "RubbingContact", "rubbing_contact"]
@@ -207,7 +207,7 @@ class _State:
         w, doing = np.empty_like(q), np.zeros(self.count, dtype=np.int64)
         for lam in (self.lam.copy(), self._without_friction(q)):
             closed = Closed.none(self.count, len(q) // self.count - 1)
-            if solve_rubbing(self.C, q, self.mu, closed, lam, w, doing, self.tolerance) != 0:
+            if solve_rubbing(self.C, q, self.mu, closed, Rings.none(), lam, w, doing, self.tolerance) != 0:
                 break
         else:
             raise ConvergenceError(

@@ -8,7 +8,7 @@ import numpy as np
 
 from klack.contact.friction import Friction
 from klack.materials.material import Material
-from klack.transient.interface_arrays import Closed
+from klack.transient.interface_arrays import Closed, Rings
 from klack.transient.interface_model import InterfaceContact
 from klack.transient.interface_run import simulate_interface
 from klack.transient.rubbing import solve_rubbing
@@ -198,7 +198,7 @@ def _cattaneo() -> Iterator[Check]:
     def moved_by(way: float) -> float:
         """Tangential force against the next part of the way of the upper body."""
         q = np.concatenate([gap, np.full(n, way) - bent[:n], -bent[n:]])
-        solve_rubbing(C, q, coefficient, closed, lam, w, doing, 1e-9 * max(lam.max(), 1.0))
+        solve_rubbing(C, q, coefficient, closed, Rings.none(), lam, w, doing, 1e-9 * max(lam.max(), 1.0))
         bent[:] = (C @ lam)[n:]
         return -float(lam[n : 2 * n].sum())
 
