@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.arrays import Cube, Index, Matrix, Vector
-from klack.machine.compiling.jit import FAST, inner
+from klack.machine.compiling.jit import FAST, inner, njit
 from klack.simulation.phase import phase
 from klack.transient.interface_arrays import Closed, Rings
 
@@ -40,53 +40,59 @@ def rings_of(A: NDArray[np.float64], angles: int) -> Rings:
     size = len(A)
     if angles == 0 or size % (3 * angles):
         return Rings.none()
-    rings, K = size // (3 * angles), angles // 2 + 1
-    first = A.reshape(3, rings, angles, -1)[:, :, 0].reshape(3 * rings, 3 * rings, angles)
+    R = size // (3 * angles)
+    first = A.reshape(3, R, angles, -1)[:, :, 0].reshape(3 * R, 3 * R, angles)
     spectrum = np.moveaxis(np.fft.rfft(first, axis=2), 2, 0)
-    sine = np.arange(3 * rings) >= 2 * rings
-    turned = np.ones((3 * rings, 3 * rings), dtype=complex)
-    turned[np.ix_(~sine, sine)], turned[np.ix_(sine, ~sine)] = 1j, -1j
+    spectrum[:, : 2 * R, 2 * R :] *= 1j  # rows along the ring move with the sine
+    spectrum[:, 2 * R :, : 2 * R] *= -1j
     around, start = _functions(angles)
-    made = Rings(
+    chosen, room = np.zeros(R, dtype=np.int64), spectrum.size
+    rings = Rings(
         around,
-        np.ascontiguousarray(np.swapaxes(around, 1, 2)),
+        np.ascontiguousarray(around.T),
         start,
-        np.ascontiguousarray((spectrum * turned).real),
-        np.full(rings, -1, dtype=np.int64),
-        np.zeros(rings, dtype=np.int64),
+        np.ascontiguousarray(spectrum.real),
+        np.full(R, -1, dtype=np.int64),
+        chosen,
         np.zeros(1, dtype=np.int64),
-        *(np.zeros(K * (3 * rings) ** 2) for _ in range(2)),
-        *(np.zeros((angles, 3 * rings)) for _ in range(3)),
+        np.zeros(room),
+        np.zeros(room),
     )
-    force = np.random.default_rng(0).standard_normal(size)
-    hats = [force.reshape(3, rings, angles) @ around[c // 2].T for c in range(3)]
-    waves = np.concatenate([hats[c][c] for c in range(3)])
-    order = np.repeat(np.arange(K), np.diff(start))
-    answers = np.einsum("kij,jk->ik", made.compliance[order], waves).reshape(3, rings, angles)
-    moved = np.array([answers[c] @ around[c // 2] for c in range(3)]).ravel()
-    whole = A @ force
-    is_even = np.max(np.abs(moved - whole)) <= _EVEN * np.max(np.abs(whole))
-    return made if is_even else Rings.none()
+    force = np.random.default_rng(0).standard_normal((3 * R, angles))
+    waves = around @ force.T
+    _swap(start, waves, 2 * R, 3 * R, 1.0)
+    order = np.repeat(np.arange(len(start) - 1), np.diff(start))
+    answers = np.einsum("kij,kj->ki", rings.compliance[order], waves)
+    _swap(start, answers, 2 * R, 3 * R, -1.0)
+    whole = A @ force.ravel()
+    missed = (around.T @ answers).T.ravel() - whole
+    return rings if np.max(np.abs(missed)) <= _EVEN * np.max(np.abs(whole)) else Rings.none()
 
 
-def _functions(angles: int) -> tuple[Cube, Index]:
-    """Orthonormal functions of the angle (2, N, N) of what is even and odd, and their orders.
+def _functions(angles: int) -> tuple[Matrix, Index]:
+    """Orthonormal functions of the angle (N, N), and the first of each order.
 
-    As :meth:`klack.bodies.elasticity.ring_points.RingPoints.factors`.  The motions of order k are
-    those from entry k of the second array on.
+    Those of :meth:`klack.bodies.elasticity.ring_points.RingPoints.factors`, a cosine and a sine.
     """
     rows, start = [], [0]
     for order in range(angles // 2 + 1):
-        share = np.sqrt((1.0 if order == 0 or 2 * order == angles else 2.0) / angles)
-        # whole turns taken off before the cosine, as there
         phase = 2.0 * np.pi / angles * (order * np.arange(angles) % angles)
-        cos, sin = share * np.cos(phase), share * np.sin(phase)
-        if order == 0 or 2 * order == angles:
-            rows.append((cos, cos))
-        else:
-            rows += [(cos, sin), (sin, -cos)]
+        both = (np.cos(phase), np.sin(phase))
+        rows += both[: 1 if order == 0 or 2 * order == angles else 2]
         start.append(len(rows))
-    return np.ascontiguousarray(np.swapaxes(np.array(rows), 0, 1)), np.array(start)
+    functions = np.array(rows)
+    return functions / np.linalg.norm(functions, axis=1, keepdims=True), np.array(start)
+
+
+@njit
+def _swap(start: Index, waves: Matrix, even: int, size: int, sign: float) -> None:
+    """Rows along the ring have the sine where others have the cosine; back with the sign -1."""
+    for order in range(len(start) - 1):
+        at = start[order]
+        if start[order + 1] - at == 2:
+            for i in range(even, size):
+                a, b = waves[at, i], waves[at + 1, i]
+                waves[at, i], waves[at + 1, i] = sign * b, -sign * a
 
 
 @inner
@@ -94,7 +100,7 @@ def choose_rings(rings: Rings, closed: Closed) -> bool:
     """Take the rings of the closed points, and their stiffness; False: an inverse is cheaper."""
     if len(rings.place) == 0 or closed.counts[0] <= _FEW:
         return False
-    N, R = len(rings.around[0]), len(rings.place)
+    N, R = len(rings.around), len(rings.place)
     wanted = np.zeros(R, dtype=np.bool_)
     for s in range(closed.counts[0]):
         wanted[closed.points[s] // N] = True
@@ -130,152 +136,129 @@ def choose_rings(rings: Rings, closed: Closed) -> bool:
 
 
 @inner(fastmath=FAST, _nrt=False, error_model="numpy")
-def _turn(functions: Cube, x: Matrix, even: int, size: int, out: Matrix) -> None:
-    """Sums over the angles or the orders, of ``size`` rows of which the first are ``even``."""
-    N = len(x)
-    for c in range(N):
-        into = out[c]
-        for i in range(size):
-            into[i] = 0.0
-        for j in range(N):
-            a, b, line = functions[0, c, j], functions[1, c, j], x[j]
-            for i in range(even):
-                into[i] += a * line[i]
-            for i in range(even, size):
-                into[i] += b * line[i]
-
-
-@inner(fastmath=FAST, _nrt=False, error_model="numpy")
 def _multiply_orders(blocks: Vector, start: Index, size: int, x: Matrix, out: Matrix) -> None:
     """Product of each order with its motions; the matrices are symmetric."""
     for order in range(len(start) - 1):
         base, at = order * size * size, start[order]
-        if start[order + 1] - at == 1:
-            first, into = x[at], out[at]
-            for i in range(size):
-                row = blocks[base + i * size : base + (i + 1) * size]
-                total = 0.0
-                for j in range(size):
-                    total += row[j] * first[j]
-                into[i] = total
-        else:
-            first, second, into, beside = x[at], x[at + 1], out[at], out[at + 1]
-            for i in range(size):
-                row = blocks[base + i * size : base + (i + 1) * size]
-                total, other = 0.0, 0.0
-                for j in range(size):
-                    total += row[j] * first[j]
-                    other += row[j] * second[j]
-                into[i], beside[i] = total, other
+        last = start[order + 1] - 1
+        first, second, into, beside = x[at], x[last], out[at], out[last]
+        for i in range(0, size - 1, 2):
+            row = blocks[base + i * size : base + (i + 1) * size]
+            next_row = blocks[base + (i + 1) * size : base + (i + 2) * size]
+            a, b, c, d = 0.0, 0.0, 0.0, 0.0
+            for j in range(size):
+                a += row[j] * first[j]
+                b += row[j] * second[j]
+                c += next_row[j] * first[j]
+                d += next_row[j] * second[j]
+            into[i], beside[i], into[i + 1], beside[i + 1] = a, b, c, d
+        if size % 2:
+            row = blocks[base + (size - 1) * size : base + size * size]
+            a, b = 0.0, 0.0
+            for j in range(size):
+                a += row[j] * first[j]
+                b += row[j] * second[j]
+            into[size - 1], beside[size - 1] = a, b
 
 
-@inner(fastmath=FAST, _nrt=False, error_model="numpy")
-def _multiply(rings: Rings, blocks: Vector) -> None:
-    """``grid`` becomes its product with the matrices of the chosen rings."""
-    m = rings.count[0]
-    _turn(rings.around, rings.grid, 2 * m, 3 * m, rings.waves)
-    _multiply_orders(blocks, rings.start, 3 * m, rings.waves, rings.answers)
-    _turn(rings.back, rings.answers, 2 * m, 3 * m, rings.grid)
+@inner
+def _multiply(rings: Rings, blocks: Vector, work: Cube) -> None:
+    """The first matrix of ``work`` becomes its product with those of the chosen rings."""
+    m, grid, waves = rings.count[0], work[0], work[1]
+    np.dot(rings.around, grid, waves)
+    _swap(rings.start, waves, 2 * m, 3 * m, 1.0)
+    _multiply_orders(blocks, rings.start, 3 * m, waves, work[2])
+    _swap(rings.start, work[2], 2 * m, 3 * m, -1.0)
+    np.dot(rings.back, work[2], grid)
 
 
-@phase
-def _clear(rings: Rings) -> None:
-    for j in range(len(rings.grid)):
-        for i in range(3 * rings.count[0]):
-            rings.grid[j, i] = 0.0
-
-
-@inner(fastmath=FAST, _nrt=False, error_model="numpy")
+@inner
 def multiply_on_rings(rings: Rings, closed: Closed, x: Vector, out: Vector) -> None:
     """Product of the compliance of the closed points, in all their directions, with a vector."""
-    N, m = len(rings.grid), rings.count[0]
-    _clear(rings)
+    N, m = len(rings.around), rings.count[0]
+    work = np.zeros((3, N, 3 * m))
     for s in range(closed.counts[0]):
         k = closed.points[s]
-        line, at = rings.grid[k % N], rings.place[k // N]
         for c in range(3):
-            line[c * m + at] = x[3 * s + c]
-    _multiply(rings, rings.soft)
+            work[0, k % N, c * m + rings.place[k // N]] = x[3 * s + c]
+    _multiply(rings, rings.soft, work)
     for s in range(closed.counts[0]):
         k = closed.points[s]
-        line, at = rings.grid[k % N], rings.place[k // N]
         for c in range(3):
-            out[3 * s + c] = line[c * m + at]
+            out[3 * s + c] = work[0, k % N, c * m + rings.place[k // N]]
 
 
-@inner(fastmath=FAST, _nrt=False, error_model="numpy")
+@inner
 def answer_on_rings(rings: Rings, closed: Closed, q: Vector, lam: Vector, w: Vector) -> None:
     """Gaps and slips of all points under the closed ones: w = q + A lam."""
-    N, m, R, n = len(rings.grid), rings.count[0], len(rings.place), len(closed.points)
-    _clear(rings)
+    N, m, R, n = len(rings.around), rings.count[0], len(rings.place), len(closed.points)
+    grid, answers = np.zeros((N, 3 * m)), np.zeros((N, 3 * R))
     for s in range(closed.counts[0]):
         k = closed.points[s]
         for c in range(3):
-            rings.grid[k % N, c * m + rings.place[k // N]] = lam[c * n + k]
-    _turn(rings.around, rings.grid, 2 * m, 3 * m, rings.waves)
+            grid[k % N, c * m + rings.place[k // N]] = lam[c * n + k]
+    waves = np.dot(rings.around, grid)
+    _swap(rings.start, waves, 2 * m, 3 * m, 1.0)
     for order in range(len(rings.start) - 1):
         for at in range(rings.start[order], rings.start[order + 1]):
-            into = rings.answers[at]
-            for i in range(3 * R):
-                into[i] = 0.0
             for j in range(3 * m):
-                row, a = rings.compliance[order, j // m * R + rings.ring[j % m]], rings.waves[at, j]
-                for i in range(3 * R):
-                    into[i] += a * row[i]
-    _turn(rings.back, rings.answers, 2 * R, 3 * R, rings.grid)
+                row = rings.compliance[order, j // m * R + rings.ring[j % m]]
+                _less(answers[at], -waves[at, j], row)
+    _swap(rings.start, answers, 2 * R, 3 * R, -1.0)
+    moved = np.dot(rings.back, answers)
     for j in range(N):
-        line = rings.grid[j]
         for i in range(3 * R):
-            w[i * N + j] = q[i * N + j] + line[i]
+            w[i * N + j] = q[i * N + j] + moved[j, i]
 
 
 @phase
-def _stretch(rings: Rings, closed: Closed, pull: float, x: Vector, spot: Index) -> None:
+def _stretch(
+    closed: Closed, m: int, pull: float, x: Vector, spot: Index, grid: Vector
+) -> None:
     """Forces of unknown ones on the grid: of the law, or ``pull`` 0: without what slip adds."""
-    m, N = rings.count[0], len(rings.grid)
-    _clear(rings)
+    for j in range(len(grid)):
+        grid[j] = 0.0
     for s in range(closed.counts[0]):
         i, a, b = 3 * s, closed.frame[s, 0], closed.frame[s, 1]
-        line, at = rings.grid[spot[s] % N], spot[s] // N
+        at = spot[s]
         slips = 0.0 if closed.row[i + 1] >= 0 else pull * closed.bound[s]
         e = x[i + 1] + slips * x[i]
-        line[at] = x[i]
-        line[m + at] = a * e - b * x[i + 2]
-        line[2 * m + at] = b * e + a * x[i + 2]
+        grid[at] = x[i]
+        grid[m + at] = a * e - b * x[i + 2]
+        grid[2 * m + at] = b * e + a * x[i + 2]
 
 
 @phase
-def _shrink(rings: Rings, closed: Closed, spot: Index, out: Vector) -> None:
+def _shrink(closed: Closed, m: int, spot: Index, grid: Vector, out: Vector) -> None:
     """What the equations of the unknown forces read of the grid."""
-    m, N = rings.count[0], len(rings.grid)
     for s in range(closed.counts[0]):
         i, a, b = 3 * s, closed.frame[s, 0], closed.frame[s, 1]
-        line, at = rings.grid[spot[s] % N], spot[s] // N
-        x, y = line[m + at], line[2 * m + at]
-        out[i] = line[at] if closed.row[i] >= 0 else 0.0
+        at = spot[s]
+        x, y = grid[m + at], grid[2 * m + at]
+        out[i] = grid[at] if closed.row[i] >= 0 else 0.0
         out[i + 1] = a * x + b * y if closed.row[i + 1] >= 0 else 0.0
         out[i + 2] = a * y - b * x if closed.row[i + 2] >= 0 else 0.0
 
 
-@inner(fastmath=FAST, _nrt=False, error_model="numpy")
+@inner
 def _precondition(
-    rings: Rings, closed: Closed, scale: Vector, spot: Index, x: Vector, out: Vector
+    rings: Rings, closed: Closed, scale: Vector, spot: Index, work: Cube, x: Vector, out: Vector
 ) -> None:
-    _stretch(rings, closed, 0.0, x, spot)
-    _multiply(rings, rings.stiff)
-    _shrink(rings, closed, spot, out)
+    _stretch(closed, rings.count[0], 0.0, x, spot, work[0].ravel())
+    _multiply(rings, rings.stiff, work)
+    _shrink(closed, rings.count[0], spot, work[0].ravel(), out)
     for s in range(closed.counts[0]):
         out[3 * s + 2] *= scale[s]
 
 
-@inner(fastmath=FAST, _nrt=False, error_model="numpy")
+@inner
 def _newton(
-    rings: Rings, closed: Closed, scale: Vector, spot: Index, x: Vector, out: Vector
+    rings: Rings, closed: Closed, scale: Vector, spot: Index, work: Cube, x: Vector, out: Vector
 ) -> None:
     """Product with Newton's matrix, its rows scaled."""
-    _stretch(rings, closed, 1.0, x, spot)
-    _multiply(rings, rings.soft)
-    _shrink(rings, closed, spot, out)
+    _stretch(closed, rings.count[0], 1.0, x, spot, work[0].ravel())
+    _multiply(rings, rings.soft, work)
+    _shrink(closed, rings.count[0], spot, work[0].ravel(), out)
     for s in range(closed.counts[0]):
         i = 3 * s + 2
         if closed.row[i] >= 0:
@@ -302,12 +285,13 @@ def solve_on_rings(
 ) -> None:
     """Solve with Newton's matrix of the listed unknown forces to a share of the residual."""
     size = 3 * closed.counts[0]
-    N = len(rings.grid)
+    N, m = len(rings.around), rings.count[0]
+    work = np.empty((3, N, 3 * m))
     spot, scale = np.empty(closed.counts[0], dtype=np.int64), np.ones(closed.counts[0])
     x, y = np.zeros(size), np.zeros(size)
     for s in range(closed.counts[0]):
         i, k = 3 * s + 1, closed.points[s]
-        spot[s] = rings.place[k // N] * N + k % N
+        spot[s] = k % N * 3 * m + rings.place[k // N]
         own = max(closed.block[i, i], closed.block[i + 1, i + 1])
         scale[s] = np.sqrt(own / (own + closed.yields[s]))
     for r in range(closed.counts[1]):
@@ -322,8 +306,8 @@ def solve_on_rings(
     ways[0] = y / left[0]
     goal, k = share * left[0], 0
     while k < _MOST and abs(left[k]) > goal:
-        _precondition(rings, closed, scale, spot, ways[k], x)
-        _newton(rings, closed, scale, spot, x, y)
+        _precondition(rings, closed, scale, spot, work, ways[k], x)
+        _newton(rings, closed, scale, spot, work, x, y)
         for i in range(k + 1):
             steps[i, k] = _part(ways[i], y)
             _less(y, steps[i, k], ways[i])
@@ -346,6 +330,6 @@ def solve_on_rings(
     y[:] = 0.0
     for i in range(k):
         _less(y, -left[i], ways[i])
-    _precondition(rings, closed, scale, spot, y, x)
+    _precondition(rings, closed, scale, spot, work, y, x)
     for r in range(closed.counts[1]):
         found[r] = x[closed.unknown[r]]

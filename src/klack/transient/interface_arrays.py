@@ -106,8 +106,8 @@ class Rings(NamedTuple):
     Numbers of rows are R c + r in direction c; of the m chosen rings, m c + their place.
     """
 
-    around: Cube  # (2, N, N) orthonormal functions of the angle: of the plane, along the ring
-    back: Cube  # (2, N, N) the same transposed
+    around: Matrix  # (N, N) orthonormal functions of the angle
+    back: Matrix  # (N, N) the same transposed
     start: Index  # (K + 1,) first function of each order
     compliance: Cube  # (K, 3 R, 3 R) [m/N] of each order
     place: Index  # (R,) of a ring among the chosen ones, -1: it is not
@@ -115,16 +115,12 @@ class Rings(NamedTuple):
     count: Index  # (1,)
     soft: Vector  # the compliance of the chosen ones, (K, 3 m, 3 m) in the first entries
     stiff: Vector  # its inverse, order by order
-    grid: Matrix  # (N, 3 R) forces and displacements of the chosen ones
-    waves: Matrix  # (N, 3 R) by the functions
-    answers: Matrix  # (N, 3 R)
 
     @classmethod
     def none(cls) -> Self:
         """Return no ring."""
         cube, index, grid = np.zeros((0, 0, 0)), np.zeros(0, dtype=np.int64), np.zeros((0, 0))
-        vector = np.zeros(0)
-        return cls(cube, cube, index, cube, index, index, index, vector, vector, grid, grid, grid)
+        return cls(grid, grid, index, cube, index, index, index, np.zeros(0), np.zeros(0))
 
 
 class Grip(NamedTuple):
