@@ -11,7 +11,11 @@ import numpy as np
 import pytest
 from draws import each
 
+from klack.bodies.elasticity.ring_points import RingPoints
+from klack.machine.compiling.jit import njit
 from klack.transient.active_set import solve_active
+from klack.transient.closed_points import invert, multiply
+from klack.transient.closed_rings import rings_of, solve_on_rings
 from klack.transient.interface_arrays import ActiveSet, Closed, Rings
 from klack.transient.rubbing import OPEN, SLIP, STICK, solve_rubbing
 
@@ -22,11 +26,12 @@ CASES = [row for row in csv.DictReader(line for line in TABLE.open() if not line
 TOLERANCE = 1e-11
 
 
-def solved(A, q, mu, guess=None, closed=None):
+def solved(A, q, mu, guess=None, closed=None, rings=None):
     lam = np.zeros(len(q)) if guess is None else guess.copy()
     w, doing = np.zeros(len(q)), np.zeros(len(mu), dtype=np.int64)
     closed = Closed.none(len(mu), len(q) // len(mu) - 1) if closed is None else closed
-    rounds = solve_rubbing(A, q, mu, closed, Rings.none(), lam, w, doing, TOLERANCE)
+    rings = Rings.none() if rings is None else rings
+    rounds = solve_rubbing(A, q, mu, closed, rings, lam, w, doing, TOLERANCE)
     assert rounds != 0
     return lam, w, doing, rounds
 
@@ -244,3 +249,75 @@ def test_faces_that_close_and_turn_round_as_a_whole_take_few_rounds():
         assert np.any(doing == state)
         if state == SLIP:
             np.testing.assert_allclose(again[16:], -mu * again[:16], atol=1e-12)
+
+
+def ring_compliance(rng, rings, angles):
+    """Of all rings in three directions: near rings move each other, the more the lower the order."""
+    spectrum = np.empty((angles // 2 + 1, 3 * rings, 3 * rings))
+    near = np.exp(-0.5 * np.abs(np.subtract.outer(np.arange(rings), np.arange(rings))))
+    for order in range(len(spectrum)):
+        G = rng.normal(size=(3, 3, 5))
+        both = np.einsum("ijk,ljk->il", G, G) / 15.0 + 0.5 * np.eye(3)
+        spectrum[order] = np.kron(both, near) / (1.0 + order)
+    row = np.repeat(np.arange(3 * rings), angles)
+    points = RingPoints(
+        row=row,
+        turn=np.tile(np.arange(angles), 3 * rings),
+        count=angles,
+        is_sine=np.arange(3 * rings) >= 2 * rings,
+    )
+    return points.compliance(spectrum)
+
+
+@njit
+def newton_twice(rings, closed, missed):
+    """Solution with Newton's matrix to 1e-10 of the residual by the rings, and by its inverse."""
+    found, other, last = np.empty(len(missed)), np.empty(len(missed)), closed.counts[2]
+    solve_on_rings(rings, closed, missed, 1e-10, found)
+    invert(closed, True)
+    multiply(closed.inverse, len(missed), missed, other)
+    closed.counts[2] = last
+    return found, other
+
+
+@pytest.mark.parametrize("angles", [9, 12])
+@pytest.mark.parametrize("coefficient", [0.0, 0.6])
+def test_rings_find_the_forces_of_the_inverse_while_points_open_stick_and_slip(angles, coefficient):
+    """From few closed points, where both invert, to most of them and back.
+
+    Compliances of whole rings are random, their orders those of tests/exact/test_ring_points.py.
+    Forces are of the order of 1; the residual of both is 1e-11, times the condition of A, 300.
+    """
+    rng = np.random.default_rng([angles, int(10 * coefficient)])
+    A = ring_compliance(rng, 16, angles)
+    n = 16 * angles
+    rings, mu = rings_of(A, angles), np.full(n, coefficient)
+    start, drift = 0.3 * rng.normal(size=3 * n), 0.3 * rng.normal(size=3 * n)
+    both = Closed.none(n, 2), Closed.none(n, 2)
+    lam, seen, listed = np.zeros(3 * n), set(), []
+    for step in range(13):
+        q = start + np.sin(0.5 * step) * drift
+        q[:n] -= 20.0 * np.sin(0.26 * step) - 6.0
+        other = solved(A, q, mu, lam, both[1])[0]
+        lam, w, doing, _ = solved(A, q, mu, lam, both[0], rings)
+        np.testing.assert_allclose(lam, other, atol=1e-8)
+        np.testing.assert_allclose(w, q + A @ lam, atol=1e-12 * n)
+        assert broken(A, q, mu, lam) < 1e-9
+        seen |= set(doing)
+        listed.append(both[0].counts[2] < 0)
+        if listed[-1]:
+            missed = rng.normal(size=both[0].counts[1])
+            found = newton_twice(rings, both[0], missed)
+            np.testing.assert_allclose(*found, atol=1e-7 * np.abs(found[1]).max())
+    assert 6 < sum(listed) < 11
+    assert seen == ({OPEN, STICK, SLIP} if coefficient else {OPEN, SLIP})
+
+
+def test_points_that_are_alike_round_no_ring_have_none():
+    rng = np.random.default_rng(1)
+    A = ring_compliance(rng, 4, 8)
+    assert len(rings_of(A, 8).place) == 4
+    assert len(rings_of(A, 0).place) == 0
+    uneven = A.copy()
+    uneven[5, 5] *= 1.0 + 1e-6
+    assert len(rings_of(uneven, 8).place) == 0

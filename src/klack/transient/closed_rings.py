@@ -332,4 +332,7 @@ def solve_on_rings(
         _less(y, -left[i], ways[i])
     _precondition(rings, closed, scale, spot, work, y, x)
     for r in range(closed.counts[1]):
-        found[r] = x[closed.unknown[r]]
+        i = closed.unknown[r]
+        found[r] = x[i]
+        if i % 3 == 1:  # beyond the force of slip
+            found[r] -= closed.bound[i // 3] * x[i - 1]
