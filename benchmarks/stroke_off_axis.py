@@ -55,7 +55,7 @@ def numbers(size: Size) -> list[Number]:
     if result.events:
         peaks = [run(valve, step, FIRST).events[0].peak_force for step in (STEP, STEP / 4.0)]
         error = abs(peaks[0] / peaks[1] - 1.0)
-    masses = two_masses_over_one(duration) if size == "full" else []
+    masses = [*two_masses_over_one(duration), *rubbing()] if size == "full" else []
     points = valve.spatial.model.count if valve.spatial is not None else 0
     name = f"wet stroke off its axis, {points} contact points"
     return [
@@ -104,6 +104,27 @@ def two_masses_over_one(duration: float) -> list[Number]:
             unit="-",
             goal=3.0,
             accuracy=left,
+            accuracy_of="energy residual",
+        )
+    ]
+
+
+def rubbing() -> list[Number]:
+    """Processor time of a dry stroke of half sections with friction at both stops."""
+    text = (HOW_TO / "half_section_stroke.yaml").read_text(encoding="utf-8")
+    valve = built(re.sub(r"(force: [24]0 N)}", r"\1, friction: 0.1}", text))
+    run(valve, STEP, 0.16e-3)  # compiled
+    begin = process_time()
+    result = run(valve, STEP, 0.4e-3)
+    seconds = process_time() - begin
+    points = valve.spatial.model.count if valve.spatial is not None else 0
+    return [
+        Number(
+            name=f"dry stroke off its axis with friction, {points} points on rings: 0.4 ms",
+            value=seconds,
+            unit="s",
+            goal=20.0,
+            accuracy=abs(result.books.relative_residual),
             accuracy_of="energy residual",
         )
     ]

@@ -245,14 +245,18 @@ def test_faces_that_close_and_turn_round_as_a_whole_take_few_rounds():
     np.testing.assert_allclose(lam[16:], mu * lam[:16], atol=1e-12)
     for move, state in ((0.01, STICK), (1.0, SLIP)):
         again, back = lam.copy(), np.concatenate([q[:16], move - kernel @ lam[16:]])
-        assert 0 < solve_rubbing(A, back, mu, Closed.none(16, 1), Rings.none(), again, w, doing, 1e-12) < 10
+        assert (
+            0
+            < solve_rubbing(A, back, mu, Closed.none(16, 1), Rings.none(), again, w, doing, 1e-12)
+            < 10
+        )
         assert np.any(doing == state)
         if state == SLIP:
             np.testing.assert_allclose(again[16:], -mu * again[:16], atol=1e-12)
 
 
 def ring_compliance(rng, rings, angles):
-    """Of all rings in three directions: near rings move each other, the more the lower the order."""
+    """Of all rings in three directions; near rings move each other, most in low orders."""
     spectrum = np.empty((angles // 2 + 1, 3 * rings, 3 * rings))
     near = np.exp(-0.5 * np.abs(np.subtract.outer(np.arange(rings), np.arange(rings))))
     for order in range(len(spectrum)):

@@ -212,9 +212,7 @@ def answer_on_rings(rings: Rings, closed: Closed, q: Vector, lam: Vector, w: Vec
 
 
 @phase
-def _stretch(
-    closed: Closed, m: int, pull: float, x: Vector, spot: Index, grid: Vector
-) -> None:
+def _stretch(closed: Closed, m: int, pull: float, x: Vector, spot: Index, grid: Vector) -> None:
     """Forces of unknown ones on the grid: of the law, or ``pull`` 0: without what slip adds."""
     for j in range(len(grid)):
         grid[j] = 0.0

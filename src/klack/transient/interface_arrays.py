@@ -271,8 +271,10 @@ class Closed(NamedTuple):
     unknown: NDArray[np.int64]  # (d n,) numbers of the first ``counts[1]`` unknown forces
     row: NDArray[np.int64]  # (d n,) of an unknown force in the inverse, -1: it is not one
     inverse: Matrix  # (d n, d n) [N/m]
-    counts: NDArray[np.int64]  # points, unknown forces, rounds beyond two since a fresh inverse; the
-    # last is -1 where the unknown forces are listed without an inverse
+    counts: NDArray[
+        np.int64
+    ]  # points, unknown forces, rounds beyond two since a fresh inverse (-1:
+    # there is none, the unknown forces are only listed)
 
     @classmethod
     def none(cls, points: int, ways: int) -> Self:

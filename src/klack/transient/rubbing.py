@@ -23,9 +23,10 @@ again in the next one.
 A round is two products, one with the compliance of the closed points and one with the inverse of
 Newton's matrix, which is kept from step to step (:mod:`klack.transient.closed_points`).  As it lags
 behind *e* and *D*, the residual falls by a constant factor per round instead of its square, at a
-hundredth of the cost of solving anew.  In the first round of a step each point sticks or slips as
-before: a guess of the forces is too rough to tell a slow slip from none.  Where the rounds do not
-end, the points take turns (projected Gauss-Seidel).
+hundredth of the cost of solving anew.  Many closed points on whole rings have no inverse but a
+solution by orders (:mod:`klack.transient.closed_rings`).  In the first round of a step each point
+sticks or slips as before: a guess of the forces is too rough to tell a slow slip from none.  Where
+the rounds do not end, the points take turns (projected Gauss-Seidel).
 
 Friction makes the matrix unsymmetric; for a large coefficient on an eccentric body a solution may
 not be unique (jam), or taking turns may find none.
@@ -482,9 +483,7 @@ def _rounds(
 
 
 @inner
-def _tame(
-    closed: Closed, rings: Rings, on_rings: bool, q: Vector, lam: Vector, w: Vector
-) -> None:
+def _tame(closed: Closed, rings: Rings, on_rings: bool, q: Vector, lam: Vector, w: Vector) -> None:
     """Restart from no force, with gaps and slips, where Newton's method has found none."""
     size = len(closed.row) // len(closed.points) * closed.counts[0]
     total = 0.0
@@ -562,9 +561,7 @@ def _solve_closed(
         own[s] = mu[k]
         for c in range(d):
             mine[d * s + c], forces[d * s + c] = q[c * n + k], lam[c * n + k]
-    rounds = _settle(
-        closed, rings, on_rings, mine, own, forces, w, what, along, stiffer, tolerance
-    )
+    rounds = _settle(closed, rings, on_rings, mine, own, forces, w, what, along, stiffer, tolerance)
     for s in range(m):
         k = closed.points[s]
         doing[k] = what[s]
@@ -734,7 +731,15 @@ class RubbingPoints:
         least = _LEAST_GAP / float(np.mean(self._own))
         try:
             rounds = solve_rubbing(
-                self._A, q, mu, self._closed, Rings.none(), lam, w, doing, max(_PRECISION * needed, least)
+                self._A,
+                q,
+                mu,
+                self._closed,
+                Rings.none(),
+                lam,
+                w,
+                doing,
+                max(_PRECISION * needed, least),
             )
         except np.linalg.LinAlgError:
             rounds = 0

@@ -207,7 +207,12 @@ class _State:
         w, doing = np.empty_like(q), np.zeros(self.count, dtype=np.int64)
         for lam in (self.lam.copy(), self._without_friction(q)):
             closed = Closed.none(self.count, len(q) // self.count - 1)
-            if solve_rubbing(self.C, q, self.mu, closed, Rings.none(), lam, w, doing, self.tolerance) != 0:
+            if (
+                solve_rubbing(
+                    self.C, q, self.mu, closed, Rings.none(), lam, w, doing, self.tolerance
+                )
+                != 0
+            ):
                 break
         else:
             raise ConvergenceError(

@@ -198,7 +198,9 @@ def _cattaneo() -> Iterator[Check]:
     def moved_by(way: float) -> float:
         """Tangential force against the next part of the way of the upper body."""
         q = np.concatenate([gap, np.full(n, way) - bent[:n], -bent[n:]])
-        solve_rubbing(C, q, coefficient, closed, Rings.none(), lam, w, doing, 1e-9 * max(lam.max(), 1.0))
+        solve_rubbing(
+            C, q, coefficient, closed, Rings.none(), lam, w, doing, 1e-9 * max(lam.max(), 1.0)
+        )
         bent[:] = (C @ lam)[n:]
         return -float(lam[n : 2 * n].sum())
 
