@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.arrays import Cube, Index, Matrix, Vector
-from klack.machine.compiling.jit import FAST, inner, njit
+from klack.machine.compiling.jit import FAST, inner
 from klack.simulation.phase import phase
 from klack.transient.interface_arrays import Closed, Rings
 
@@ -59,13 +59,13 @@ def rings_of(A: NDArray[np.float64], angles: int) -> Rings:
         np.zeros(room),
     )
     force = np.random.default_rng(0).standard_normal((3 * R, angles))
-    waves = around @ force.T
-    _swap(start, waves, 2 * R, 3 * R, 1.0)
+    waves, pair = around @ force.T, start[:-1][np.diff(start) == 2]
+    waves[pair, 2 * R :], waves[pair + 1, 2 * R :] = waves[pair + 1, 2 * R :], -waves[pair, 2 * R :]
     order = np.repeat(np.arange(len(start) - 1), np.diff(start))
-    answers = np.einsum("kij,kj->ki", rings.compliance[order], waves)
-    _swap(start, answers, 2 * R, 3 * R, -1.0)
+    moved = np.einsum("kij,kj->ki", rings.compliance[order], waves)
+    moved[pair, 2 * R :], moved[pair + 1, 2 * R :] = -moved[pair + 1, 2 * R :], moved[pair, 2 * R :]
     whole = A @ force.ravel()
-    missed = (around.T @ answers).T.ravel() - whole
+    missed = (around.T @ moved).T.ravel() - whole
     return rings if np.max(np.abs(missed)) <= _EVEN * np.max(np.abs(whole)) else Rings.none()
 
 
@@ -74,7 +74,8 @@ def _functions(angles: int) -> tuple[Matrix, Index]:
 
     Those of :meth:`klack.bodies.elasticity.ring_points.RingPoints.factors`, a cosine and a sine.
     """
-    rows, start = [], [0]
+    rows: list[Vector] = []
+    start = [0]
     for order in range(angles // 2 + 1):
         phase = 2.0 * np.pi / angles * (order * np.arange(angles) % angles)
         both = (np.cos(phase), np.sin(phase))
@@ -84,7 +85,7 @@ def _functions(angles: int) -> tuple[Matrix, Index]:
     return functions / np.linalg.norm(functions, axis=1, keepdims=True), np.array(start)
 
 
-@njit
+@phase
 def _swap(start: Index, waves: Matrix, even: int, size: int, sign: float) -> None:
     """Rows along the ring have the sine where others have the cosine; back with the sign -1."""
     for order in range(len(start) - 1):
@@ -116,7 +117,7 @@ def choose_rings(rings: Rings, closed: Closed) -> bool:
             rings.ring[m] = k
             rings.place[k] = m
             m += 1
-    rings.count[0] = m
+    rings.chosen[0] = m
     size = 3 * m
     rows = np.empty(size, dtype=np.int64)
     for i in range(size):
@@ -164,7 +165,7 @@ def _multiply_orders(blocks: Vector, start: Index, size: int, x: Matrix, out: Ma
 @inner
 def _multiply(rings: Rings, blocks: Vector, work: Cube) -> None:
     """The first matrix of ``work`` becomes its product with those of the chosen rings."""
-    m, grid, waves = rings.count[0], work[0], work[1]
+    m, grid, waves = rings.chosen[0], work[0], work[1]
     np.dot(rings.around, grid, waves)
     _swap(rings.start, waves, 2 * m, 3 * m, 1.0)
     _multiply_orders(blocks, rings.start, 3 * m, waves, work[2])
@@ -175,7 +176,7 @@ def _multiply(rings: Rings, blocks: Vector, work: Cube) -> None:
 @inner
 def multiply_on_rings(rings: Rings, closed: Closed, x: Vector, out: Vector) -> None:
     """Product of the compliance of the closed points, in all their directions, with a vector."""
-    N, m = len(rings.around), rings.count[0]
+    N, m = len(rings.around), rings.chosen[0]
     work = np.zeros((3, N, 3 * m))
     for s in range(closed.counts[0]):
         k = closed.points[s]
@@ -191,7 +192,7 @@ def multiply_on_rings(rings: Rings, closed: Closed, x: Vector, out: Vector) -> N
 @inner
 def answer_on_rings(rings: Rings, closed: Closed, q: Vector, lam: Vector, w: Vector) -> None:
     """Gaps and slips of all points under the closed ones: w = q + A lam."""
-    N, m, R, n = len(rings.around), rings.count[0], len(rings.place), len(closed.points)
+    N, m, R, n = len(rings.around), rings.chosen[0], len(rings.place), len(closed.points)
     grid, answers = np.zeros((N, 3 * m)), np.zeros((N, 3 * R))
     for s in range(closed.counts[0]):
         k = closed.points[s]
@@ -242,9 +243,9 @@ def _shrink(closed: Closed, m: int, spot: Index, grid: Vector, out: Vector) -> N
 def _precondition(
     rings: Rings, closed: Closed, scale: Vector, spot: Index, work: Cube, x: Vector, out: Vector
 ) -> None:
-    _stretch(closed, rings.count[0], 0.0, x, spot, work[0].ravel())
+    _stretch(closed, rings.chosen[0], 0.0, x, spot, work[0].ravel())
     _multiply(rings, rings.stiff, work)
-    _shrink(closed, rings.count[0], spot, work[0].ravel(), out)
+    _shrink(closed, rings.chosen[0], spot, work[0].ravel(), out)
     for s in range(closed.counts[0]):
         out[3 * s + 2] *= scale[s]
 
@@ -254,9 +255,9 @@ def _newton(
     rings: Rings, closed: Closed, scale: Vector, spot: Index, work: Cube, x: Vector, out: Vector
 ) -> None:
     """Product with Newton's matrix, its rows scaled."""
-    _stretch(closed, rings.count[0], 1.0, x, spot, work[0].ravel())
+    _stretch(closed, rings.chosen[0], 1.0, x, spot, work[0].ravel())
     _multiply(rings, rings.soft, work)
-    _shrink(closed, rings.count[0], spot, work[0].ravel(), out)
+    _shrink(closed, rings.chosen[0], spot, work[0].ravel(), out)
     for s in range(closed.counts[0]):
         i = 3 * s + 2
         if closed.row[i] >= 0:
@@ -283,7 +284,7 @@ def solve_on_rings(
 ) -> None:
     """Solve with Newton's matrix of the listed unknown forces to a share of the residual."""
     size = 3 * closed.counts[0]
-    N, m = len(rings.around), rings.count[0]
+    N, m = len(rings.around), rings.chosen[0]
     work = np.empty((3, N, 3 * m))
     spot, scale = np.empty(closed.counts[0], dtype=np.int64), np.ones(closed.counts[0])
     x, y = np.zeros(size), np.zeros(size)

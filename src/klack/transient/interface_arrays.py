@@ -111,8 +111,8 @@ class Rings(NamedTuple):
     start: Index  # (K + 1,) first function of each order
     compliance: Cube  # (K, 3 R, 3 R) [m/N] of each order
     place: Index  # (R,) of a ring among the chosen ones, -1: it is not
-    ring: Index  # (R,) the first ``count[0]`` are chosen
-    count: Index  # (1,)
+    ring: Index  # (R,) the first ``chosen[0]`` are chosen
+    chosen: Index  # (1,)
     soft: Vector  # the compliance of the chosen ones, (K, 3 m, 3 m) in the first entries
     stiff: Vector  # its inverse, order by order
 
@@ -271,10 +271,8 @@ class Closed(NamedTuple):
     unknown: NDArray[np.int64]  # (d n,) numbers of the first ``counts[1]`` unknown forces
     row: NDArray[np.int64]  # (d n,) of an unknown force in the inverse, -1: it is not one
     inverse: Matrix  # (d n, d n) [N/m]
-    counts: NDArray[
-        np.int64
-    ]  # points, unknown forces, rounds beyond two since a fresh inverse (-1:
-    # there is none, the unknown forces are only listed)
+    counts: NDArray[np.int64]  # points, unknown forces, rounds beyond two since a fresh inverse
+    # (-1: there is none, the unknown forces are only listed)
 
     @classmethod
     def none(cls, points: int, ways: int) -> Self:
