@@ -315,6 +315,8 @@ def solve_on_rings(
             a, b = steps[i, k], steps[i + 1, k]
             steps[i, k], steps[i + 1, k] = cos[i] * a + sin[i] * b, cos[i] * b - sin[i] * a
         length = np.sqrt(steps[k, k] ** 2 + more**2)
+        if not length > 0.0:
+            break
         cos[k], sin[k] = steps[k, k] / length, more / length
         steps[k, k] = length
         left[k + 1], left[k] = -sin[k] * left[k], cos[k] * left[k]

@@ -452,7 +452,7 @@ def _rounds(
             _as_before(closed, d, lam, doing, along, stiffer)
         _place(closed, d, mu, lam, w, doing, along, np.inf if on_rings else _LEAST * worst, change)
         if on_rings:
-            _multiply(closed, rings, on_rings, change, moved)
+            multiply_on_rings(rings, closed, change, moved)
             for i in range(size):
                 w[i] += moved[i]
                 change[i] = 0.0
