@@ -123,7 +123,6 @@ def rubbing() -> list[Number]:
             name=f"dry stroke off its axis with friction, {points} points on rings: 0.4 ms",
             value=seconds,
             unit="s",
-            goal=20.0,
             accuracy=abs(result.books.relative_residual),
             accuracy_of="energy residual",
         )
