@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.acoustics.spectrum import force_spectrum
+from klack.acoustics.spectrum import force_spectrum, held_means
 from klack.acoustics.third_octave import ThirdOctaves, band_edges, band_energies, band_numbers
 from klack.signals.sampled import Spectrum, TimeSeries
 
@@ -126,11 +126,9 @@ def averaged(force: TimeSeries, step: float) -> TimeSeries:
     size = max(1, round(step / force.step))
     if size == 1:
         return force
-    after = size + -force.values.size % size
-    values = np.pad(force.values, (size, after), mode="edge")
     return TimeSeries(
         step=size * force.step,
-        values=values.reshape(-1, size).mean(axis=1),
+        values=held_means(force.values, size),
         unit=force.unit,
         start=force.start - 0.5 * (size + 1) * force.step,
         name=force.name,

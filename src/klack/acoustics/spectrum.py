@@ -31,6 +31,7 @@ __all__ = [
     "force_series",
     "force_spectrum",
     "half_cosine_tail",
+    "held_means",
     "impulse_level",
     "impulse_spectrum",
 ]
@@ -150,10 +151,8 @@ def change_spectrum(
             hint="record in finer steps, or request less.",
         )
     many = max(int(1.0 / (_FINE * high * series.step)), 1)
-    # both ends are held for one mean more, which then has the value that holds outside
-    held = np.pad(series.values, (many, many + -series.values.size % many), mode="edge")
     step = many * series.step
-    changes = np.diff(held.reshape(-1, many).mean(axis=1))
+    changes = np.diff(held_means(series.values, many))
     if not np.any(changes):
         return np.zeros(count, dtype=complex)
     f = np.linspace(0.0, high, count)
@@ -163,6 +162,14 @@ def change_spectrum(
         spectrum * np.exp(-2j * np.pi * f * first) / np.sinc(f * step) ** 2
     )
     return whole
+
+
+def held_means(values: NDArray[np.float64], size: int) -> NDArray[np.float64]:
+    """Means over ``size`` values each; both ends are held for one mean more, which lies outside."""
+    after = size + -values.size % size
+    held = np.concatenate([np.full(size, values[0]), values, np.full(after, values[-1])])
+    means: NDArray[np.float64] = np.einsum("ij->i", held.reshape(-1, size)) / size
+    return means
 
 
 def _zoom(size: int, high: float, count: int, rate: float) -> _Zoom:
