@@ -199,12 +199,15 @@ def _sort(columns: Sequence[Column], middle: int) -> list[Column]:
     outward = [*range(middle - 1, -1, -1), *range(middle + 1, len(columns))]
     found: list[list[Column]] = []
     for sweep in range(_SWEEPS):
+        before = [column.copy() for column in columns]
         for i in outward:
             inner = i + 1 if i < middle else i - 1
             _settle(columns, i, [inner] if sweep == 0 else _beside(columns, i))
         found += [_ended(columns, middle, outward, sort=sort) for sort in (False, True)]
         for i in (*reversed(outward), middle):
             _settle(columns, i, _beside(columns, i))
+        if sweep > 0 and columns == before:  # all that follow would be the same
+            break
     return min(found, key=_cost)
 
 
@@ -241,10 +244,11 @@ def _ends(
     return found
 
 
-def _settle(columns: list[Column], i: int, near: Iterable[int], *, sort: bool = True) -> None:
+def _settle(columns: list[Column], i: int, near: list[int], *, sort: bool = True) -> None:
     """Place cells for short and straight wires."""
     column = columns[i]
-    ends, others = _ends(columns, i, near), _ends(columns, i, _beside(columns, i))
+    beside, ends = _beside(columns, i), _ends(columns, i, near)
+    others = ends if near == beside else _ends(columns, i, beside)
     wishes = []
     for cell, top in zip(column.cells, column.tops, strict=True):
         found = _wishes(cell, ends) or _wishes(cell, others)
