@@ -289,9 +289,12 @@ def test_fine_accuracy_is_finer():
     )
 
     peak, time = exact["opening"]
-    assert abs(fine["opening"][0] / peak - 1.0) < 0.3 * abs(normal["opening"][0] / peak - 1.0)
-    assert abs(fine["seat"][1] - exact["seat"][1]) < 0.02e-6
+    # normal steps happen to be off by 2e-6 only, as the truth in steps of 2.5 ns itself
+    assert abs(fine["opening"][0] / peak - 1.0) < 1e-5
     assert abs(fine["opening"][1] - time) < 2.6e-9  # a part of a step
+    peak, time = exact["seat"]
+    assert abs(fine["seat"][0] / peak - 1.0) < 0.3 * abs(normal["seat"][0] / peak - 1.0)
+    assert abs(fine["seat"][1] - time) < 0.02e-6
 
 
 def with_line(delay: float, segments: int) -> Rows:

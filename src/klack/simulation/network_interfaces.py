@@ -78,6 +78,7 @@ __all__ = [
     "mark_far_ones",
     "mark_none_far",
     "may_fly",
+    "may_press",
     "may_swing",
     "may_touch",
     "push_by_far_films",
@@ -104,6 +105,8 @@ _SHAKEN = 0.04  # of the force of a contact at rest: its change in a macro step
 _ROUGH = 0.1  # of the time after which a closed contact rests: until swings are followed again
 _STILL = 0.1  # of that: at rest of an elastic contact, which is followed while it swings
 _SMOOTH = 0.06  # of a gap and its cut-off: way in a middle step that the film follows
+_HARDENING = 0.015  # the same in a sub-step of a macro step: a peak of the film is 1e-4 higher
+_SOFTENING = 0.15  # ... while it presses less than before, or pulls
 _AS_HARD = 1.0002  # times the deepest indentation: what is missed of it matters to no peak
 _HARDER = 1.002  # the same of what is expected
 _STAYS = 0.5  # of the gap of a closed contact: way in a step in which it stays closed
@@ -187,6 +190,25 @@ def may_swing(contacts: Any, now: float, length: float) -> bool:
             deep = -state.gap[c]
             may = may and rate * length <= _STAYS * deep and state.film_before[c] == 0.0
             may = may and deep - state.rate[c] * length <= _HARDER * state.deepest[c]
+    return may
+
+
+@phase
+def may_press(contacts: Any, length: float, sub: float) -> bool:
+    """Whether interfaces stay open for the next ``length`` [s], their films smooth in ``sub`` [s].
+
+    None may be about to cavitate.  The mean of a step is below a peak of ``v/x^3`` by half the
+    square of the share of the gap that is gone through.
+    """
+    rows, state = contacts.rows, contacts.state
+    may = True
+    for c in range(rows.interfaces):
+        rate = state.rate[c]
+        x = state.gap[c] + 3.0 * min(rate, 0.0) * length
+        may = may and state.since[c] == np.inf and state.film_before[c] == 0.0 and x > 0.0
+        may = may and (state.pulled[c] != 0.0 or state.force[c] >= -HELD * rows.suction[c])
+        share = _HARDENING if state.force[c] > max(state.force_before[c], 0.0) else _SOFTENING
+        may = may and (rows.dry[c] != 0 or abs(rate) * sub <= share * (x + rows.cut_off[c]))
     return may
 
 

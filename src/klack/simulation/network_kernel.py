@@ -5,8 +5,9 @@ One macro step ``H = M h`` while elements and fluid are slow beside it:
 1. **Guess** the forces of elements and fluid, their mean over the macro step and an even rise.
 2. **Act**: modes move exactly; contacts, films and dry friction find their mean forces.  Far apart
    or at rest, in one step of ``H``; while closed contacts swing, in one or a few in which their
-   forces rise or fall; else in sub-steps of a few fine ones ``h``, or of one where films change
-   fast; the force of a closed elastic contact rises or falls in them as well.  A sub-step in which
+   forces rise or fall; while films of open ones change slowly, in a few; else in sub-steps of a few
+   fine ones ``h``, or of one where films change fast; the force of a closed elastic contact rises
+   or falls in them as well.  A sub-step in which
    a contact closes or opens is cut into parts.
 3. **Answer**: elements, pressures and lines are asked once, for the motion of their ports.
 4. **Repair**: what the guess missed of their forces acts as if it had acted all the time.  Modes
@@ -69,6 +70,7 @@ from klack.simulation.network_interfaces import (
     mark_far_ones,
     mark_none_far,
     may_fly,
+    may_press,
     may_swing,
     may_touch,
     push_by_far_films,
@@ -157,7 +159,7 @@ CLOCK = 8
 """Time in fine steps, size of the last step, then
 :class:`klack.simulation.network_result.StepCounts`."""
 
-SETTLED = (2e-4, 1e-6), (5e-5, 1e-12)
+SETTLED = (1e-3, 1e-6), (5e-5, 1e-12)
 """Of a macro step, then of a fine one: displacement by the missed force, over the longest
 displacement of a port, and energy that catching up costs over the work of the step."""
 
@@ -232,13 +234,14 @@ def run_network(
         flight = together and may_fly(contacts, origin + now * h, M * h)
         swing = together and not flight and bodies.driven == 0
         swing = swing and may_swing(contacts, origin + now * h, M * h)
+        press = together and not (flight or swing) and may_press(contacts, M * h, near * h)
         smooth, apart = R > 1, True
         done = 0
         while done < M:
             # what acts: one step, or sub-steps
             level = FINE
             if together:
-                level = COARSE if flight or swing else NEAR
+                level = COARSE if flight or swing or press else NEAR
             steps = _steps_of(level, M, near)
             if together and apart:
                 mark_far_ones(contacts, bodies, level, steps * h)
@@ -249,7 +252,7 @@ def run_network(
                 smooth = smooth and smooth_films(contacts, near * h, R * h)
                 of_sub = MIDDLE if smooth else FINE
                 parts = near // R if smooth else near
-            elif swing and not swings_follow(contacts, M * h):
+            elif press or (swing and not swings_follow(contacts, M * h)):
                 of_sub, parts = NEAR, M // near
             whole = parts == 1 and not swing and not (of_sub == FINE and may_touch(contacts, h))
             way = _Way(parts, whole, flight, swing)
@@ -286,12 +289,14 @@ def run_network(
                 )
                 take_back_sliders(loop.sliding, loop.accounts, _slider_sums(loop))
                 if status == STATUS_REFUSED:
-                    together = swing = False
+                    together = swing = press = False
                 elif flight:
                     flight = False
                 elif swing:
                     swing = parts < M // near
                     forget_swings(contacts, -np.inf if swing else begin)
+                elif press:
+                    press = False
                 else:
                     smooth = apart = False
                 last_level, last_steps = level, steps  # forces so far are spaced like this now
@@ -475,7 +480,7 @@ def _act(
                 swing = swing or stay_closed(contacts, now.H)
             if swing or turned:
                 bring(bodies, now.level, now.level)
-            kept = not whole and not way.swing
+            kept = not whole and not way.swing and now.level != NEAR
             kept = kept and (now.level == FINE or may_touch(contacts, now.H))
             if kept:
                 keep_for_cut(bodies, now.level)
@@ -503,7 +508,7 @@ def _act(
             return STATUS_MET
         if way.swing and not swings_hold(contacts, now.H):
             return STATUS_MET
-        if (way.flight or way.swing or now.level == MIDDLE) and not sliders_hold(sliding):
+        if now.level != FINE and now.level != CUT and not sliders_hold(sliding):
             return STATUS_MET
         if not whole and cut == 0 and not contacts_hold(contacts):
             if not kept:

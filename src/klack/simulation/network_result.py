@@ -238,7 +238,7 @@ class StepCounts:
     fine
         Taken by bodies, elements and fluid together.
     flight
-        Macro steps in flight, at rest, or while closed contacts swing.
+        Macro steps in flight, at rest, while closed contacts swing or films change slowly.
     near
         Macro steps about a touch, in sub-steps of the bodies.
     sub
