@@ -83,7 +83,7 @@ def test_an_impact_its_report_its_export_and_its_files(tmp_path, capsys):
     assert impact["levels"]["reduced"]["peak_force_N"] > 0.0
     assert all((out / name).is_file() for name in report["files"])
     assert sorted(path.name for path in (tmp_path / "csv").iterdir()) == export["files"]
-    assert set(parts["parts"]) == {"short", "long"}
+    assert set(parts["parts"]) == {"short", "long", "case: impact"}
 
 
 def test_a_stroke_and_a_reduction(tmp_path, capsys):
