@@ -141,12 +141,40 @@ def test_a_name_changes_where_the_case_has_it():
     assert with_component_renamed(text, PATH, "plunger", "needle") == TEXT
 
 
-def test_a_name_changes_in_the_heat_of_a_case_and_it_stays_a_case():
+@pytest.mark.parametrize(
+    ("path", "names"),
+    [
+        (shipped_cases()["warm-valve"], ("coil", "copper", "fluid", "stop")),
+        (shipped_cases()["demo-mounted"], ("spring", "guide")),
+        (Path("docs/how-to/seat_insert.yaml"), ("seat",)),
+    ],
+)
+def test_a_name_changes_in_heat_noise_and_run_and_it_stays_a_case(path, names):
     """Truth: the reader of cases, which names a component that is not there."""
-    path = shipped_cases()["warm-valve"]
-    for name in ("coil", "copper", "fluid", "stop"):
+    for name in names:
         text = with_component_renamed(path.read_text("utf-8"), path, name, "other")
         assert "other" in tree_of(text, path).any_case().network.components
+
+
+def test_a_name_changes_in_the_channels_of_sensors_and_not_where_another_thing_has_it():
+    """Truth: the text; reactions of ``fluid`` are of all pressures, and bodies keep their names."""
+    more = (
+        "noise: {reactions: {fluid: needle.rim, needle: needle.rim}, passages: {fluid: {}}}\n"
+        "bodies: {needle: {}}\n"
+    )
+    text = TEXT.replace(
+        "    # held open\n",
+        "    fluid: {type: pid, sensors: {a: {channel: needle.tip speed}, b: {channel: fluid}}}\n",
+    )
+    renamed = with_component_renamed(text + more, PATH, "needle", "plunger")
+    both = with_component_renamed(renamed, PATH, "fluid", "oil")
+
+    assert "channel: plunger.tip speed" in renamed
+    assert "{fluid: needle.rim, plunger: needle.rim}" in renamed
+    assert "bodies: {needle: {}}" in renamed
+    assert "    oil: {type: pid" in both
+    assert "b: {channel: oil}" in both
+    assert "reactions: {fluid: needle.rim, plunger: needle.rim}, passages: {oil: {}}" in both
 
 
 @pytest.mark.parametrize("name", ["stop", "ground", "1a", "a b", "", "a.b"])

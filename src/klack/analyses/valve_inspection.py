@@ -79,6 +79,14 @@ def _stops(network: Network, meetings: Mapping[str, Meeting], travel: Travel) ->
                 factors[side[0]] = factors.get(side[0], 0.0) + sign
         most = gap + travel.highest(factors)[0]
         opens = f"opens to {format_si(most, 'm', 4)}" if isfinite(most) else "opens without end"
+        moving = [(body, factor) for body, factor in factors.items() if factor]
+        if len(moving) == 1:  # as far as the body travels; what it may fly further is no lift
+            (body, factor), *_ = moving
+            low, high = travel.lift(body)[0]
+            carried = gap + (high if factor > 0.0 else -low)
+            if carried < most:
+                far = f"at most {format_si(most, 'm', 4)}" if isfinite(most) else "or further"
+                opens = f"opens to {format_si(carried, 'm', 4)}, {far} if it flies on"
         film = ", film" if getattr(part, "film", None) is not None else ""
         yield END_STOP, name, f"{' on '.join(pair)}: gap {format_si(gap, 'm', 4)}, {opens}{film}"
 

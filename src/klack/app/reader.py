@@ -38,6 +38,7 @@ from klack.app.texts import (
     checked_text,
     differing_inputs,
     exchanged_text,
+    is_read_text,
     study_offer,
     study_problem,
     study_text,
@@ -58,6 +59,7 @@ class Reader:
 
     check = staticmethod(checked_text)
     exchange = staticmethod(exchanged_text)
+    is_read = staticmethod(is_read_text)
     network = staticmethod(network_view)
     catalogue = staticmethod(catalogue)
     edited = staticmethod(edited)

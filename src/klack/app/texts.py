@@ -18,7 +18,7 @@ from klack.analyses.study.run import asked_points
 from klack.app.answers import Checked, FormField, MeasureOffer, StudyChoice, StudyOffer, typed
 from klack.app.explorer import has_sliders, sliders_of
 from klack.case.any_case import CaseTree, tree_of
-from klack.case.key_path import kind_at, node_at
+from klack.case.key_path import kind_at, node_at, written_at
 from klack.case.reader import parse, validated
 from klack.case.rewriting import with_values
 from klack.case.study import CaseStudy, StudyFile
@@ -33,6 +33,7 @@ __all__ = [
     "differing_inputs",
     "exchanged_text",
     "form_of",
+    "is_read_text",
     "leaves",
     "limits_of",
     "scalar_of",
@@ -346,8 +347,33 @@ def exchanged_text(text: str, path: str, place: Key, written: str) -> str:
     InputError if the file cannot have the value there.
     """
     data, lines = parse(text, Path(path))  # without the files that it includes
+    _require_component(data, place)
     tree = CaseTree(path=Path(path), text=text, data=data, lines=lines)
     return with_values(tree, {place: scalar_of(written, is_text=_takes_text(tree, place))})
+
+
+def _require_component(data: Any, place: Key) -> None:
+    """Refuse a value of a component that is not there: it was removed, or has another name."""
+    if place[:2] == ("network", "components") and place[2:]:
+        components = written_at(data, place[:2])
+        known = components if isinstance(components, Mapping) else {}
+        if place[2] not in known:
+            where = ".".join(map(str, place))
+            raise InputError(
+                where,
+                got=f"no component '{place[2]}' in the text",
+                expected=f"one of: {', '.join(known)}",
+                hint="add the component again, or write the value for another one.",
+            )
+
+
+def is_read_text(text: str, path: str) -> bool:
+    """Whether a text is YAML that has keys."""
+    try:
+        parse(text, Path(path))
+    except KlackError:
+        return False
+    return True
 
 
 def form_of(case: Section, tree: CaseTree) -> Iterator[FormField]:

@@ -29,6 +29,7 @@ __all__ = [
 
 _WIDEST = 110  # characters of a component on one line
 _COMPONENTS, _CONNECTIONS = ("network", "components"), ("network", "connections")
+_REACTIONS, _PASSAGES = ("noise", "reactions"), ("noise", "passages")  # 'fluid': all pressures
 Pieces = list[tuple[int, int, str]]
 """Begin and end in the text, and what comes there."""
 
@@ -99,7 +100,8 @@ def without_key(text: str, path: Path, name: str, key: str) -> str:
 def with_component_renamed(text: str, path: Path, old: str, new: str) -> str:
     """Text in which a component has another name, wherever the case names it.
 
-    That is in the connections, in ``run.lift``, in the study, in ``thermal``, in each
+    That is in the connections, in ``run.lift`` and ``run.seat``, in the study, in ``thermal``, in
+    the channels of sensors, in ``noise.reactions`` and ``noise.passages``, in each
     ``network.components.NAME``, and for an end stop in ``stops``.
     """
     data, root = _read(text, path)
@@ -112,13 +114,13 @@ def with_component_renamed(text: str, path: Path, old: str, new: str) -> str:
     def rule(above: Key, word: str, is_key: bool) -> str:
         """The word as it is after the change."""
         whole = ".".join((*_COMPONENTS, old))
-        if is_key and word == old and (above == _COMPONENTS or (is_stop and above == ("stops",))):
+        if word == old and _is_name(above, word, is_key, is_stop=is_stop):
             return new
         if word == whole or word.startswith(f"{whole}."):
             return word.replace(whole, ".".join((*_COMPONENTS, new)), 1)
         named = above[:2] in (_CONNECTIONS, ("run", "lift")) or above[:1] == ("study",)
         begins = word.startswith(f"{old}.")
-        if above[:1] == ("thermal",) and _names_in_heat(above, is_key):
+        if _begins_with_name(above, is_key):
             named, begins = True, word.replace(".", " ").split(" ")[0] == old
         return new + word[len(old) :] if named and begins else word
 
@@ -351,8 +353,21 @@ def _other_ports(text: str, node: SequenceNode, ports: list[str]) -> Pieces:
 # --------------------------------------------------------------------------- names
 
 
-def _names_in_heat(above: Key, is_key: bool) -> bool:
-    """Whether a key or a value of the section ``thermal`` names a component."""
+def _is_name(above: Key, word: str, is_key: bool, *, is_stop: bool) -> bool:
+    """Whether a word that is the name of a component stands for it there."""
+    if not is_key:
+        return above == ("run", "seat")
+    if above == ("stops",):
+        return is_stop
+    return above in (_COMPONENTS, _PASSAGES) or (above == _REACTIONS and word != "fluid")
+
+
+def _begins_with_name(above: Key, is_key: bool) -> bool:
+    """Whether a key or a value begins with a component: ``coil ohmic``, ``needle.tip speed``."""
+    if above[:2] == _COMPONENTS:
+        return not is_key and above[-1] == "channel"
+    if above[:1] != ("thermal",):
+        return False
     if is_key:
         return above[1:] in (("windings",), ("magnets",))
     return above[-1] in ("loss", "node", "fluid") or above[1] == "windings" or "of" in above

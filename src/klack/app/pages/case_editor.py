@@ -4,7 +4,7 @@ import asyncio
 import json
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import groupby
 from typing import Any
@@ -28,7 +28,6 @@ from klack.app.pages.network_panel import NetworkPanel
 from klack.app.pages.studies import StudyPanel
 from klack.app.state import State
 from klack.errors import KlackError
-from klack.input.problem import Key
 
 __all__ = ["case_editor_page"]
 
@@ -63,12 +62,23 @@ def _begins_a_study(text: str) -> bool:
     return "study" in heads and not heads & {"bodies", "network"}
 
 
+@dataclass(eq=False)
+class _Change:
+    """A change of the text by a function of the reader, with its words."""
+
+    act: str
+    words: tuple[Any, ...]
+    told: Callable[[str], None] | None = None  # hears why it cannot be made, until it is made once
+    is_made: bool = False
+    is_late: bool = False  # it was said that it waits
+
+
 class _Editor:
     """Form and text of one case; the text is the truth, the form follows from it.
 
-    The browser counts what is typed there (``klackTyped``, ``klackChanged``).  A text that was
-    typed before the browser had one with a value gets this value again, and an answer that is older
-    than what was typed changes nothing.
+    The browser counts what is typed there (``klackTyped``, ``klackChanged``); an answer that is
+    older than what was typed changes nothing.  Texts from here are counted as well: one that was
+    typed before the browser had the text with a change gets this change again.
     """
 
     def __init__(self, state: State, case: str, saved: str) -> None:
@@ -78,8 +88,9 @@ class _Editor:
         self._text = saved if draft is None else draft
         self._count = 0  # of the last change that came from the browser
         self._turn = asyncio.Lock()  # of who writes values into the text, and checks it
-        self._values: dict[Key, tuple[int, str]] = {}  # of boxes, with their counts
-        self._waiting: dict[Key, str] = {}  # those of them that the text does not have yet
+        self._shown = 0  # texts that were handed to the page
+        self._made: list[tuple[int, _Change]] = []  # changes since, by the text that has them
+        self._waiting: list[_Change] = []  # those that the text does not have yet
         self._is_too_long = False  # what is seen is longer than the text that is known here
         self._keys: frozenset[FormField] = frozenset()
         self._items: dict[str, FormField] = {}  # of all boxes so far, by their names in the page
@@ -95,8 +106,7 @@ class _Editor:
             self._status = plain("checking ...").classes("k-badge").props("role=status")
             plain("").style("flex:1 1 auto")
             for word in ("Undo", "Redo"):
-                found = button(word).props(f"id=k-{word.lower()}")
-                found.on("click", js_handler=f"() => window.klack{word}()")
+                button(word, partial(self._step, word)).props(f"id=k-{word.lower()}")
             button("Discard changes", self._discard)
             self._of_case = ui.element("div").classes("k-tools")
             with self._of_case:
@@ -167,8 +177,9 @@ class _Editor:
             self._message.set_text(_TOO_LONG)
             self._go.set_visibility(False)
             return
-        self._text = str(text)
-        self._waiting = {key: value for key, (at, value) in self._values.items() if at > known}
+        self._text = str(text).replace("\n", self._newline)
+        self._waiting[:0] = [change for at, change in self._made if at > known]
+        self._made.clear()
         mine = self._begin()
         await asyncio.sleep(_REST)
         if mine == self._count:
@@ -186,25 +197,47 @@ class _Editor:
             await self._check()
 
     async def _write(self) -> None:
-        """Write waiting values, each into the text at that time."""
+        """Make the changes that wait, each in the text at that time."""
         if not self._waiting:
             return
+        late: list[_Change] = []
         while self._waiting:
-            place, value = next(iter(self._waiting.items()))
-            text = self._text
+            change, text = self._waiting[0], self._text
+            failed: Exception | None = None
             try:
-                found = await self._state.reader.call("exchange", text, self._path, place, value)
-            except KlackError as error:
-                with self._form:
-                    show_error(error)
-                self._values.pop(place, None)
-                found = text
-            if text != self._text:  # typed meanwhile, and what waits now is another list
-                continue
-            self._text = found
-            if self._waiting.get(place) == value:
-                del self._waiting[place]
+                found = await self._state.reader.call(change.act, text, self._path, *change.words)
+            except (KlackError, OSError) as error:
+                found, failed = text, error
+            waits = failed is not None and change.act == "exchange" and not await self._is_read()
+            if text != self._text or self._waiting[0] is not change:
+                continue  # typed meanwhile, and what waits now is another list
+            del self._waiting[0]
+            if failed is None:
+                self._text, change.is_made, change.told = found, True, None
+                self._made.append((self._shown + 1, change))
+            elif waits:
+                late.append(change)
+            if failed is not None and not change.is_late:
+                change.is_late = waits
+                self._say(change, failed)
+        self._waiting = late
         self._show_text()
+
+    async def _is_read(self) -> bool:
+        """Whether the text is YAML, so that a value can be written into it."""
+        try:
+            return bool(await self._state.reader.call("is_read", self._text, self._path))
+        except (KlackError, OSError):
+            return True
+
+    def _say(self, change: _Change, error: Exception) -> None:
+        """Say why a change is not in the text."""
+        if change.told is not None:
+            change.told(str(error))
+            return
+        words = "The value is written once the text can be read. " if change.is_late else ""
+        with self._form:
+            show_error(KlackError(f"{words}{error}"))
 
     async def _check(self) -> None:
         """Keep the draft; show the checker's words, and a valid text in the form."""
@@ -269,24 +302,21 @@ class _Editor:
         self, act: str, *words: Any, told: Callable[[str], None] | None = None
     ) -> bool:
         """Change the text by a function of the reader; whether it did."""
-        async with self._turn:
-            await self._write()
-            text = self._text
-            try:
-                if self._is_too_long:
-                    raise KlackError(_TOO_LONG)
-                found = await self._state.reader.call(act, text, self._path, *words)
-                if text != self._text:
-                    raise KlackError("The text was changed at the same time. Do it again.")
-            except (KlackError, OSError) as error:
-                with self._form:
-                    (show_error if told is None else lambda error: told(str(error)))(error)
-                return False
-            self._text = found
-            self._begin()
-            self._show_text()
-            await self._check()
-        return True
+        change = _Change(act, words, told)
+        if self._is_too_long:
+            self._say(change, KlackError(_TOO_LONG))
+            return False
+        self._waiting.append(change)
+        self._begin()
+        await self._settle()
+        return change.is_made
+
+    async def _step(self, word: str) -> None:
+        """Undo or redo a step of the page, once it has what was done before it."""
+        if self._waiting:
+            async with self._turn:
+                pass
+        self._area.client.run_javascript(f"window.klack{word}()")
 
     async def keep_now(self, case: str) -> None:
         """Write what waits, and keep the text, if this is the case."""
@@ -303,6 +333,11 @@ class _Editor:
             return draft is None
         self._draft = draft
         return True
+
+    @property
+    def _newline(self) -> str:
+        """Line ends of the file: browsers have their own in what is typed."""
+        return "\r\n" if "\r\n" in self._saved else "\n"
 
     @property
     def _path(self) -> str:
@@ -370,17 +405,17 @@ class _Editor:
         if self._is_too_long:
             self._message.set_text(f"{item.label} is not changed. {_TOO_LONG}")
             return
-        self._values[item.place] = count, value
-        self._waiting[item.place] = value
+        self._waiting.append(_Change("exchange", (item.place, value)))
         self._begin()
         await self._settle()
 
     def _show_text(self) -> None:
-        self._tell("klackText", self._text)
+        self._shown += 1
+        self._tell("klackText", self._text.replace("\r\n", "\n"), self._shown)
 
-    def _tell(self, function: str, what: object) -> None:
+    def _tell(self, function: str, what: object, *more: int) -> None:
         """Hand something to the page, with its last known change."""
-        call = f"{function}({json.dumps(what)}, {self._count})"
+        call = f"{function}({', '.join(map(str, (json.dumps(what), self._count, *more)))})"
         self._area.client.run_javascript(f"window.{call}")
 
     # ----------------------------------------------------------------------- keeping it
@@ -460,7 +495,7 @@ class _Editor:
                 show_error(error)
                 return
             self._text, self._is_too_long = self._saved, False
-            self._values.clear()
+            self._made.clear()
             self._waiting.clear()
             self._show_text()
             await self._check()

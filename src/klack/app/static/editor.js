@@ -196,7 +196,8 @@
     if (!(event.ctrlKey || event.metaKey) || event.altKey || !(isUndo || isRedo) || !begun()) return;
     if (event.target !== area && event.target.closest("input, textarea, select, [role=dialog]")) return;
     event.preventDefault();
-    (isUndo ? window.klackUndo : window.klackRedo)();
+    if (event.target !== area) document.getElementById(isUndo ? "k-undo" : "k-redo").click();  // what a box has told comes first
+    else (isUndo ? window.klackUndo : window.klackRedo)();
   });
 })();
 // The schematic: component and port that a click hits.

@@ -37,7 +37,9 @@
     const save = document.getElementById("k-save");
     if (save && (event.ctrlKey || event.metaKey) && event.key === "s") {
       event.preventDefault();
-      save.click();
+      const box = document.activeElement;
+      if (box.dataset.told !== undefined) box.dispatchEvent(new Event("change", { bubbles: true }));  // half typed
+      queueMicrotask(() => save.click());  // after it
     }
   });
 })();
@@ -80,7 +82,7 @@
   let count = 0;
   window.klackTyped = (area, longest) => {
     area.at = ++count;
-    return [JSON.stringify(area.value).length > longest ? null : area.value, count, area.known ?? 0];
+    return [JSON.stringify(area.value).length > longest ? null : area.value, count, area.shown ?? 0];
   };
   window.klackChanged = ({ type, target: box }, emit) => queueMicrotask(() => {  // later than a removal, which tells both events
     const told = box.dataset.told, isLeft = type === "focusout";
@@ -107,10 +109,10 @@
       else if (box.value !== value || box.dataset.told !== value) box.value = box.dataset.told = value;
     }
   };
-  window.klackText = (text, known) => {
+  window.klackText = (text, known, shown) => {
     const area = document.getElementById("k-yaml"), old = area.value;
     if (area.at > known) return;
-    area.known = known;
+    area.shown = shown;
     if (old === text) return;
     let from = 0, end = 0;
     const most = Math.min(old.length, text.length);
