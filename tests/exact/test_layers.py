@@ -11,11 +11,19 @@ import pytest
 from draws import each
 from scipy.optimize import brentq
 
+from klack.analyses.noise.body import ASSUMED_DAMPING
+from klack.analyses.noise.body import damped as noisy
 from klack.bodies.elasticity.body import elastic_body
 from klack.bodies.elasticity.eigen import eigenmodes
 from klack.bodies.elasticity.fourier_body import fourier_body
 from klack.bodies.elasticity.layer import Layer
-from klack.bodies.reduction.damping import LossFactor, RayleighDamping, damping_ratios
+from klack.bodies.reduction.damping import (
+    LossFactor,
+    ModalDamping,
+    RayleighDamping,
+    damping_ratios,
+)
+from klack.bodies.reduction.structure import build_structure
 from klack.errors import InputError
 from klack.materials.material import Material
 from klack.mesh.meridian import mesh_meridian
@@ -148,6 +156,30 @@ def test_the_loss_of_a_mode_is_that_of_the_complex_stiffness():
     full = body_damping(RayleighDamping(alpha=3.0, beta=1e-9), modes, body)
     assert full.rate == pytest.approx(2.0 * ratios * modes.omega, rel=1e-12)
     assert (full.alpha, full.beta) == (3.0, 1e-9)
+
+
+@each(("own", "expected"), [(0.0, ASSUMED_DAMPING), (1e-4, 1e-4)])
+def test_the_assumed_damping_of_sound_is_beside_the_loss_of_layers(own, expected):
+    """A layer damps the modes that strain it; a body without damping rings in all others."""
+    mesh = parted(rods(), ["joint"])
+    held = mesh.surface("bottom").nodes
+    body = elastic_body(
+        "rods", mesh, MATERIALS, fixed_nodes=held, layers=[layer(1e13, 1e13, loss=1e-7)]
+    )
+    modes = eigenmodes(body, count=4)
+    structure = build_structure(
+        body,
+        modes=modes,
+        damping=ModalDamping(ratio=own),
+        ports=[],
+        deflections=np.zeros((body.dof_count, 0)),
+        surfaces=["side"],
+    )
+    lost = 0.5 * body.layers[0].loss(modes.omega, modes.shapes)
+    sounding = noisy(structure)
+    assert sounding.damping == pytest.approx(expected + lost, rel=1e-12)
+    assert (sounding is structure) == (own > 0.0)
+    assert noisy(sounding) is sounding
 
 
 def test_stiffness_at_other_frequencies_shifts_modes_as_the_closed_form():

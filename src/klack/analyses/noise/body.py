@@ -295,11 +295,15 @@ def port_transfers(
 
 
 def damped(structure: Structure) -> Structure:
-    """Give undamped modes, which would ring and radiate without end, the assumed damping."""
-    if np.all(structure.damping > 0.0):
+    """Give undamped modes, which would ring and radiate without end, the assumed damping.
+
+    Layers alone leave all modes undamped that do not strain them: what they lose is added.
+    """
+    has_own = structure.has_own_damping & (structure.damping > 0.0)
+    if np.all(has_own):
         return structure
-    damping = np.where(structure.damping > 0.0, structure.damping, ASSUMED_DAMPING)
-    return replace(structure, damping=damping)
+    damping = structure.damping + np.where(has_own, 0.0, ASSUMED_DAMPING)
+    return replace(structure, damping=damping, has_own_damping=True)
 
 
 def frequency_lines(structure: Structure, mount: Mount | None, low: float, high: float) -> Floats:

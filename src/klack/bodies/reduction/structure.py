@@ -85,6 +85,8 @@ class Structure:
         Mean axial component of the outward normal.
     at_mounts
         The body at its mounts, in parts that do not couple (Fourier orders); empty without.
+    has_own_damping
+        False: what there is in ``damping`` is the loss of layers.
     """
 
     name: str
@@ -110,6 +112,7 @@ class Structure:
     face_residual: NDArray[np.float32]
     axial_normals: NDArray[np.float64]
     at_mounts: tuple[CraigBampton, ...] = ()
+    has_own_damping: bool = True
 
     @property
     def highest_frequency(self) -> float:
@@ -209,6 +212,7 @@ def build_structure(
         dimension=body.dimension,
         omega=modes.omega,
         damping=damping_ratios(damping, body, modes.omega, modes.shapes),
+        has_own_damping=bool(damping.ratios([1.0])[0] > 0.0),
         port_names=tuple(p.port.name for p in ports),
         port_stops=tuple(p.stop for p in ports),
         port_signs=np.array([p.sign for p in ports], dtype=float),
