@@ -201,7 +201,7 @@ def test_both_stops_stand_at_their_gap_from_the_tilted_body(tmp_path):
         seat, stop = ring_contacts(problem, case.motion.placement, 16, problem.space.reach)
         kept = {
             body.name: eigenmodes(body, count=4)
-            for body in (problem.pair.upper, problem.pair.lower, problem.opposite.body)
+            for body in problem.bodies
         }
         model = off_axis_model(problem, kept, [seat, stop])
     for contact, gap in ((seat, 1e-6), (stop, 3e-6)):

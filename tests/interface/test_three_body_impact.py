@@ -12,6 +12,7 @@ import pytest
 from pages import HOW_TO
 
 import klack
+from klack.analyses.impact.analysis import IMPACT
 from klack.assembling.body_row import build_row
 from klack.case import read_case
 from klack.cli.main import main
@@ -67,6 +68,34 @@ LINE = (
 )
 LINES = re.findall(LINE, PAGE, flags=re.MULTILINE)
 CLAMP = re.search(r"  clamp: .*\n", TEXT).group()
+
+
+SHAFT = """              - {line: [1.25, 20], name: shaft}
+              - {line: [0, 20], name: top}
+              - {close: true, name: axis}
+    material: steel
+"""
+BONDED = """              - {line: [1.25, 10], name: shaft}
+              - {line: [0, 10], name: joint}
+              - {close: true, name: axis}
+          head:
+            start: [0, 10]
+            edges:
+              - {line: [1.25, 10], name: joint}
+              - {line: [1.25, 20], name: head}
+              - {line: [0, 20], name: top}
+              - {close: true, name: head_axis}
+    material: steel
+    layers: {joint: {normal: 20 kN/mm^3, tangential: 5 kN/mm^3, loss_factor: 0.2}}
+"""
+
+
+def test_a_layer_of_one_of_them_is_shown(tmp_path):
+    (tmp_path / "case.yaml").write_text(TEXT.replace(SHAFT, BONDED), "utf-8")
+    study = klack.run_impact(tmp_path / "case.yaml", ["reduced"]).record
+    (layer,) = IMPACT.to_json(study)["layers"]
+    assert (layer["body"], layer["layer"]) == ("needle", "joint")
+    assert max(layer["energy_share"]) > 0.1
 
 
 def test_the_page_has_the_case_and_its_numbers(tmp_path):

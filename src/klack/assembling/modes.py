@@ -55,10 +55,9 @@ def mode_pools(
 
     ``rough`` as of :func:`klack.bodies.elasticity.eigen.eigenmodes`.
     """
-    bodies = [placed.pair.upper, placed.pair.lower]
+    bodies = placed.bodies
     flexibilities = [placed.flexibility_upper, placed.flexibility_lower]
     if placed.opposite is not None:
-        bodies.append(placed.opposite.body)
         flexibilities.append(placed.opposite.flexibility)
     progress("modes", 0.0)
     pools = side_by_side(

@@ -154,6 +154,12 @@ class PlacedBodies(Closing):
     candidates: Candidates
     opposite: OppositeStop | None = None
 
+    @property
+    def bodies(self) -> list[ElasticBody]:
+        """The pair, then that of an upper stop."""
+        above = () if self.opposite is None else (self.opposite.body,)
+        return [self.pair.upper, self.pair.lower, *above]
+
     def keep_no_more(self) -> None:
         """Cache no more static solutions: many impacts ask for others."""
         for flexibility in self._flexibilities:

@@ -17,7 +17,7 @@ from klack.assembling.bodies import (
 )
 from klack.assembling.candidates import likely_loads
 from klack.assembling.given_shapes import require_given_shapes, tell_effort
-from klack.assembling.layers import tell_layers
+from klack.assembling.layers import LayerState, layer_states, tell_layers
 from klack.assembling.modes import damping_of, mode_pool, selection_of
 from klack.assembling.spatial import build_spatial, check_heights
 from klack.assembling.spatial_rings import build_spatial_rings
@@ -74,6 +74,8 @@ class Valve:
         Held bodies as sources of sound.
     spatial
         Bodies that meet point by point, in three dimensions.
+    layers
+        Of all bodies.
     """
 
     case: ValveCase
@@ -84,6 +86,7 @@ class Valve:
     network: Network
     structures: tuple[Structure, ...] = ()
     spatial: SpatialValve | None = None
+    layers: tuple[LayerState, ...] = ()
 
 
 @tells_place
@@ -217,6 +220,9 @@ def _built(
         network=network,
         structures=structures,
         spatial=spatial,
+        layers=tuple(
+            state for body in bodies.values() for state in layer_states(body, pools[body.name])
+        ),
     )
 
 

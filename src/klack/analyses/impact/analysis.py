@@ -217,8 +217,8 @@ STUDY = JsonForm(
         lambda study: study.contact.stuck,
     ),
     Key("running_in", (_RUNNING_IN, None), "Null for one impact, or elastic faces."),
-    Key("fits", [_FIT], "Press fits of both bodies."),
-    Key("layers", [_LAYER], "Gaskets, O-rings and adhesives of both bodies."),
+    Key("fits", [_FIT], "Press fits of all bodies."),
+    Key("layers", [_LAYER], "Gaskets, O-rings and adhesives of all bodies."),
     Key("warnings", list[str]),
 )
 

@@ -505,7 +505,7 @@ class ImpactStudy(CaseRecord):
     pictures
         Of both bodies; none in results of earlier versions.
     fits, layers
-        Press fits and layers of both bodies.
+        Press fits and layers of all bodies.
     """
 
     speed: float

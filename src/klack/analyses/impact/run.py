@@ -490,7 +490,7 @@ class _Work:
             fits=tuple(fit for name in case.bodies for fit in press_fits(case, name)),
             layers=tuple(
                 state
-                for body in (self.problem.pair.upper, self.problem.pair.lower)
+                for body in self.problem.bodies
                 for state in layer_states(body, self.pools[body.name])
             ),
             warnings=(

@@ -76,6 +76,7 @@ def run_three_bodies(case: Case, *, progress: Progress, threads: int | None = No
         reference=_LEVEL,
         deviations={},
         fits=tuple(fit for name in case.bodies for fit in press_fits(case, name)),
+        layers=row.valve.layers,
         warnings=(*dict.fromkeys(notes), *trust_notes(results, _LEVEL, {})),
         estimate_doubt=_NO_ESTIMATE,
     )
