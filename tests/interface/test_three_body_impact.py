@@ -219,6 +219,18 @@ def test_a_third_body_without_the_section_is_told_what_to_write():
     assert "'backing: {between: [insert.SURFACE, housing.SURFACE]}'" in told
 
 
+def test_notes_name_sections_of_the_impact_and_only_contacts_that_met(tmp_path):
+    """A ledge 1 mm away is not reached, and with 60 modes has little left for its local law."""
+    text = TEXT.replace(CLAMP, "  gap: 1 mm\n").replace("{count: 12}", "{count: 60}")
+    (tmp_path / "case.yaml").write_text(text, "utf-8")
+    study = klack.run_impact(tmp_path / "case.yaml", ["reduced"]).record
+    (found,) = study.levels.values()
+    assert found.backing.peak_force == 0.0
+    (note,) = study.warnings
+    assert re.match(r"backing: only \d+ % of the static compliance", note)
+    assert not found.doubts
+
+
 @pytest.mark.parametrize("level", ["lumped", "interface", "full", "reduced-none"])
 def test_other_levels_and_commands_refuse_before_meshing(level):
     case = read_case(TEXT.replace("motion: {", "lumped: {stiffness: 1e9 N/m}\nmotion: {"), CASE)

@@ -77,7 +77,7 @@ def run_three_bodies(case: Case, *, progress: Progress, threads: int | None = No
         deviations={},
         fits=tuple(fit for name in case.bodies for fit in press_fits(case, name)),
         layers=row.valve.layers,
-        warnings=(*dict.fromkeys(notes), *trust_notes(results, _LEVEL, {})),
+        warnings=(*dict.fromkeys(map(_at_section, notes)), *trust_notes(results, _LEVEL, {})),
         estimate_doubt=_NO_ESTIMATE,
     )
 
@@ -121,6 +121,13 @@ def _run(case: Case, row: BodyRow, setup_time: float) -> LevelResult:
     )
 
 
+def _at_section(note: str) -> str:
+    """A note on a stop of the valve, at the section of the impact."""
+    for name in (CONTACT, BACKING):
+        note = note.replace(f"stop '{name}': contact: ", f"{name}: ")
+    return note
+
+
 def _of_needle(history: ImpactHistory) -> ImpactHistory:
     """Speeds before and after the impact are those of the needle: below it is no single body."""
     return replace(history, velocity_b=np.zeros(history.velocity_b.size), mass_b=np.inf)
@@ -159,7 +166,7 @@ def _doubts(
             yield from (
                 f"{surfaces}: {doubt}" for doubt in (checks[name].doubts if name in checks else ())
             )
-        if name == CONTACT or not case.backing.preload:
+        if peak > 0.0 and (name == CONTACT or not case.backing.preload):
             pair = contact.pair
             kept = (row.valve.reduced[body.name] for body in (pair.upper, pair.lower))
             highest = (float(body.frequencies.max(initial=0.0)) for body in kept)
