@@ -199,10 +199,7 @@ def test_both_stops_stand_at_their_gap_from_the_tilted_body(tmp_path):
     case = case_of(tmp_path, between_stops, eccentricity="0.5 um", tilt="0.05 deg")
     with build_problem(case, silent) as problem:
         seat, stop = ring_contacts(problem, case.motion.placement, 16, problem.space.reach)
-        kept = {
-            body.name: eigenmodes(body, count=4)
-            for body in problem.bodies
-        }
+        kept = {body.name: eigenmodes(body, count=4) for body in problem.bodies}
         model = off_axis_model(problem, kept, [seat, stop])
     for contact, gap in ((seat, 1e-6), (stop, 3e-6)):
         assert np.min(contact.space.gap / contact.space.axial) == pytest.approx(gap, abs=2e-12)
