@@ -70,6 +70,7 @@ def findings_everywhere(page: Any) -> tuple[dict[str, list[str]], list[str], int
         page.emulate_media(color_scheme=scheme)
         for width in WIDTHS:
             page.set_viewport_size({"width": width, "height": 900})
+            page.evaluate("window.scrollTo(0, 0)")  # the bar at the top stays: it hides parts
             settle(page)
             for sentence in lasting_findings(page):
                 said.setdefault(sentence, []).append(f"{width} px {scheme}")

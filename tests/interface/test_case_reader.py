@@ -340,6 +340,7 @@ def test_further_mistakes_are_counted():
         ("a,b\n1,2\n", "single value"),
         ("*HEADING\nmesh\n*NODE\n1, 2., 3.\n", "not YAML"),
         ("a: 1\n---\nb: 2\n", "not YAML"),
+        ("a: {b: [\n", "brackets that are not closed"),
         ("a: \x00", "not YAML"),
         ("[" * 500, "nested"),
         ("a: &a [*a]\n", "plain tree"),

@@ -134,6 +134,24 @@ def test_the_last_connection_leaves_an_empty_list():
     assert parse(again, PATH)[0]["network"]["connections"] == [["needle.tip", "spring.end"]]
 
 
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+def test_ports_on_lines_of_their_own_keep_their_comments(newline):
+    text = (
+        "network:\n  components:\n    a: {type: gravity}\n  connections:\n"
+        "  - - a.x  # one\n    - b.x\n  -\n    # odd\n    - c.x  # two\n    - d.x\n    - e.x\n"
+    ).replace("\n", newline)
+
+    for port in ("a.x", "e.x"):
+        joined = connected(text, PATH, port, "f.x")
+        assert disconnected(joined, PATH, "f.x") == text
+        assert len(joined.splitlines()) == len(text.splitlines()) + 1
+    less = text.replace(f"    - d.x{newline}", "")
+    assert disconnected(text, PATH, "d.x") == less
+    assert f"  - - b.x{newline}    - g.x" in disconnected(
+        connected(text, PATH, "b.x", "g.x"), PATH, "a.x"
+    )
+
+
 def test_a_name_changes_where_the_case_has_it():
     text = with_component_renamed(TEXT, PATH, "needle", "plunger")
 

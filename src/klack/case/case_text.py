@@ -306,6 +306,10 @@ _YAML_WORDS = {
         "write the value itself, or put it into quotes.",
     ),
     "found unexpected end of stream": ("a quote that is not closed", "close it."),
+    "found '<stream end>'": (
+        "brackets that are not closed at its end",
+        "close each bracket { or [ that was opened.",
+    ),
 }
 """Begin of a parser problem; meaning, and advice."""
 
@@ -322,7 +326,7 @@ def _mistyped(lines: list[str], line: int, column: int) -> tuple[int, str, str] 
     here = lines[line] if line < len(lines) else ""
     before = next((k for k in range(line - 1, -1, -1) if lines[k].strip()), None)
     for k in (line, before):
-        if k is not None and _NO_DASH.match(lines[k]):
+        if k is not None and k < len(lines) and _NO_DASH.match(lines[k]):
             return k, "a dash without a blank behind it, or another sign", "begin with '- '."
     if before is not None and lines[before].lstrip().startswith("- ") and here.lstrip()[:1] == "{":
         return line, "an item of a list without its dash", "begin with '- '."

@@ -341,13 +341,25 @@ def _list_pieces(text: str, root: Node, new: Mapping[int, list[str]]) -> Pieces:
 
 def _other_ports(text: str, node: SequenceNode, ports: list[str]) -> Pieces:
     """One connection with ports left out or added at its end."""
-    if not node.flow_style:  # each on a line of its own: written in brackets
-        return [(int(node.start_mark.index), _end(node), f"[{', '.join(ports)}]")]
     now = [str(item.value) for item in node.value]
     gone = [index for index, port in enumerate(now) if port not in ports]
     more = [port for port in ports if port not in now]
-    pieces = _out_of_flow(text, node, gone) if gone else []
-    return pieces + (_into_flow(node, ", ".join(more)) if more else [])
+    if node.flow_style:
+        pieces = _out_of_flow(text, node, gone) if gone else []
+        return pieces + (_into_flow(node, ", ".join(more)) if more else [])
+    lines, last, end = list[tuple[int, int, str]](), node.value[-1], _newline(text)
+    for index in gone:  # each port stands on a line of its own
+        start = int(node.value[index].start_mark.index)
+        if text[_line_start(text, start) : start].strip() == "-":
+            lines += _lines_of(text, start, node.value[index], "-")
+        elif index + 1 < len(node.value):  # the first of '- - port'
+            lines.append((start, int(node.value[index + 1].start_mark.index), ""))
+        else:
+            raise _layout()
+    column = " " * node.start_mark.column
+    if more:
+        lines += _behind(text, last, end.join(f"{column}- {port}" for port in more))
+    return lines
 
 
 # --------------------------------------------------------------------------- names

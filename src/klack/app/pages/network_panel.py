@@ -272,9 +272,7 @@ class NetworkPanel:
 
         with _Dialog(f"Rename {old}", "Rename", rename):
             _line("Name", now, "name", start=old)
-            plain(
-                "Connections and all else that names it get the new name as well.", "p"
-            )
+            plain("Connections and all else that names it get the new name as well.", "p")
 
     async def _choose_next(self, name: str) -> None:
         names = [part.name for part in self._view.parts]
