@@ -216,7 +216,7 @@ def _layer() -> Iterator[Check]:
         "two rods on a layer, first frequency [Hz]",
         expected=x / length * np.sqrt(_BAR.young / _BAR.density) / (2 * np.pi),
         computed=float(modes.frequency[0]),
-        tolerance=1e-6,
+        tolerance=1e-9,
         source=source,
     )
     # share of energy in the layer: derivative of the frequency by the stiffness
@@ -225,7 +225,7 @@ def _layer() -> Iterator[Check]:
         "two rods on a layer, loss factor of the first mode [-]",
         expected=loss * share,
         computed=float(body.layers[0].loss(modes.omega, modes.shapes)[0]),
-        tolerance=1e-6,
+        tolerance=3e-8,
         source=f"{source}; loss factor times 2 dln w / dln k (Johnson & Kienholz 1982)",
     )
 
