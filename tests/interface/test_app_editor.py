@@ -196,6 +196,22 @@ def test_what_was_typed_at_the_moment_of_a_reload_is_there_again(editor):
     assert text_of(editor).endswith("# mine")
 
 
+def test_what_the_server_did_not_hear_before_a_reload_is_there_again(editor):
+    """Messages of a page that goes may be lost: none is sent here."""
+    text = text_of(editor)
+    editor.evaluate("window.socket.emit = () => {}")
+    enter(editor, SPEED, "0.4 m/s", end="")
+    editor.reload()
+    editor.wait_for_selector("text=valid impact, not saved")
+    require(editor, text.replace("0.3 m/s", "0.4 m/s"), motion__speed="0.4 m/s")
+    editor.evaluate("window.socket.emit = () => {}")
+    editor.get_by_label("case file, YAML").focus()
+    editor.keyboard.press("Control+End")
+    editor.keyboard.type("# mine")
+    editor.reload()
+    require(editor, text.replace("0.3 m/s", "0.4 m/s") + "# mine")
+
+
 # ----------------------------------------------------------------------- lines, colours, errors
 
 SAME = """() => {

@@ -119,6 +119,7 @@
   // lines and columns, from 1, of what the checker says of a text; 0 where it names none
   window.klackMarks = (places, known) => {
     if (!begun() || area.at > known) return;
+    area.heard = known;
     index(area.value);
     marked = new Set(places.map(([number]) => number - 1));
     [first = null] = places;

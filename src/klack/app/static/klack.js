@@ -79,7 +79,14 @@
 })();
 // The editor: changes of boxes and text are counted, and an answer that knows less of them comes too late for what they changed.
 (() => {
-  let count = 0;
+  let count = 0, sent = [];  // values of boxes that no text from the server has yet
+  const name = `klack-boxes:${location.pathname}${location.search}`;
+  const store = (act) => { try { return act(sessionStorage); } catch { return null; } };
+  let left = JSON.parse(store((kept) => kept.getItem(name)) ?? "[]");  // by the page before this one
+  store((kept) => kept.removeItem(name));
+  addEventListener("pagehide", () => {  // what is on its way may be lost
+    if (sent.length) store((kept) => kept.setItem(name, JSON.stringify(sent)));
+  });
   window.klackTyped = (area, longest) => {
     area.at = ++count;
     return [JSON.stringify(area.value).length > longest ? null : area.value, count, area.shown ?? 0];
@@ -91,6 +98,7 @@
       box.at = ++count;
       box.dataset.told = box.value;
       delete box.late;
+      sent.push([box.id, box.value, count]);
       emit([box.id, box.value, count]);
     } else if (box.value !== told) {
       box.value = told;
@@ -100,6 +108,15 @@
       delete box.late;
     }
   });
+  const takeUp = () => {
+    for (const [id, value] of left) {
+      const box = document.getElementById(id.replace(/^n-/, "f-"));  // the form has each key
+      if (!box || box.value === value) continue;
+      box.value = value;
+      box.dispatchEvent(new Event("change", { bubbles: true }));
+    }
+    left = [];
+  };
   window.klackBoxes = (values, known) => {
     for (const [id, [value, instead]] of Object.entries(values)) {
       const box = document.getElementById(id);
@@ -108,9 +125,11 @@
       if (document.activeElement === box) box.late = value;
       else if (box.value !== value || box.dataset.told !== value) box.value = box.dataset.told = value;
     }
+    if (Object.keys(values).length) takeUp();
   };
   window.klackText = (text, known, shown) => {
     const area = document.getElementById("k-yaml"), old = area.value;
+    sent = sent.filter(([, , at]) => at > known);
     if (area.at > known) return;
     area.shown = shown;
     if (old === text) return;
@@ -160,6 +179,10 @@ document.addEventListener("keydown", (event) => {
   let left = stored((store, name) => store.getItem(name));  // by the page before this one
   document.addEventListener("input", (event) => {
     if (event.target === area() && !connected()) stored((store, name) => store.setItem(name, event.target.value));
+  });
+  addEventListener("pagehide", () => {  // what is on its way may be lost
+    const found = area();
+    if (found?.at > (found.heard ?? 0)) stored((store, name) => store.setItem(name, found.value));
   });
   const words = () => {
     const spans = document.querySelectorAll("#popup > span");
