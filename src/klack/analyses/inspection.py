@@ -9,6 +9,7 @@ import numpy as np
 from klack.analyses.valve_inspection import valve_rows
 from klack.assembling.assembled_bodies import assembled_body
 from klack.assembling.bodies import assemble_body, mesh_body
+from klack.assembling.bolts import bolted_joints
 from klack.assembling.fits import press_fits
 from klack.assembling.given_bodies import reduced_from_file
 from klack.assembling.layers import layer_states
@@ -227,7 +228,7 @@ def inspect_bodies(case: CaseFile) -> Iterator[tuple[str, Inspected]]:
             rows = _drawn_rows(body.geometry.profile, profiles)
             drawn = {solid: profile.moments for solid, profile in profiles.items()}
             found = _weighed(case, name, rows, drawn)
-            yield name, replace(found, rows=(*found.rows, *_fit_rows(case, name)))
+            yield name, replace(found, rows=(*found.rows, *_joint_rows(case, name)))
     require_surface_names(case, known)
 
 
@@ -242,10 +243,14 @@ def _drawn_rows(drawn: ProfileGeometry, profiles: Mapping[str, Profile]) -> Iter
         yield "surface", edge, f"z {_range(points[:, 1])}, r {_range(points[:, 0])}"
 
 
-def _fit_rows(case: CaseFile, name: str) -> Iterator[Row]:
-    for fit in press_fits(case, name):
-        yield from (("press fit", fit.joint, f"{what}: {text}") for what, text in fit.rows())
-        yield from (("doubt", fit.joint, doubt) for doubt in fit.doubts)
+def _joint_rows(case: CaseFile, name: str) -> Iterator[Row]:
+    for kind, found in (
+        ("press fit", press_fits(case, name)),
+        ("bolts", bolted_joints(case, name)),
+    ):
+        for each in found:
+            yield from ((kind, each.joint, f"{what}: {text}") for what, text in each.rows())
+            yield from (("doubt", each.joint, doubt) for doubt in each.doubts)
     if case.bodies[name].layers:
         body = assemble_body(case, name, mesh_body(case.bodies[name], name, ()))
         for state in layer_states(body, eigenmodes(body, count=_MODES)):

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.assembling.assembled_bodies import assembled_from_matrices, node_mesh
+from klack.assembling.bolts import bolted_joints
 from klack.assembling.face_form import form_of_faces, layer_of_faces
 from klack.assembling.fits import press_fits
 from klack.assembling.gauges import place_gauges
@@ -305,7 +306,7 @@ def assemble_body(case: CaseFile, name: str, mesh: Mesh) -> ElasticBody:
     -----
     AccuracyWarning
         Of materials that no solid has (:attr:`klack.materials.material.Material.question`), and of
-        press fits (:attr:`klack.assembling.fits.PressFit.doubts`).
+        press fits and bolts (:attr:`klack.assembling.fits.PressFit.doubts`).
     """
     body = case.bodies[name]
     if body.matrices is not None:
@@ -314,8 +315,8 @@ def assemble_body(case: CaseFile, name: str, mesh: Mesh) -> ElasticBody:
     for material in materials.values():
         if material.question is not None:
             warnings.warn(material.question, AccuracyWarning, stacklevel=2)
-    for fit in press_fits(case, name):
-        for doubt in fit.doubts:
+    for joint in (*press_fits(case, name), *bolted_joints(case, name)):
+        for doubt in joint.doubts:
             warnings.warn(doubt, AccuracyWarning, stacklevel=2)
     return elastic_body(
         name,

@@ -1,9 +1,10 @@
 """Press fits of a case: pressure, stress, what they hold, and their doubts."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from math import pi
+from typing import TypeVar
 
 import numpy as np
 
@@ -17,13 +18,35 @@ from klack.case.placed_errors import tells_place
 from klack.errors import InputError
 from klack.materials.material import Material
 from klack.mesh.joint import cylinder_joint
+from klack.mesh.mesh import Mesh
 from klack.mesh.profile import Profile
 from klack.mesh.sizing import MeshSizing
 from klack.units import format_si
 
-__all__ = ["PressFit", "press_fits"]
+__all__ = [
+    "ELEMENTS",
+    "Chosen",
+    "Drawn",
+    "PressFit",
+    "Sizes",
+    "joint_mesh",
+    "joints_of",
+    "press_fits",
+    "stress_rows",
+    "yield_doubts",
+    "yield_stresses",
+]
 
-_ELEMENTS = 24  # along a joint
+G = TypeVar("G")
+S = TypeVar("S")
+
+Drawn = tuple[tuple[str, Profile], ...]
+Chosen = tuple[tuple[str, Material], ...]
+Sizes = tuple[float, float, tuple[tuple[str, float], ...]]
+"""General element size [m], grading, and sizes of edges."""
+
+ELEMENTS = 24
+"""Along a joint."""
 _MODES = 10
 _LARGE = 1e-3  # interference over diameter: 0.5 to 1 per mille is a heavy fit
 _STIFFENED = 1e-3  # shift of a frequency that is no longer small beside other errors
@@ -94,14 +117,7 @@ class PressFit:
                 f"{format_si(self.least_pressure, 'Pa', 3)} at one place. The numbers of this fit "
                 "are those of a joint that pulls. Try: a joint that ends there, or stiffer parts."
             )
-        for part, limit in self.yield_stress.items():
-            stress = self.stress[part]
-            if stress > limit:
-                found.append(
-                    f"{where}: '{part}' yields: {format_si(stress, 'Pa', 3)} is above its yield "
-                    f"stress of {format_si(limit, 'Pa', 3)}, and the pressure is less than "
-                    "computed. Try: less interference, or a harder material."
-                )
+        found += yield_doubts(where, self.stress, self.yield_stress, "the pressure", "interference")
         if self.stiffening > _STIFFENED:
             found.append(
                 f"{where}: its stress moves frequencies by up to {100 * self.stiffening:.2g} %, "
@@ -113,11 +129,6 @@ class PressFit:
         self, told: Callable[[float, str, int], str] = format_si
     ) -> tuple[tuple[str, str], ...]:
         """A row for each quantity; ``told`` writes value, unit and digits."""
-        stresses = []
-        for part, stress in self.stress.items():
-            limit = self.yield_stress.get(part)
-            beside = "" if limit is None else f", yield {told(limit, 'Pa', 3)}"
-            stresses.append((f"largest stress of {part}", told(stress, "Pa", 3) + beside))
         return (
             (
                 "joint",
@@ -130,7 +141,7 @@ class PressFit:
                 "least, largest pressure",
                 f"{told(self.least_pressure, 'Pa', 3)}, {told(self.largest_pressure, 'Pa', 3)}",
             ),
-            *stresses,
+            *stress_rows(self.stress, self.yield_stress, told),
             (
                 f"holds, friction {self.friction:g}",
                 f"{told(self.axial_force, 'N', 3)} along the axis or "
@@ -143,22 +154,33 @@ class PressFit:
 @tells_place
 def press_fits(case: CaseFile, body: str) -> tuple[PressFit, ...]:
     """State of the press fits of a body, as drawn and free."""
-    given = case.bodies[body]
-    if not given.fits:
+    return joints_of(case, body, "fits", case.bodies[body].fits or {}, _computed)
+
+
+def joints_of(
+    case: CaseFile,
+    body: str,
+    key: str,
+    given: Mapping[str, G],
+    compute: Callable[[str, Drawn, Chosen, tuple[tuple[str, G], ...], Sizes], tuple[S, ...]],
+) -> tuple[S, ...]:
+    """States of joints of a drawn body; an error of one gets its key in the case."""
+    if not given:
         return ()
-    assert given.geometry.profile is not None
-    assert given.mesh is not None
-    profiles = given.geometry.profile.profiles()
+    drawn = case.bodies[body]
+    assert drawn.geometry.profile is not None
+    assert drawn.mesh is not None
+    profiles = drawn.geometry.profile.profiles()
     try:
-        return _computed(
+        return compute(
             body,
             tuple(profiles.items()),
             tuple(case.materials_of(body, profiles).items()),
-            tuple(given.fits.items()),
-            (given.mesh.size, given.mesh.grading, tuple(given.mesh.surfaces.items())),
+            tuple(given.items()),
+            (drawn.mesh.size, drawn.mesh.grading, tuple(drawn.mesh.surfaces.items())),
         )
     except InputError as error:
-        if not error.where.startswith("fits"):
+        if not error.where.startswith(key):
             raise
         raise InputError(
             f"bodies.{body}.{error.where}",
@@ -168,25 +190,65 @@ def press_fits(case: CaseFile, body: str) -> tuple[PressFit, ...]:
         ) from error
 
 
-@lru_cache(maxsize=20)
-def _computed(
-    body: str,
-    drawn: tuple[tuple[str, Profile], ...],
-    chosen: tuple[tuple[str, Material], ...],
-    fits: tuple[tuple[str, Fit], ...],
-    sizes: tuple[float, float, tuple[tuple[str, float], ...]],
-) -> tuple[PressFit, ...]:
-    """Kept: a run asks once for the doubts, and once for the numbers."""
-    profiles, materials = dict(drawn), dict(chosen)
-    joints = [cylinder_joint(profiles, name) for name, _ in fits]
+def joint_mesh(
+    body: str, profiles: Mapping[str, Profile], sizes: Sizes, finer: Mapping[str, float]
+) -> Mesh:
+    """Half section whose edges of these names have elements of this size [m] or smaller."""
     size, grading, surfaces = sizes[0], sizes[1], dict(sizes[2])
-    for joint in joints:
-        surfaces[joint.name] = min(joint.length / _ELEMENTS, surfaces.get(joint.name, size))
-    mesh = meshed_for_case(
+    for edge, most in finer.items():
+        surfaces[edge] = min(most, surfaces.get(edge, size))
+    return meshed_for_case(
         body,
         MeshSizing(size=size, grading=grading, surfaces=surfaces),
         lambda sizing: meshed_profiles(profiles, sizing, "axisymmetric", None),
     )
+
+
+def yield_stresses(materials: Mapping[str, Material]) -> dict[str, float]:
+    """Where the materials that yield do [Pa]."""
+    return {
+        part: material.hardening.yield_stress
+        for part, material in materials.items()
+        if material.hardening is not None
+    }
+
+
+def yield_doubts(
+    where: str, stress: Mapping[str, float], limits: Mapping[str, float], less: str, cause: str
+) -> Iterator[str]:
+    """Parts whose stress is above where they yield."""
+    for part, limit in limits.items():
+        if stress[part] > limit:
+            yield (
+                f"{where}: '{part}' yields: {format_si(stress[part], 'Pa', 3)} is above its yield "
+                f"stress of {format_si(limit, 'Pa', 3)}, and {less} is less than "
+                f"computed. Try: less {cause}, or a harder material."
+            )
+
+
+def stress_rows(
+    stress: Mapping[str, float], limits: Mapping[str, float], told: Callable[[float, str, int], str]
+) -> Iterator[tuple[str, str]]:
+    """Largest stress of every part beside its yield stress."""
+    for part, value in stress.items():
+        limit = limits.get(part)
+        beside = "" if limit is None else f", yield {told(limit, 'Pa', 3)}"
+        yield f"largest stress of {part}", told(value, "Pa", 3) + beside
+
+
+@lru_cache(maxsize=20)
+def _computed(
+    body: str,
+    drawn: Drawn,
+    chosen: Chosen,
+    fits: tuple[tuple[str, Fit], ...],
+    sizes: Sizes,
+) -> tuple[PressFit, ...]:
+    """Kept: a run asks once for the doubts, and once for the numbers."""
+    profiles, materials = dict(drawn), dict(chosen)
+    joints = [cylinder_joint(profiles, name) for name, _ in fits]
+    finer = {joint.name: joint.length / ELEMENTS for joint in joints}
+    mesh = joint_mesh(body, profiles, sizes, finer)
     overlaps = [fit.interference / 2.0 for _, fit in fits]
     state = pressed_state(mesh, materials, joints, overlaps)
     modes = eigenmodes(elastic_body(body, mesh, materials), count=_MODES)
@@ -210,11 +272,7 @@ def _computed(
             largest_pressure=float(found.pressure[found.away].max()),
             force=found.force,
             stress=state.stress,
-            yield_stress={
-                part: material.hardening.yield_stress
-                for part, material in materials.items()
-                if material.hardening is not None
-            },
+            yield_stress=yield_stresses(materials),
             stiffening=stiffening,
         )
         for joint, (_, fit), found in zip(joints, fits, state.joints, strict=True)

@@ -1,14 +1,16 @@
-"""The cylinder that two drawn solids share: where one is pressed on the other."""
+"""The edge that two drawn solids share: a cylinder of a press fit, a flat face under bolts."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import pi
+from typing import ClassVar
 
 import numpy as np
 
 from klack.errors import InputError
 from klack.mesh.profile import SAME, Curve, Profile
 
-__all__ = ["Joint", "cylinder_joint", "edges_of_two"]
+__all__ = ["FlatJoint", "Joint", "cylinder_joint", "edges_of_two", "flat_joint"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,11 +24,47 @@ class Joint:
     radius, length [m]
     """
 
+    key: ClassVar[str] = "fits"
+
     name: str
     inner: str
     outer: str
     radius: float
     length: float
+
+    @property
+    def solids(self) -> tuple[str, str]:
+        """Both, the inner one first."""
+        return self.inner, self.outer
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlatJoint:
+    """A flat face across the axis that is the edge of two solids, and where bolts press them.
+
+    Parameters
+    ----------
+    lower, upper
+        Names of the solids.
+    length, area [m, m^2]
+        Of the edge along the radius; of the face.
+    ends
+        Names of the two edges, of one solid each.
+    """
+
+    key: ClassVar[str] = "bolts"
+
+    name: str
+    lower: str
+    upper: str
+    length: float
+    area: float
+    ends: tuple[str, str]
+
+    @property
+    def solids(self) -> tuple[str, str]:
+        """Both, the lower one first."""
+        return self.lower, self.upper
 
 
 def cylinder_joint(profiles: Mapping[str, Profile], name: str) -> Joint:
@@ -48,6 +86,59 @@ def cylinder_joint(profiles: Mapping[str, Profile], name: str) -> Joint:
             "a cylinder: straight edges of one radius",
             "a cone or a flat face cannot be pressed on; draw and name the cylinder.",
         )
+    _require_same_ends(name, one, own, two, others)
+    upwards = own[0].end[1] > own[0].start[1]  # the material is on the left: inside
+    return Joint(
+        name=name,
+        inner=one if upwards else two,
+        outer=two if upwards else one,
+        radius=own[0].start[0],
+        length=float(sum(curve.length for curve in own)),
+    )
+
+
+def flat_joint(profiles: Mapping[str, Profile], name: str, ends: tuple[str, str]) -> FlatJoint:
+    """Joint of all edges of one name; rejects what is no flat face of exactly two solids.
+
+    ``ends`` are edges of one solid each, straight and off the axis.
+    """
+    (one, own), (two, others) = edges_of_two(profiles, name).items()
+    size = max(abs(x) for c in (*own, *others) for x in (*c.start, *c.end))
+    heights = [z for curve in (*own, *others) for _, z in (curve.start, curve.end)]
+    if max(heights) - min(heights) > SAME * size or any(c.centre is not None for c in own):
+        raise _error(
+            name,
+            "an edge that is not at a right angle to the axis, or edges of several heights",
+            "a flat face: straight edges of one z",
+            "bolts press along the axis; draw and name the flat face, a cone is not computed.",
+        )
+    _require_same_ends(name, one, own, two, others)
+    for end in ends:
+        curves = [(solid, c) for solid, p in profiles.items() for c in p.curves if c.name == end]
+        straight = all(c.centre is None and c.start[0] + c.end[0] > SAME * size for _, c in curves)
+        if len({solid for solid, _ in curves}) != 1 or not straight:
+            raise _error(
+                name,
+                f"bolts between {ends[0]} and {ends[1]}, where '{end}' is no straight edge of one "
+                "part, off the axis",
+                "two edges: one under the head, one where the thread carries",
+                "name these edges in the parts; a nut presses as a head does.",
+            )
+    upper = own[0].end[0] > own[0].start[0]  # the material is on the left: above
+    return FlatJoint(
+        name=name,
+        lower=two if upper else one,
+        upper=one if upper else two,
+        length=float(sum(curve.length for curve in own)),
+        area=float(sum(pi * (c.start[0] + c.end[0]) * c.length for c in own)),
+        ends=ends,
+    )
+
+
+def _require_same_ends(
+    name: str, one: str, own: Sequence[Curve], two: str, others: Sequence[Curve]
+) -> None:
+    size = max(abs(x) for c in (*own, *others) for x in (*c.start, *c.end))
     if len(own) != len(others) or not all(
         any(_same(curve, other, size) for other in others) for curve in own
     ):
@@ -57,14 +148,6 @@ def cylinder_joint(profiles: Mapping[str, Profile], name: str) -> Joint:
             "the same two ends in both parts",
             "end the edge of either part where the other one ends, as for parts that are glued.",
         )
-    upwards = own[0].end[1] > own[0].start[1]  # the material is on the left: inside
-    return Joint(
-        name=name,
-        inner=one if upwards else two,
-        outer=two if upwards else one,
-        radius=own[0].start[0],
-        length=float(sum(curve.length for curve in own)),
-    )
 
 
 def edges_of_two(profiles: Mapping[str, Profile], name: str) -> dict[str, list[Curve]]:

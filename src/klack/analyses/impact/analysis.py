@@ -157,6 +157,32 @@ _FIT = JsonForm(
         "Largest relative shift of a frequency by the stress, left out of the impact.",
     ),
 )
+_BOLTS = JsonForm(
+    "BoltsJson",
+    "Two parts of a body that bolts press together, of all bolts together.",
+    Key("body", str),
+    Key("joint", str),
+    Key("lower", str),
+    Key("upper", str),
+    Key("ends", list[str], "Edges that the bolts press."),
+    Key("count", int, "Of bolts."),
+    Key("area_m2", Real, "Of the joint.", "area"),
+    Key("preload_N", Real, of="preload"),
+    Key("bolt_stress_Pa", Real, "Under the preload.", "bolt_stress"),
+    Key("bolt_yield_Pa", (Real, None), "Null where it is not given.", "bolt_yield"),
+    Key("pressure_Pa", Real, "Mean over the joint.", "pressure"),
+    Key("least_pressure_Pa", Real, "Zero where the joint is open.", "least_pressure"),
+    Key("largest_pressure_Pa", Real, "Away from sharp corners.", "largest_pressure"),
+    Key("open_share", Real, "Of the joint, under the preload."),
+    Key("stress_Pa", dict[str, float], "Largest equivalent one of each part.", "stress"),
+    Key("yield_Pa", dict[str, float], "Of parts whose material yields.", "yield_stress"),
+    Key("bolt_stiffness_N_per_m", Real, of="bolt_stiffness"),
+    Key("part_stiffness_N_per_m", Real, "Of the clamped parts.", "part_stiffness"),
+    Key("load_factor", Real, "Part of a force between the ends that the bolts take."),
+    Key("lifting_force_N", Real, "Between the ends.", "lifting_force"),
+    Key("carried_N", (Real, None), "Twice the largest contact force.", "carried"),
+    Key("opens", bool, "The impact may open the joint: carried_N is above the preload."),
+)
 _LAYER = JsonForm(
     "LayerJson",
     "A layer between two parts of a body, and the share that its modes have in it.",
@@ -218,6 +244,7 @@ STUDY = JsonForm(
     ),
     Key("running_in", (_RUNNING_IN, None), "Null for one impact, or elastic faces."),
     Key("fits", [_FIT], "Press fits of all bodies."),
+    Key("bolts", [_BOLTS], "Bolted joints of all bodies."),
     Key("layers", [_LAYER], "Gaskets, O-rings and adhesives of all bodies."),
     Key("warnings", list[str]),
 )
@@ -253,6 +280,9 @@ def study_told(study: ImpactStudy) -> Iterator[TextTable | str]:
     for fit in study.fits:
         heads = ("press fit", f"{fit.body}.{fit.joint}")
         yield TextTable(title="Press fit", columns=heads, rows=fit.rows())
+    for bolted in study.bolts:
+        heads = ("bolts", f"{bolted.body}.{bolted.joint}")
+        yield TextTable(title="Bolts", columns=heads, rows=bolted.rows())
     for each in study.layers:
         heads = ("layer", f"{each.body}.{each.name}")
         yield TextTable(title="Layer", columns=heads, rows=each.rows())

@@ -243,6 +243,10 @@ def _computed(study: ImpactStudy) -> Section:
                 for fit in study.fits
             ),
             *(
+                Table(columns=("bolts", f"{each.body}.{each.joint}"), rows=each.rows(quantity))
+                for each in study.bolts
+            ),
+            *(
                 Table(columns=("layer", f"{each.body}.{each.name}"), rows=each.rows(quantity))
                 for each in study.layers
             ),

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from klack.analyses.record import CaseRecord
 from klack.assembling.body_summary import BodySummary
+from klack.assembling.bolts import BoltedJoint
 from klack.assembling.fits import PressFit
 from klack.assembling.layers import LayerState
 from klack.bodies.gauges.gauge import GaugeRecord
@@ -504,8 +505,8 @@ class ImpactStudy(CaseRecord):
         Where faces yield and more than one impact was asked for.
     pictures
         Of both bodies; none in results of earlier versions.
-    fits, layers
-        Press fits and layers of all bodies.
+    fits, bolts, layers
+        Press fits, bolted joints and layers of all bodies.
     """
 
     speed: float
@@ -528,6 +529,7 @@ class ImpactStudy(CaseRecord):
     running_in: RunningIn | None = None
     pictures: tuple[BodyPicture, ...] = ()
     fits: tuple[PressFit, ...] = ()
+    bolts: tuple[BoltedJoint, ...] = ()
     layers: tuple[LayerState, ...] = ()
 
     @property

@@ -62,6 +62,7 @@ from klack.analyses.impact.yielding_level import (
 from klack.analyses.incomplete import Attempts, IncompleteImpactError, failure_notes
 from klack.analyses.record import case_fields, run_fields
 from klack.assembling.body_summary import BodySummary, summarise_body
+from klack.assembling.bolts import struck_bolts
 from klack.assembling.fits import press_fits
 from klack.assembling.layers import layer_states
 from klack.assembling.modes import (
@@ -473,6 +474,8 @@ class _Work:
         reference = next(sound, best_level(results))
         compared = deviations(results, reference)
         failures = self.attempts.texts
+        again = () if self.ran is None else self.ran.peak_force
+        bolts = struck_bolts(case, max([results[reference].measures.peak_force, *again]))
         return ImpactStudy(
             **case_fields(case),
             speed=case.motion.speed,
@@ -488,6 +491,7 @@ class _Work:
             sections=self.sections,
             pictures=self.pictures,
             fits=tuple(fit for name in case.bodies for fit in press_fits(case, name)),
+            bolts=bolts,
             layers=tuple(
                 state
                 for body in self.problem.bodies
@@ -496,6 +500,7 @@ class _Work:
             warnings=(
                 *failure_notes(failures),
                 *dict.fromkeys([*self.bodies.notes, *notes]),
+                *filter(None, (joint.opening_doubt for joint in bolts)),
                 *trust_notes(results, reference, compared),
             ),
             failures=failures,

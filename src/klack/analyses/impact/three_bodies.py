@@ -24,6 +24,7 @@ from klack.analyses.impact.trust import flat_doubt, trust_notes
 from klack.analyses.record import case_fields, run_fields
 from klack.assembling.body_row import BACKING, CONTACT, BodyRow, build_row
 from klack.assembling.body_summary import BodySummary, summarise_body
+from klack.assembling.bolts import struck_bolts
 from klack.assembling.fits import press_fits
 from klack.bodies.reduction.reduced_body import elastic_count
 from klack.case.bodies import SurfaceName
@@ -64,6 +65,7 @@ def run_three_bodies(case: Case, *, progress: Progress, threads: int | None = No
             level = level.doubted(_SPEEDED_UP)
         results = {_LEVEL: level.doubted(*_doubts(case, row, checks, peaks))}
         clock("reduced", 1.0)
+    bolts = struck_bolts(case, max(peaks.values()))
     return ImpactStudy(
         **case_fields(case),
         speed=case.motion.speed,
@@ -76,8 +78,13 @@ def run_three_bodies(case: Case, *, progress: Progress, threads: int | None = No
         reference=_LEVEL,
         deviations={},
         fits=tuple(fit for name in case.bodies for fit in press_fits(case, name)),
+        bolts=bolts,
         layers=row.valve.layers,
-        warnings=(*dict.fromkeys(map(_at_section, notes)), *trust_notes(results, _LEVEL, {})),
+        warnings=(
+            *dict.fromkeys(map(_at_section, notes)),
+            *filter(None, (joint.opening_doubt for joint in bolts)),
+            *trust_notes(results, _LEVEL, {}),
+        ),
         estimate_doubt=_NO_ESTIMATE,
     )
 

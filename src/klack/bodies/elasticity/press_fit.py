@@ -29,13 +29,23 @@ from klack.bodies.elasticity.rigid_motions import held_dofs
 from klack.bodies.elasticity.stress import StressField, parts_apart, von_mises
 from klack.errors import InputError
 from klack.materials.material import Material
-from klack.mesh.joint import Joint
+from klack.mesh.joint import FlatJoint, Joint
 from klack.mesh.mesh import Mesh
 
-__all__ = ["JointPressure", "PressedState", "pressed_state"]
+__all__ = [
+    "WITHOUT",
+    "JointPressure",
+    "JointSides",
+    "PartedBody",
+    "PressedState",
+    "far_from",
+    "nodes_of",
+    "pressed_state",
+]
 
 _SHARP = np.radians(200.0)  # of the material round a corner; arcs in elements stay below
-_WITHOUT = 0.1  # of a joint's length: radius round a sharp corner that is left out
+WITHOUT = 0.1
+"""Radius round a sharp corner that is left out, over the length of a joint."""
 
 _LINE3 = np.array([[4.0, -1.0, 2.0], [-1.0, 4.0, 2.0], [2.0, 2.0, 16.0]]) / 30.0
 
@@ -101,12 +111,10 @@ def pressed_state(
     overlaps [m]
         On the radius, one for each joint.
     """
-    parts = _glued_parts(mesh, joints)
-    apart, nodes = parts_apart(mesh, parts)
-    first = [min(b.connectivity.min() for b in apart.blocks if b.solid in part) for part in parts]
-    sides = [_Sides.of(apart, nodes, joint, mesh.node_sets[joint.name]) for joint in joints]
-    masters = 2 * np.concatenate([each.inner for each in sides])
-    slaves = 2 * np.concatenate([each.outer for each in sides])
+    parted = PartedBody.of(mesh, materials, joints)
+    apart, sides = parted.mesh, parted.sides
+    masters = 2 * np.concatenate([each.nodes[0] for each in sides])
+    slaves = 2 * np.concatenate([each.nodes[1] for each in sides])
     if len(np.unique(slaves)) < len(slaves):
         raise InputError(
             "fits",
@@ -115,13 +123,11 @@ def pressed_state(
             hint="give edges of one cylinder the same name.",
         )
     jump = np.zeros(apart.dof_count)
-    jump[slaves] = np.repeat(overlaps, [len(each.outer) for each in sides])
-    K, _ = assemble(apart, materials)
+    jump[slaves] = np.repeat(overlaps, [len(each.nodes[1]) for each in sides])
+    K = parted.stiffness
     column = np.arange(apart.dof_count)
     column[slaves] = masters
-    # nothing acts along the joints: each part is held at one node, without force
-    held = np.union1d(held_dofs(apart, np.empty(0, dtype=np.int64)), 2 * np.array(first) + 1)
-    kept = np.setdiff1d(np.unique(column), held)
+    kept = np.setdiff1d(np.unique(column), parted.held)
     row = np.flatnonzero(np.isin(column, kept))
     T = csr_array(
         (np.ones(len(row)), (row, np.searchsorted(kept, column[row]))),
@@ -130,9 +136,7 @@ def pressed_state(
     with factorize(csr_array(T.T @ K @ T)) as factor:
         u = jump + T @ factor.solve(-(T.T @ (K @ jump)))
     force = K @ u
-    field = StressField(apart, materials)
-    stress = von_mises(field(u))
-    corners = _sharp_corners(apart, sides)
+    corners = parted.sharp_corners
     found = []
     for joint, side in zip(joints, sides, strict=True):
         height, pressure = side.pressure(apart, force, joint)
@@ -141,51 +145,123 @@ def pressed_state(
             JointPressure(
                 height=height,
                 pressure=pressure,
-                away=_away(place, corners, _WITHOUT * joint.length),
-                force=float(force[2 * side.outer].sum()),
+                away=far_from(corners, place, WITHOUT * joint.length),
+                force=float(force[2 * side.nodes[1]].sum()),
             )
         )
-    around = _WITHOUT * min(joint.length for joint in joints)
-    largest = {}
-    for solid in mesh.solids:
-        own = _nodes_of(field.mesh, solid)
-        far = _away(field.mesh.points[own], corners, around)
-        largest[solid] = float(stress[own][far].max())
     return PressedState(
-        mesh=apart, nodes=nodes, displacement=u, joints=tuple(found), stress=largest
+        mesh=apart,
+        nodes=parted.nodes,
+        displacement=u,
+        joints=tuple(found),
+        stress=parted.largest_stress(
+            u, materials, corners, WITHOUT * min(joint.length for joint in joints)
+        ),
     )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Sides:
-    """Nodes of the inner and the outer part on a joint, in one order, and the sides of elements."""
+class PartedBody:
+    """A body whose parts have nodes of their own at its joints, and nothing that holds them there.
 
-    inner: NDArray[np.int64]
-    outer: NDArray[np.int64]
+    Parameters
+    ----------
+    mesh
+        With nodes of its own on either side of the joints.
+    nodes (n_nodes,)
+        Node of the glued mesh that each one is.
+    parts
+        Solids of each part; those that are glued to each other are one.
+    stiffness (n_dof, n_dof) [N/m]
+    held
+        Degrees of freedom: on the axis, and along it at one node of each part, without force.
+    """
+
+    mesh: Mesh
+    nodes: NDArray[np.int64]
+    parts: list[set[str]]
+    sides: list["JointSides"]
+    stiffness: csr_array
+    held: NDArray[np.int64]
+
+    @classmethod
+    def of(
+        cls, mesh: Mesh, materials: Mapping[str, Material], joints: Sequence[Joint | FlatJoint]
+    ) -> "PartedBody":
+        """Part a half section; edges of a joint are its node set of that name."""
+        parts = _glued_parts(mesh, joints)
+        apart, nodes = parts_apart(mesh, parts)
+        first = [
+            min(b.connectivity.min() for b in apart.blocks if b.solid in part) for part in parts
+        ]
+        return cls(
+            mesh=apart,
+            nodes=nodes,
+            parts=parts,
+            sides=[
+                JointSides.of(apart, nodes, joint, mesh.node_sets[joint.name]) for joint in joints
+            ],
+            stiffness=assemble(apart, materials)[0],
+            held=np.union1d(held_dofs(apart, np.empty(0, np.int64)), 2 * np.array(first) + 1),
+        )
+
+    @property
+    def sharp_corners(self) -> NDArray[np.float64]:
+        """Inner corners of parts, ends of joints where a part continues, shape (n, 2) [m]."""
+        return _sharp_corners(self.mesh, self.sides)
+
+    def largest_stress(
+        self,
+        u: NDArray[np.float64],
+        materials: Mapping[str, Material],
+        corners: NDArray[np.float64],
+        around: float,
+    ) -> dict[str, float]:
+        """Largest equivalent stress of each solid [Pa], farther than ``around`` from corners."""
+        field = StressField(self.mesh, materials)
+        stress = von_mises(field(u))
+        largest = {}
+        for solid in dict.fromkeys(block.solid for block in self.mesh.blocks):
+            own = nodes_of(field.mesh, solid)
+            far = far_from(corners, field.mesh.points[own], around)
+            largest[solid] = float(stress[own][far].max())
+        return largest
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class JointSides:
+    """Nodes of both parts on a joint, in one order, and the sides of elements of the second."""
+
+    nodes: tuple[NDArray[np.int64], NDArray[np.int64]]
     faces: NDArray[np.int64]
 
     @classmethod
     def of(
-        cls, apart: Mesh, nodes: NDArray[np.int64], joint: Joint, shared: NDArray[np.int64]
-    ) -> "_Sides":
-        inner, outer = (
+        cls,
+        apart: Mesh,
+        nodes: NDArray[np.int64],
+        joint: Joint | FlatJoint,
+        shared: NDArray[np.int64],
+    ) -> "JointSides":
+        """Of the first and the second solid; ``shared`` are nodes of the glued mesh."""
+        first, second = (
             own[np.isin(nodes[own], shared)]
-            for own in (_nodes_of(apart, solid) for solid in (joint.inner, joint.outer))
+            for own in (nodes_of(apart, solid) for solid in joint.solids)
         )
         sides = [
             block.connectivity[:, list(face.nodes)]
             for block in apart.blocks
-            if block.solid == joint.outer
+            if block.solid == joint.solids[1]
             for face in block.topology.faces
         ]
         faces = np.vstack(sides)
-        return cls(inner=inner, outer=outer, faces=faces[np.isin(faces, outer).all(axis=1)])
+        return cls(nodes=(first, second), faces=faces[np.isin(faces, second).all(axis=1)])
 
     @property
     def ends(self) -> NDArray[np.int64]:
-        """Places of the end nodes in :attr:`inner` and :attr:`outer`."""
+        """Places of the end nodes in :attr:`nodes`."""
         node, count = np.unique(self.faces[:, :2], return_counts=True)
-        return np.searchsorted(self.outer, node[count == 1])
+        return np.searchsorted(self.nodes[1], node[count == 1])
 
     def pressure(
         self, apart: Mesh, force: NDArray[np.float64], joint: Joint
@@ -193,27 +269,27 @@ class _Sides:
         """Height of the middle of each side [m], and its mean pressure [Pa] of these forces."""
         z = apart.points[self.faces, 1]
         area = 2.0 * np.pi * joint.radius * np.abs(z[:, 1] - z[:, 0])
-        local = np.searchsorted(self.outer, self.faces)
+        local = np.searchsorted(self.nodes[1], self.faces)
         row, column = np.broadcast_arrays(local[:, :, None], local[:, None, :])
         mass = coo_array(
             ((area[:, None, None] * _LINE3).ravel(), (row.ravel(), column.ravel())),
-            shape=(len(self.outer),) * 2,
+            shape=(len(self.nodes[1]),) * 2,
         )
-        nodal = spsolve(mass.tocsc(), force[2 * self.outer])
+        nodal = spsolve(mass.tocsc(), force[2 * self.nodes[1]])
         order = np.argsort(z[:, 2])
         return z[order, 2], (nodal[local] @ np.array([1.0, 1.0, 4.0]) / 6.0)[order]
 
 
-def _nodes_of(mesh: Mesh, solid: str) -> NDArray[np.int64]:
+def nodes_of(mesh: Mesh, solid: str) -> NDArray[np.int64]:
     """Sorted nodes of a solid."""
     return np.unique(
         np.concatenate([b.connectivity.ravel() for b in mesh.blocks if b.solid == solid])
     )
 
 
-def _glued_parts(mesh: Mesh, joints: Sequence[Joint]) -> list[set[str]]:
+def _glued_parts(mesh: Mesh, joints: Sequence[Joint | FlatJoint]) -> list[set[str]]:
     """Solids that share an edge, except those of a joint: glued to each other."""
-    pressed = [{joint.inner, joint.outer} for joint in joints]
+    pressed = [set(joint.solids) for joint in joints]
     middles = {  # an edge has a middle, a corner that two solids share has none
         solid: np.concatenate(
             [
@@ -233,15 +309,15 @@ def _glued_parts(mesh: Mesh, joints: Sequence[Joint]) -> list[set[str]]:
     for joint, pair in zip(joints, pressed, strict=True):
         if any(pair <= part for part in parts):
             raise InputError(
-                f"fits.{joint.name}",
-                got=f"'{joint.inner}' and '{joint.outer}', glued to each other by other parts",
-                expected="parts that only the fit holds together",
-                hint="leave out the part that joins them: a later weld leaves the fit as it is.",
+                f"{joint.key}.{joint.name}",
+                got="'{}' and '{}', glued to each other by other parts".format(*joint.solids),
+                expected="parts that only this joint holds together",
+                hint="leave out the part that joins them: a later weld leaves the joint as it is.",
             )
     return parts
 
 
-def _sharp_corners(apart: Mesh, sides: Sequence[_Sides]) -> NDArray[np.float64]:
+def _sharp_corners(apart: Mesh, sides: Sequence[JointSides]) -> NDArray[np.float64]:
     """Inner corners of the parts, and ends of joints where a part continues, shape (n, 2) [m]."""
     around = np.zeros(apart.node_count)
     for block in apart.blocks:
@@ -252,18 +328,18 @@ def _sharp_corners(apart: Mesh, sides: Sequence[_Sides]) -> NDArray[np.float64]:
         np.add.at(around, corner, np.arctan2(cross, np.sum(before * after, axis=-1)))
     own = np.flatnonzero((around > _SHARP) & (around < 2.0 * np.pi - 1e-6))
     ends = [
-        side.outer[k]
+        side.nodes[1][k]
         for side in sides
         for k in side.ends
-        if around[side.inner[k]] + around[side.outer[k]] > _SHARP
+        if around[side.nodes[0][k]] + around[side.nodes[1][k]] > _SHARP
     ]
     return apart.points[np.concatenate([own, np.array(ends, dtype=np.int64)])]
 
 
-def _away(
-    points: NDArray[np.float64], corners: NDArray[np.float64], radius: float
+def far_from(
+    corners: NDArray[np.float64], points: NDArray[np.float64], radius: float
 ) -> NDArray[np.bool_]:
-    """Which points are farther from all corners; all where none is."""
+    """Which points are farther from all corners than the radius; all where none is."""
     if not len(corners):
         return np.ones(len(points), dtype=bool)
     away = np.asarray(cKDTree(corners).query(points)[0]) > radius
