@@ -315,9 +315,9 @@ def assemble_body(case: CaseFile, name: str, mesh: Mesh) -> ElasticBody:
     for material in materials.values():
         if material.question is not None:
             warnings.warn(material.question, AccuracyWarning, stacklevel=2)
-    for joint in (*press_fits(case, name), *bolted_joints(case, name)):
-        for doubt in joint.doubts:
-            warnings.warn(doubt, AccuracyWarning, stacklevel=2)
+    fits, bolts = press_fits(case, name), bolted_joints(case, name)
+    for doubt in (*(d for fit in fits for d in fit.doubts), *(d for b in bolts for d in b.doubts)):
+        warnings.warn(doubt, AccuracyWarning, stacklevel=2)
     return elastic_body(
         name,
         mesh,
