@@ -443,7 +443,7 @@ def test_result_is_plain(model: InterfaceModel):
     """What goes to worker processes holds arrays, numbers and words only."""
     for field in dataclasses.fields(model):
         value = getattr(model, field.name)
-        assert isinstance(value, np.ndarray | tuple | float | None) or field.name == "checks"
+        assert isinstance(value, np.ndarray | tuple | float | int | None) or field.name == "checks"
 
 
 def test_hits_on_both_stops_in_quick_succession_are_two_impacts(model: InterfaceModel):
