@@ -192,7 +192,8 @@ def edit_by_form_and_by_text(walk: Walk, folder: Path) -> None:
     walk.sees("not valid, not saved")
     walk.finds((folder / COPY).read_text() == before, "nothing was written")
     walk.presses("Discard changes", "valid impact, saved")
-    walk.finds(area.input_value() == before, "the text of the file is back")
+    is_back = "text => document.getElementById('k-yaml').value === text"
+    walk.page.wait_for_function(is_back, arg=before, timeout=LONG)  # comes after the words
     levels = "[lumped, reduced-none, reduced-attachment, reduced, full]"
     area.fill(before.replace(levels, "[reduced]"))
     walk.sees("valid impact, not saved")

@@ -14,8 +14,10 @@ from klack.analyses.impact.analysis import IMPACT
 from klack.analyses.impact.content import report_content
 from klack.analyses.impact.run import run_impact
 from klack.analyses.inspection import inspect_case
+from klack.analyses.stroke.run import run_stroke
 from klack.assembling.bolts import bolted_joints, struck_bolts
 from klack.case import load_case
+from klack.case.any_case import load_valve_case
 from klack.errors import InputError
 
 CASE = "bolted_nozzle.yaml"
@@ -161,3 +163,32 @@ def test_an_impact_shows_its_bolts_and_is_that_of_the_glued_body(tmp_path):
     assert ("bolts", "housing.flange") in heads
     (more,) = [note for note in loose.warnings if note not in glued.warnings]
     assert "housing.flange: the joint may open" in more
+
+
+STROKE = """stops:
+  seat: {between: [needle.tip, housing.seat], speed: 1 m/s, force: 20 N}
+reduction: {modes: {needle: {count: 4}, housing: {count: 4}}}
+network:
+  components:
+    needle: {type: flexible-body, body: needle, points: [tip, top]}
+    housing: {type: flexible-body, body: housing, points: [seat]}
+    seat: {type: end-stop, gap: 0 um, law: {kind: consistent}}
+    magnet: {type: force-over-time, time: [0 us, 1 us, 50 us, 51 us], force: [0 N, 30 N, 30 N, 0 N]}
+    spring: {type: spring, stiffness: 10 N/mm, preload: 12 N}
+  connections:
+    - [needle.tip, seat.upper]
+    - [housing.seat, seat.lower]
+    - [needle.top, spring.end, magnet.end]
+run: {duration: 0.3 ms, variants: [dry], lift: needle.tip}
+"""
+
+
+@pytest.mark.slow
+def test_a_stroke_that_may_open_the_joint_has_the_same_doubt(tmp_path):
+    text = (HOW_TO / CASE).read_text("utf-8").partition("contact:\n  between")[0] + STROKE
+    for preload, opens in (("5 kN", False), ("20 N", True)):
+        (tmp_path / "case.yaml").write_text(text.replace("5 kN\n", f"{preload}\n"), "utf-8")
+        found = run_stroke(load_valve_case(tmp_path / "case.yaml"))
+        (event,) = found.variants["dry"].result.events[:1]
+        assert event.peak_force > 10.0  # so twice of it is more than 20 N
+        assert any("the joint may open" in note for note in found.warnings) == opens

@@ -26,11 +26,12 @@ def parted(mesh: Mesh, names: Iterable[str], where: str = "parted") -> Mesh:
 
     Rejects a name that is not that of faces between exactly two solids; ``where`` begins the error.
     """
+    names = tuple(names)
+    if not names:
+        return mesh
     table = FaceTable.of(mesh.blocks)
     faces = _Faces(table)
     open_rows = {name: _between(mesh, faces, name, where) for name in names}
-    if not open_rows:
-        return mesh
     rows = np.unique(np.concatenate(list(open_rows.values())))
     split = np.unique(faces.nodes[rows])
     split = split[split >= 0]
