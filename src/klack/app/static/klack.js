@@ -182,7 +182,7 @@ document.addEventListener("keydown", (event) => {
   });
   addEventListener("pagehide", () => {  // what is on its way may be lost
     const found = area();
-    if (found?.at > (found.heard ?? 0)) stored((store, name) => store.setItem(name, found.value));
+    if (found && found.at > (found.heard ?? 0)) stored((store, name) => store.setItem(name, found.value));
   });
   const words = () => {
     const spans = document.querySelectorAll("#popup > span");
