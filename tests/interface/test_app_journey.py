@@ -283,10 +283,11 @@ def move_pin_hear(walk: Walk, folder: Path) -> None:
     walk.finds(abs(shown / start - 1) < 1e-3, f"{shown} N is what the run has, {start} N")
     speed = page.get_by_label("speed")
     speed.focus()
+    was = figure.inner_text()
     for _ in range(5):
         walk.keys("ArrowRight")
     changed = "was => document.querySelector('.k-figure').innerText !== was"
-    walk.waits(changed, figure.inner_text())
+    walk.waits(changed, was)
     page.wait_for_selector(".k-badge.good")
     moved = float(speed.input_value()) / 0.3
     ratio = float(re.findall(r"[\d.]+", figure.inner_text())[0]) / start
