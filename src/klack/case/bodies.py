@@ -1,6 +1,7 @@
 """Materials, bodies and their reduction, shared by every kind of case."""
 
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from math import isclose
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, Self
@@ -426,19 +427,11 @@ class CaseBody(Section):
                 )
             for name, item in (given or {}).items():
                 assert profile is not None
-                try:
+                with _told_at(key, name):
                     if isinstance(item, Bolts):
                         flat_joint(profile.profiles(), name, item.ends)
                     else:
                         cylinder_joint(profile.profiles(), name)
-                except InputError as error:
-                    raise CaseProblem(
-                        (key, name),
-                        got=error.got,
-                        expected=error.expected,
-                        hint=error.hint,
-                        on_key=True,
-                    ) from error
         others = [key for key in ("fits", "layers") if getattr(self, key)]
         if self.bolts and others:
             raise CaseProblem(
@@ -471,21 +464,24 @@ class CaseBody(Section):
         if geometry.profile is None:
             return
         for name in self.layers:
-            try:
+            with _told_at("layers", name):
                 edges_of_two(geometry.profile.profiles(), name)
-            except InputError as error:
-                raise CaseProblem(
-                    ("layers", name),
-                    got=error.got,
-                    expected=error.expected,
-                    hint=error.hint,
-                    on_key=True,
-                ) from error
 
     @property
     def has_surfaces(self) -> bool:
         """False for a reduced model and for nodes alone: contact is then at a port."""
         return self.reduced is None and self.geometry.nodes is None
+
+
+@contextmanager
+def _told_at(*key: str) -> Iterator[None]:
+    """What is wrong with a joint as drawn, at its key in the case."""
+    try:
+        yield
+    except InputError as error:
+        raise CaseProblem(
+            key, got=error.got, expected=error.expected, hint=error.hint, on_key=True
+        ) from error
 
 
 class ModeChoice(Section):

@@ -184,4 +184,4 @@ def _listed(names: Mapping[str, object]) -> str:
 
 
 def _error(name: str, got: str, expected: str, hint: str) -> InputError:
-    return InputError(f"fits.{name}", got=got, expected=expected, hint=hint)
+    return InputError(f"joint '{name}'", got=got, expected=expected, hint=hint)
