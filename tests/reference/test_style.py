@@ -87,7 +87,7 @@ def test_the_table_is_read():
 
 @pytest.mark.parametrize(
     "texts",
-    [pytest.param(pages, id="pages"), pytest.param(strings, id="source", marks=pytest.mark.slow)],
+    [pytest.param(pages, id="pages"), pytest.param(strings, id="source")],
 )
 def test_texts_use_the_vocabulary(texts):
     wrong = [

@@ -100,7 +100,7 @@ def cylinder_joint(profiles: Mapping[str, Profile], name: str) -> Joint:
 def flat_joint(profiles: Mapping[str, Profile], name: str, ends: tuple[str, str]) -> FlatJoint:
     """Joint of all edges of one name; rejects what is no flat face of exactly two solids.
 
-    ``ends`` are edges of one solid each, straight and off the axis.
+    ``ends`` are edges of one solid each, straight and not on the axis.
     """
     (one, own), (two, others) = edges_of_two(profiles, name).items()
     size = max(abs(x) for c in (*own, *others) for x in (*c.start, *c.end))
@@ -120,7 +120,7 @@ def flat_joint(profiles: Mapping[str, Profile], name: str, ends: tuple[str, str]
             raise _error(
                 name,
                 f"bolts between {ends[0]} and {ends[1]}, where '{end}' is no straight edge of one "
-                "part, off the axis",
+                "part, or lies on the axis",
                 "two edges: one under the head, one where the thread carries",
                 "name these edges in the parts; a nut presses as a head does.",
             )
