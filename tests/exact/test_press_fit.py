@@ -1,4 +1,4 @@
-"""Press fits of drawn parts, and the stiffness that their stress gives to modes.
+"""Press fits of drawn parts and STEP solids, and the stiffness that their stress gives to modes.
 
 Truth: Lame's thick cylinders of one length with free ends (plane stress), exact at any length;
 reciprocity of two joints (Betti); the work of closed fields for the stiffness of an initial stress;
@@ -19,10 +19,12 @@ from klack.bodies.elasticity.stress import work_of_stress
 from klack.errors import InputError
 from klack.exchange.calculix_run import find_calculix
 from klack.materials.material import Material
-from klack.mesh.joint import cylinder_joint
+from klack.mesh.joint import cylinder_joint, solid_joint
 from klack.mesh.meridian import mesh_meridian
 from klack.mesh.profile import Line, Profile
+from klack.mesh.rigid import Pose
 from klack.mesh.sizing import MeshSizing
+from klack.mesh.solid import mesh_step, write_step_revolved
 from klack.verification.lattice import STEEL, lattice_mesh
 
 IRON = Material(name="iron", young=120e9, poisson=0.25, density=7300.0)
@@ -224,6 +226,109 @@ def test_the_sharp_ends_of_a_joint_are_left_out():
     assert fine[0] > plane  # the shaft beyond the hub supports it
 
 
+def pressed_solid(folder, profiles, materials, overlaps, sizing, turn=0.0):
+    """State of the same parts as a STEP file, turned about an axis beside them [rad]."""
+    write_step_revolved(profiles, folder / "parts.step")
+    mesh = mesh_step(folder / "parts.step", sizing)
+    if turn:
+        axis = turn * np.array([0.6, 0.8, 0.0])
+        mesh = mesh.placed(
+            Pose(rotation=axis, about=np.zeros(3), shift=np.array([1e-2, 0.0, 3e-2]))
+        )
+    joints = [solid_joint(mesh, name) for name in overlaps]
+    return pressed_state(mesh, materials, joints, list(overlaps.values())), joints
+
+
+@each("seed", range(3))
+def test_tubes_of_a_step_file_have_the_pressure_of_lame(tmp_path, seed):
+    """Random tubes, anywhere in space: radius and length are those of the file.
+
+    Tolerances are for elements of a quarter of the radius: mean pressure 0.5 %, that of single
+    sides 10 %, stresses 3 %.
+    """
+    rng = np.random.default_rng(seed)
+    R, overlap = 2e-3, 1e-6
+    a, b, height = R * rng.uniform(0.3, 0.7), R * rng.uniform(1.4, 2.5), R * rng.uniform(0.6, 1.5)
+    materials = {"shaft": STEEL, "hub": IRON}
+    sizing = MeshSizing(size=0.5e-3, grading=0.3)
+    state, (joint,) = pressed_solid(
+        tmp_path, two_rings((a, R, b), height), materials, {"joint": overlap}, sizing, turn=0.7
+    )
+
+    exact = lame((a, R, b), (STEEL, IRON), overlap)
+    hoop = exact * (b**2 + R**2) / (b**2 - R**2)
+    (found,) = state.joints
+    assert joint.solids == ("shaft", "hub")
+    assert (joint.radius, joint.length) == pytest.approx((R, height), rel=1e-8)
+    assert found.area == pytest.approx(2 * np.pi * R * height, rel=1e-4)
+    assert found.force / found.area == pytest.approx(exact, rel=5e-3)
+    assert found.pressure == pytest.approx(exact, rel=0.1)
+    assert found.away.all()  # both parts end where the joint ends
+    assert state.stress["hub"] == pytest.approx(
+        np.sqrt(hoop**2 + hoop * exact + exact**2), rel=0.03
+    )
+
+
+def test_two_joints_of_solids_are_those_of_the_half_section(tmp_path):
+    """Truth: the drawn parts. Forces to 1 %; sharp ends are found at the same heights."""
+    overlaps = {"first": 1e-6, "second": 5e-7}
+    drawn, _, _ = pressed(stepped(), PARTS, overlaps, 0.1e-3)
+    sizing = MeshSizing(size=1e-3, grading=0.3, surfaces=dict.fromkeys(overlaps, 0.5e-3))
+    solid, _ = pressed_solid(tmp_path, stepped(), PARTS, overlaps, sizing)
+
+    for one, other in zip(drawn.joints, solid.joints, strict=True):
+        assert other.force == pytest.approx(one.force, rel=0.01)
+        assert not other.away.all()
+        assert np.ptp(other.height[other.away]) < np.ptp(other.height)
+
+
+def test_faces_that_cannot_be_pressed_are_one_error(tmp_path):
+    """A flat face, a cone, and a cylinder that leaves the next one of its parts alone."""
+    cone = {
+        "shaft": Profile(
+            (0.0, 0.0),
+            (
+                Line((2e-3, 0.0), "bottom"),
+                Line((1.8e-3, 2e-3), "joint"),
+                Line((0.0, 2e-3), "top"),
+                Line((0.0, 0.0), "axis"),
+            ),
+        ),
+        "hub": Profile(
+            (2e-3, 0.0),
+            (
+                Line((4e-3, 0.0), "bottom"),
+                Line((4e-3, 2e-3), "rim"),
+                Line((1.8e-3, 2e-3), "top"),
+                Line((2e-3, 0.0), "joint"),
+            ),
+        ),
+    }
+    stacked = {
+        "shaft": ring(1e-3, 3e-3, 0.0, 1e-3),
+        "hub": Profile(
+            (1e-3, 1e-3),
+            (
+                Line((3e-3, 1e-3), "joint"),
+                Line((3e-3, 2e-3), "rim"),
+                Line((1e-3, 2e-3), "top"),
+                Line((1e-3, 1e-3), "bore"),
+            ),
+        ),
+    }
+    below = stacked["shaft"]
+    stacked["shaft"] = replace(
+        below, edges=(*below.edges[:2], replace(below.edges[2], name="joint"), below.edges[3])
+    )
+    sizing = MeshSizing(size=1e-3)
+    materials = {"shaft": STEEL, "hub": STEEL}
+    for profiles, got in ((cone, "not one cylinder"), (stacked, "a flat face")):
+        with pytest.raises(InputError, match=rf"fits\.joint: got .*{got}"):
+            pressed_solid(tmp_path, profiles, materials, {"joint": 1e-6}, sizing)
+    with pytest.raises(InputError, match=r"fits\.seam: got a name of no face"):
+        pressed_solid(tmp_path, stacked, materials, {"seam": 1e-6}, sizing)
+
+
 def test_parts_that_are_glued_otherwise_are_refused():
     """A cap across shaft and hub holds both; two names of one cylinder share a corner."""
     profiles = two_rings((1e-3, 2e-3, 3e-3), 2e-3)
@@ -265,6 +370,8 @@ def test_parts_that_are_glued_otherwise_are_refused():
     }
     with pytest.raises(InputError, match="joints that meet in a corner"):
         pressed(parts, dict.fromkeys(parts, STEEL), {"low": 1e-6, "high": 2e-6}, 0.4e-3)
+    with pytest.raises(InputError, match=r"fits\.low: got a part of the faces where"):
+        pressed(parts, dict.fromkeys(parts, STEEL), {"low": 1e-6}, 0.4e-3)
 
 
 def test_a_bar_under_tension_vibrates_faster():

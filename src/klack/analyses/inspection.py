@@ -222,7 +222,8 @@ def inspect_bodies(case: CaseFile) -> Iterator[tuple[str, Inspected]]:
             content = step_content(body.geometry.step.file)
             known[name] = tuple(face.name for face in content.faces)
             moments = {solid.name: solid.moments for solid in content.solids if solid.moments}
-            yield name, _weighed(case, name, _step_rows(content), moments)
+            found = _weighed(case, name, _step_rows(content), moments)
+            yield name, replace(found, rows=(*found.rows, *_fit_rows(case, name)))
         elif body.geometry.profile is not None:
             profiles = body.geometry.profile.profiles()
             rows = _drawn_rows(body.geometry.profile, profiles)
@@ -243,7 +244,7 @@ def _drawn_rows(drawn: ProfileGeometry, profiles: Mapping[str, Profile]) -> Iter
         yield "surface", edge, f"z {_range(points[:, 1])}, r {_range(points[:, 0])}"
 
 
-def _joint_rows(case: CaseFile, name: str) -> Iterator[Row]:
+def _fit_rows(case: CaseFile, name: str) -> Iterator[Row]:
     for kind, found in (
         ("press fit", press_fits(case, name)),
         ("bolts", bolted_joints(case, name)),
@@ -251,6 +252,10 @@ def _joint_rows(case: CaseFile, name: str) -> Iterator[Row]:
         for each in found:
             yield from ((kind, each.joint, f"{what}: {text}") for what, text in each.rows())
             yield from (("doubt", each.joint, doubt) for doubt in each.doubts)
+
+
+def _joint_rows(case: CaseFile, name: str) -> Iterator[Row]:
+    yield from _fit_rows(case, name)
     if case.bodies[name].layers:
         body = assemble_body(case, name, mesh_body(case.bodies[name], name, ()))
         for state in layer_states(body, eigenmodes(body, count=_MODES)):

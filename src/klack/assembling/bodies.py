@@ -353,7 +353,7 @@ def mesh_body(
         Places of a case with another general size [m].
     """
     whole = _whole_mesh(body, name, places, places_at)
-    return parted(whole, body.layers or (), f"bodies.{name}.layers")
+    return parted(whole, body.layers or (), f"bodies.{name}.layers")[0]
 
 
 def _whole_mesh(

@@ -215,7 +215,7 @@ def _computed(
     for end in sorted(joint.ends):
         lengths = (c.length for p in profiles.values() for c in p.curves if c.name == end)
         finer[end] = sum(lengths) / _ACROSS
-    mesh = joint_mesh(body, profiles, sizes, finer)
+    mesh = joint_mesh(body, drawn, sizes, finer)
     preload = given.count * given.preload
     state = clamped_state(mesh, materials, joint, preload)
     return (

@@ -1,32 +1,34 @@
 """Press fits of a case: pressure, stress, what they hold, and their doubts."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from math import pi
-from typing import TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from klack.assembling.generated_mesh import meshed_for_case, meshed_profiles
+from klack.assembling.generated_mesh import meshed_for_case, meshed_profiles, meshed_step
 from klack.bodies.elasticity.body import elastic_body
 from klack.bodies.elasticity.eigen import eigenmodes
 from klack.bodies.elasticity.press_fit import pressed_state
 from klack.bodies.elasticity.stress import work_of_stress
 from klack.case.bodies import CaseFile, Fit
+from klack.case.geometry import StepFile
 from klack.case.placed_errors import tells_place
 from klack.errors import InputError
 from klack.materials.material import Material
-from klack.mesh.joint import cylinder_joint
+from klack.mesh.joint import Joint, cylinder_joint, solid_joint
 from klack.mesh.mesh import Mesh
 from klack.mesh.profile import Profile
 from klack.mesh.sizing import MeshSizing
+from klack.mesh.step_content import step_content
 from klack.units import format_si
 
 __all__ = [
     "ELEMENTS",
     "Chosen",
     "Drawn",
+    "FileShape",
     "PressFit",
     "Sizes",
     "joint_mesh",
@@ -41,12 +43,21 @@ G = TypeVar("G")
 S = TypeVar("S")
 
 Drawn = tuple[tuple[str, Profile], ...]
+
+
+class FileShape(NamedTuple):
+    """A STEP file, and what it has now."""
+
+    step: StepFile
+    content: bytes
+
+
 Chosen = tuple[tuple[str, Material], ...]
 Sizes = tuple[float, float, tuple[tuple[str, float], ...]]
 """General element size [m], grading, and sizes of edges."""
 
 ELEMENTS = 24
-"""Along a joint."""
+"""Along a joint of a half section."""
 _MODES = 10
 _LARGE = 1e-3  # interference over diameter: 0.5 to 1 per mille is a heavy fit
 _STIFFENED = 1e-3  # shift of a frequency that is no longer small beside other errors
@@ -70,8 +81,8 @@ class PressFit:
         Of every part of the body: largest equivalent stress away from sharp corners, and where its
         material yields.
     stiffening [-]
-        Largest relative shift of the first frequencies of the free body, axisymmetric, by the
-        stress of all its fits; the impact leaves it out.
+        Largest relative shift of the first frequencies of the free body (of a drawn one, the
+        axisymmetric) by the stress of all its fits; the impact leaves it out.
     """
 
     body: str
@@ -162,20 +173,26 @@ def joints_of(
     body: str,
     key: str,
     given: Mapping[str, G],
-    compute: Callable[[str, Drawn, Chosen, tuple[tuple[str, G], ...], Sizes], tuple[S, ...]],
+    compute: Callable[[str, Any, Chosen, tuple[tuple[str, G], ...], Sizes], tuple[S, ...]],
 ) -> tuple[S, ...]:
-    """States of joints of a drawn body; an error of one gets its key in the case."""
+    """States of joints of a body; an error of one gets its key in the case."""
     if not given:
         return ()
     drawn = case.bodies[body]
-    assert drawn.geometry.profile is not None
     assert drawn.mesh is not None
-    profiles = drawn.geometry.profile.profiles()
+    shape: Drawn | FileShape
+    if drawn.geometry.profile is not None:
+        profiles = drawn.geometry.profile.profiles()
+        shape, solids = tuple(profiles.items()), tuple(profiles)
+    else:
+        assert drawn.geometry.step is not None
+        shape = FileShape(drawn.geometry.step, drawn.geometry.step.file.read_bytes())
+        solids = tuple(solid.name for solid in step_content(shape.step.file).solids)
     try:
         return compute(
             body,
-            tuple(profiles.items()),
-            tuple(case.materials_of(body, profiles).items()),
+            shape,
+            tuple(case.materials_of(body, solids).items()),
             tuple(given.items()),
             (drawn.mesh.size, drawn.mesh.grading, tuple(drawn.mesh.surfaces.items())),
         )
@@ -191,17 +208,22 @@ def joints_of(
 
 
 def joint_mesh(
-    body: str, profiles: Mapping[str, Profile], sizes: Sizes, finer: Mapping[str, float]
+    body: str, shape: Drawn | FileShape, sizes: Sizes, finer: Mapping[str, float]
 ) -> Mesh:
-    """Half section whose edges of these names have elements of this size [m] or smaller."""
+    """Mesh whose edges or faces of these names have elements of this size [m] or smaller.
+
+    Of drawn parts the half section.
+    """
     size, grading, surfaces = sizes[0], sizes[1], dict(sizes[2])
     for edge, most in finer.items():
         surfaces[edge] = min(most, surfaces.get(edge, size))
-    return meshed_for_case(
-        body,
-        MeshSizing(size=size, grading=grading, surfaces=surfaces),
-        lambda sizing: meshed_profiles(profiles, sizing, "axisymmetric", None),
-    )
+
+    def mesher(sizing: MeshSizing) -> Mesh:
+        if isinstance(shape, FileShape):
+            return meshed_step(shape.step, sizing)
+        return meshed_profiles(dict(shape), sizing, "axisymmetric", None)
+
+    return meshed_for_case(body, MeshSizing(size=size, grading=grading, surfaces=surfaces), mesher)
 
 
 def yield_stresses(materials: Mapping[str, Material]) -> dict[str, float]:
@@ -239,20 +261,18 @@ def stress_rows(
 @lru_cache(maxsize=20)
 def _computed(
     body: str,
-    drawn: Drawn,
+    shape: Drawn | FileShape,
     chosen: Chosen,
     fits: tuple[tuple[str, Fit], ...],
     sizes: Sizes,
 ) -> tuple[PressFit, ...]:
     """Kept: a run asks once for the doubts, and once for the numbers."""
-    profiles, materials = dict(drawn), dict(chosen)
-    joints = [cylinder_joint(profiles, name) for name, _ in fits]
-    finer = {joint.name: joint.length / ELEMENTS for joint in joints}
-    mesh = joint_mesh(body, profiles, sizes, finer)
+    materials = dict(chosen)
+    joints, mesh = _meshed_joints(body, shape, [name for name, _ in fits], sizes)
     overlaps = [fit.interference / 2.0 for _, fit in fits]
     state = pressed_state(mesh, materials, joints, overlaps)
     modes = eigenmodes(elastic_body(body, mesh, materials), count=_MODES)
-    shapes = modes.shapes.reshape(mesh.node_count, 2, -1)[state.nodes]
+    shapes = modes.shapes.reshape(mesh.node_count, mesh.dimension, -1)[state.nodes]
     work = work_of_stress(
         state.mesh, materials, state.displacement, shapes.reshape(-1, shapes.shape[-1])
     )
@@ -267,7 +287,7 @@ def _computed(
             length=joint.length,
             interference=fit.interference,
             friction=fit.friction,
-            pressure=found.force / (2.0 * pi * joint.radius * joint.length),
+            pressure=found.force / found.area,
             least_pressure=float(found.pressure.min()),
             largest_pressure=float(found.pressure[found.away].max()),
             force=found.force,
@@ -277,3 +297,22 @@ def _computed(
         )
         for joint, (_, fit), found in zip(joints, fits, state.joints, strict=True)
     )
+
+
+def _meshed_joints(
+    body: str, shape: Drawn | FileShape, names: Sequence[str], sizes: Sizes
+) -> tuple[list[Joint], Mesh]:
+    """Joints of these names, and a mesh that is fine there."""
+    if isinstance(shape, FileShape):
+        coarse = joint_mesh(body, shape, sizes, {})
+        joints = [solid_joint(coarse, name) for name in names]
+        finer = {joint.name: _size_of_solid(joint) for joint in joints}
+    else:
+        joints = [cylinder_joint(dict(shape), name) for name in names]
+        finer = {joint.name: joint.length / ELEMENTS for joint in joints}
+    return joints, joint_mesh(body, shape, sizes, finer)
+
+
+def _size_of_solid(joint: Joint) -> float:
+    """Size [m] of elements of a solid: 8 along a joint, but 25 to 75 round it."""
+    return max(min(joint.length / 8.0, joint.radius / 4.0), joint.radius / 12.0)

@@ -324,7 +324,7 @@ class CaseBody(Section):
     )
     fits: dict[Name, Fit] | None = Field(
         default=None,
-        description="edge: press fit of the two parts of a profile that share it, a cylinder; "
+        description="edge or face: press fit of the two parts that share it, a cylinder; "
         "klack inspect and klack impact show its pressure. Other shared edges are glued.",
     )
     bolts: dict[Name, Bolts] | None = Field(
@@ -413,20 +413,23 @@ class CaseBody(Section):
         return self
 
     def _check_joints(self) -> None:
-        """Reject fits and bolts of what is not drawn, and of edges of another shape."""
+        """Reject fits and bolts of other geometries, and of edges of another shape."""
         profile = None if self.geometry.is_absent else self.geometry.profile
         kinds = {"fits": ("a press fit", self.fits), "bolts": ("bolts", self.bolts)}
         for key, (kind, given) in kinds.items():
-            if given and (profile is None or self.matrices is not None):
+            of_file = key == "fits" and not self.geometry.is_absent and self.geometry.step
+            if given and (self.matrices is not None or not (profile or of_file)):
+                also = " or geometry.step" if key == "fits" else ""
                 raise CaseProblem(
                     (key,),
                     got=f"{kind} of a body that is not drawn",
-                    expected="geometry.profile with a part for either side of the joint",
+                    expected=f"geometry.profile{also} with a part for either side of the joint",
                     hint=f"draw the parts, or remove '{key}': the solids are glued then.",
                     on_key=True,
                 )
             for name, item in (given or {}).items():
-                assert profile is not None
+                if profile is None:  # faces of the file are known with its mesh
+                    continue
                 with _told_at(key, name):
                     if isinstance(item, Bolts):
                         flat_joint(profile.profiles(), name, item.ends)

@@ -91,7 +91,7 @@ def clamped_state(
     forces = np.zeros((parted.mesh.dof_count, count + 1))  # f = R^T (contact forces, bolts)
     forces[2 * upper + 1, at], forces[2 * lower + 1, at] = 1.0, -1.0
     forces[:, count] = load
-    free = np.setdiff1d(np.arange(parted.mesh.dof_count), parted.held)
+    free = np.setdiff1d(np.arange(parted.mesh.dof_count), parted.held())
     moved = np.zeros_like(forces)
     with factorize(csr_array(parted.stiffness[free][:, free])) as factor:
         moved[free] = factor.solve(forces[free])

@@ -17,8 +17,10 @@ __all__ = ["parted"]
 Ints = NDArray[np.int64]
 
 
-def parted(mesh: Mesh, names: Iterable[str], where: str = "parted") -> Mesh:
+def parted(mesh: Mesh, names: Iterable[str], where: str = "parted") -> tuple[Mesh, Ints]:
     """Mesh whose two solids meet at each named node set without shared nodes: its ``pairs``.
+
+    Beside it stands the node of the given mesh that each of its nodes is.
 
     Around every node of these faces, elements that share another face stay together; each further
     group gets a node of its own at the end of the numbering. So a node at the rim of a pair stays
@@ -28,7 +30,7 @@ def parted(mesh: Mesh, names: Iterable[str], where: str = "parted") -> Mesh:
     """
     names = tuple(names)
     if not names:
-        return mesh
+        return mesh, np.arange(mesh.node_count)
     table = FaceTable.of(mesh.blocks)
     faces = _Faces(table)
     open_rows = {name: _between(mesh, faces, name, where) for name in names}
@@ -91,7 +93,7 @@ def parted(mesh: Mesh, names: Iterable[str], where: str = "parted") -> Mesh:
             solids=(solids[0], solids[1]), first=tuple(sides[0]), second=tuple(sides[1])
         )
 
-    return replace(
+    apart = replace(
         mesh,
         points=np.vstack([mesh.points, mesh.points[added]]),
         blocks=tuple(
@@ -112,6 +114,7 @@ def parted(mesh: Mesh, names: Iterable[str], where: str = "parted") -> Mesh:
         },
         pairs={**mesh.pairs, **{name: pair(rows) for name, rows in open_rows.items()}},
     )
+    return apart, np.concatenate([np.arange(mesh.node_count), added])
 
 
 class _Faces:

@@ -206,7 +206,7 @@ def _layer() -> Iterator[Check]:
             Line((0.0, low), "axis"),
         )
         profiles[name] = Profile((0.0, low), edges)
-    mesh = parted(mesh_meridian(profiles, MeshSizing(size=radius)), ["joint"])
+    mesh, _ = parted(mesh_meridian(profiles, MeshSizing(size=radius)), ["joint"])
     given = Layer(name="joint", table=np.array([[1.0, stiffness, stiffness, loss]]), frequency=1.0)
     body = elastic_body("rods", mesh, dict.fromkeys(profiles, _BAR), layers=[given])
     modes = eigenmodes(body, count=1)

@@ -1,8 +1,9 @@
 r"""Stress of parts that are pressed on each other: overlap on the cylinders where they meet.
 
-With separate nodes on either side of a joint the radial displacement jumps by the overlap,
+With separate nodes on either side of a joint the displacement along its normal n, the radius,
+jumps by the overlap,
 
-.. math:: u_r^{outer} - u_r^{inner} = \delta ,
+.. math:: n^T (u^{outer} - u^{inner}) = \delta ,
 
 and nothing acts along the joint: the state of Lame and of DIN 7190-1, in which either part keeps
 its length.  What friction leaves along the joint depends on how the parts were joined, and stays
@@ -14,23 +15,26 @@ one joint are held together by nothing else.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import csr_array
 from scipy.sparse.linalg import spsolve
 from scipy.spatial import cKDTree
 
 from klack.bodies.elasticity.assembly import assemble
 from klack.bodies.elasticity.factorization import factorize
-from klack.bodies.elasticity.rigid_motions import held_dofs
-from klack.bodies.elasticity.stress import StressField, parts_apart, von_mises
+from klack.bodies.elasticity.loads import face_points, over_faces
+from klack.bodies.elasticity.rigid_motions import held_best, held_dofs, rigid_motions
+from klack.bodies.elasticity.stress import StressField, von_mises
 from klack.errors import InputError
 from klack.materials.material import Material
+from klack.mesh.families import FAMILIES
 from klack.mesh.joint import FlatJoint, Joint
-from klack.mesh.mesh import Mesh
+from klack.mesh.mesh import ElementBlock, FaceBlock, FacePair, Mesh
+from klack.mesh.parting import parted
 
 __all__ = [
     "WITHOUT",
@@ -43,11 +47,14 @@ __all__ = [
     "pressed_state",
 ]
 
-_SHARP = np.radians(200.0)  # of the material round a corner; arcs in elements stay below
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_SHARP = 200.0 / 360.0  # of the full angle round a corner; arcs in elements stay below
+_LEVEL = 1e-6  # of the normal of a face across the axis
+_STILL = 1e-6  # jump of a motion that a joint leaves free, over its largest displacement
 WITHOUT = 0.1
 """Radius round a sharp corner that is left out, over the length of a joint."""
-
-_LINE3 = np.array([[4.0, -1.0, 2.0], [-1.0, 4.0, 2.0], [2.0, 2.0, 16.0]]) / 30.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -61,14 +68,16 @@ class JointPressure:
     pressure (n,) [Pa]
         Mean over each.
     away (n,)
-        Not at a sharp corner, where a linear pressure has no limit.
+        Not at or near a sharp corner, where a linear pressure has no limit.
+    area [m^2]
     force [N]
         Integral of the pressure.
     """
 
-    height: NDArray[np.float64]
-    pressure: NDArray[np.float64]
+    height: Floats
+    pressure: Floats
     away: NDArray[np.bool_]
+    area: float
     force: float
 
 
@@ -88,8 +97,8 @@ class PressedState:
     """
 
     mesh: Mesh
-    nodes: NDArray[np.int64]
-    displacement: NDArray[np.float64]
+    nodes: Ints
+    displacement: Floats
     joints: tuple[JointPressure, ...]
     stress: Mapping[str, float]
 
@@ -107,57 +116,114 @@ def pressed_state(
     Parameters
     ----------
     mesh
-        Half section, parts glued; the edges of a joint are its node set of that name.
+        Half section or solid, parts glued; a joint is its node set of that name.
     overlaps [m]
         On the radius, one for each joint.
     """
-    parted = PartedBody.of(mesh, materials, joints)
-    apart, sides = parted.mesh, parted.sides
-    masters = 2 * np.concatenate([each.nodes[0] for each in sides])
-    slaves = 2 * np.concatenate([each.nodes[1] for each in sides])
-    if len(np.unique(slaves)) < len(slaves):
+    body = PartedBody.of(mesh, materials, joints)
+    apart, sides = body.mesh, body.sides
+    _require_all_pressed(apart, joints, sides)
+    masters = np.concatenate([each.nodes[0] for each in sides])
+    slaves = np.concatenate([each.nodes[1] for each in sides])
+    if len(np.unique(slaves)) < len(slaves) or np.isin(slaves, masters).any():
         raise InputError(
             "fits",
             got="joints that meet in a corner",
             expected="one overlap at every node",
             hint="give edges of one cylinder the same name.",
         )
-    jump = np.zeros(apart.dof_count)
-    jump[slaves] = np.repeat(overlaps, [len(each.nodes[1]) for each in sides])
-    K = parted.stiffness
-    column = np.arange(apart.dof_count)
-    column[slaves] = masters
-    kept = np.setdiff1d(np.unique(column), parted.held)
-    row = np.flatnonzero(np.isin(column, kept))
-    T = csr_array(
-        (np.ones(len(row)), (row, np.searchsorted(kept, column[row]))),
-        shape=(apart.dof_count, len(kept)),
+    normal = np.vstack(
+        [joint.outwards(apart.points[s.nodes[1]]) for joint, s in zip(joints, sides, strict=True)]
     )
+    overlap = np.repeat(overlaps, [len(each.nodes[1]) for each in sides])
+    T, jump = _tied(apart, masters, slaves, normal, overlap)
+    d = apart.dimension
+    row = np.repeat(np.arange(len(slaves)), d)
+    along = tuple(
+        csr_array(
+            (normal.ravel(), (row, (d * nodes[:, None] + np.arange(d)).ravel())),
+            shape=(len(slaves), apart.dof_count),
+        )
+        for nodes in (slaves, masters)
+    )
+    kept = np.setdiff1d(T.indices, body.held(along[0] - along[1], T))
+    K, T = body.stiffness, T[:, kept]
     with factorize(csr_array(T.T @ K @ T)) as factor:
         u = jump + T @ factor.solve(-(T.T @ (K @ jump)))
-    force = K @ u
-    corners = parted.sharp_corners
+    force = np.split(along[0] @ (K @ u), np.cumsum([len(s.nodes[1]) for s in sides])[:-1])
+    corners = body.sharp_corners
     found = []
-    for joint, side in zip(joints, sides, strict=True):
-        height, pressure = side.pressure(apart, force, joint)
-        place = np.column_stack([np.full(len(height), joint.radius), height])
+    for joint, side, push in zip(joints, sides, force, strict=True):
+        place, area, pressure = side.pressure(apart, push)
+        order = np.argsort(joint.height(place))
+        nodes = apart.points[side.faces].reshape(-1, apart.dimension)
+        clear = far_from(corners, nodes, 0.0).reshape(side.faces.shape).all(axis=1)
+        away = clear & far_from(corners, place, WITHOUT * joint.length)
         found.append(
             JointPressure(
-                height=height,
-                pressure=pressure,
-                away=far_from(corners, place, WITHOUT * joint.length),
-                force=float(force[2 * side.nodes[1]].sum()),
+                height=joint.height(place)[order],
+                pressure=pressure[order],
+                away=away[order] if away.any() else np.ones(len(order), dtype=bool),
+                area=float(area.sum()),
+                force=float(push.sum()),
             )
         )
     return PressedState(
         mesh=apart,
-        nodes=parted.nodes,
+        nodes=body.nodes,
         displacement=u,
         joints=tuple(found),
-        stress=parted.largest_stress(
+        stress=body.largest_stress(
             u, materials, corners, WITHOUT * min(joint.length for joint in joints)
         ),
     )
+
+
+def _require_all_pressed(
+    apart: Mesh, joints: Sequence[Joint], sides: Sequence["JointSides"]
+) -> None:
+    """Reject further faces of the parts of a joint, except across its axis, where none presses."""
+    for pair in apart.pairs.values():
+        own = [(j, s) for j, s in zip(joints, sides, strict=True) if {*j.solids} == {*pair.solids}]
+        for block in pair.first:
+            pressed = [np.isin(block.connectivity, s.nodes).all(axis=1) for _, s in own]
+            rest = FaceBlock(block.family, block.connectivity[~np.any(pressed, axis=0)])
+            normal = face_points(apart, rest)[3].reshape(-1, apart.dimension)
+            joint = own[0][0]
+            if np.any(np.abs(joint.height(normal)) < 1.0 - _LEVEL):
+                raise InputError(
+                    f"{joint.key}.{joint.name}",
+                    got="a part of the faces where '{}' and '{}' meet".format(*joint.solids),
+                    expected="a fit for all of them that are not at a right angle to the axis",
+                    hint="give all faces of one cylinder the same name, others a fit of their own.",
+                )
+
+
+def _tied(
+    mesh: Mesh, masters: Ints, slaves: Ints, normal: Floats, overlap: Floats
+) -> tuple[csr_array, Floats]:
+    r"""T (n_dof, n_dof) and b (n_dof,) of :math:`u = T q + b`, in which the joint has its jump.
+
+    Of every slave the largest part of its normal is eliminated; that column of T is empty.
+    """
+    d, count = mesh.dimension, len(slaves)
+    largest = np.abs(normal).argmax(axis=1)
+    at = np.arange(count)
+    gone = d * slaves + largest
+    jump = np.zeros(mesh.dof_count)
+    jump[gone] = overlap / normal[at, largest]
+    share = normal / normal[at, largest][:, None]
+    own = -share
+    own[at, largest] = 0.0
+    free = np.setdiff1d(np.arange(mesh.dof_count), gone)
+    each = np.arange(d)
+    row = np.concatenate([free, np.tile(np.repeat(gone, d), 2)])
+    column = np.concatenate(
+        [free, *((d * nodes[:, None] + each).ravel() for nodes in (masters, slaves))]
+    )
+    value = np.concatenate([np.ones(len(free)), share.ravel(), own.ravel()])
+    some = value != 0.0
+    return csr_array((value[some], (row[some], column[some])), shape=(mesh.dof_count,) * 2), jump
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -173,48 +239,77 @@ class PartedBody:
     parts
         Solids of each part; those that are glued to each other are one.
     stiffness (n_dof, n_dof) [N/m]
-    held
-        Degrees of freedom: on the axis, and along it at one node of each part, without force.
     """
 
     mesh: Mesh
-    nodes: NDArray[np.int64]
+    nodes: Ints
     parts: list[set[str]]
     sides: list["JointSides"]
     stiffness: csr_array
-    held: NDArray[np.int64]
 
     @classmethod
     def of(
         cls, mesh: Mesh, materials: Mapping[str, Material], joints: Sequence[Joint | FlatJoint]
     ) -> "PartedBody":
-        """Part a half section; edges of a joint are its node set of that name."""
-        parts = _glued_parts(mesh, joints)
-        apart, nodes = parts_apart(mesh, parts)
-        first = [
-            min(b.connectivity.min() for b in apart.blocks if b.solid in part) for part in parts
-        ]
+        """Part a mesh; edges or faces of a joint are its node set of that name."""
+        between = {" and ".join(sorted(j.solids)): _shared(mesh, *j.solids) for j in joints}
+        whole = replace(mesh, node_sets={**mesh.node_sets, **between})
+        apart, nodes = parted(whole, between, joints[0].key)
         return cls(
             mesh=apart,
             nodes=nodes,
-            parts=parts,
+            parts=_glued_parts(apart, joints),
             sides=[
-                JointSides.of(apart, nodes, joint, mesh.node_sets[joint.name]) for joint in joints
+                JointSides.of(
+                    apart.pairs[" and ".join(sorted(joint.solids))],
+                    nodes,
+                    joint,
+                    mesh.node_sets[joint.name],
+                )
+                for joint in joints
             ],
             stiffness=assemble(apart, materials)[0],
-            held=np.union1d(held_dofs(apart, np.empty(0, np.int64)), 2 * np.array(first) + 1),
+        )
+
+    def held(self, jumps: csr_array | None = None, free: csr_array | None = None) -> Ints:
+        """Degrees of freedom that hold the parts without force; also r on the axis.
+
+        Parameters
+        ----------
+        jumps (n, n_dof)
+            Motions that these rows see need no support; none: the parts are not connected.
+        free (n_dof, n_dof)
+            Its empty columns hold nothing.
+        """
+        d = self.mesh.dimension
+        whole = rigid_motions(self.mesh)
+        motions = np.zeros((self.mesh.dof_count, 0))
+        for part in self.parts:
+            own = np.unique(np.concatenate([nodes_of(self.mesh, solid) for solid in part]))
+            dofs = (d * own[:, None] + np.arange(d)).ravel()
+            of_part = np.zeros_like(whole)
+            of_part[dofs] = whole[dofs]
+            motions = np.hstack([motions, of_part])
+        if jumps is not None:
+            _, sizes, ways = np.linalg.svd(jumps @ motions, full_matrices=False)
+            motions = motions @ ways[sizes <= _STILL * np.sqrt(jumps.shape[0])].T
+        candidates = np.arange(len(motions))
+        if free is not None:
+            candidates = np.intersect1d(candidates, free.indices)
+        return np.union1d(
+            held_dofs(self.mesh, np.empty(0, np.int64)), held_best(motions, candidates)
         )
 
     @property
-    def sharp_corners(self) -> NDArray[np.float64]:
-        """Inner corners of parts, ends of joints where a part continues, shape (n, 2) [m]."""
+    def sharp_corners(self) -> Floats:
+        """Inner corners of parts, ends of joints where a part continues, shape (n, d) [m]."""
         return _sharp_corners(self.mesh, self.sides)
 
     def largest_stress(
         self,
-        u: NDArray[np.float64],
+        u: Floats,
         materials: Mapping[str, Material],
-        corners: NDArray[np.float64],
+        corners: Floats,
         around: float,
     ) -> dict[str, float]:
         """Largest equivalent stress of each solid [Pa], farther than ``around`` from corners."""
@@ -232,82 +327,69 @@ class PartedBody:
 class JointSides:
     """Nodes of both parts on a joint, in one order, and the sides of elements of the second."""
 
-    nodes: tuple[NDArray[np.int64], NDArray[np.int64]]
-    faces: NDArray[np.int64]
+    nodes: tuple[Ints, Ints]
+    faces: Ints
+    family: str
 
     @classmethod
     def of(
-        cls,
-        apart: Mesh,
-        nodes: NDArray[np.int64],
-        joint: Joint | FlatJoint,
-        shared: NDArray[np.int64],
+        cls, pair: FacePair, nodes: Ints, joint: Joint | FlatJoint, shared: Ints
     ) -> "JointSides":
         """Of the first and the second solid; ``shared`` are nodes of the glued mesh."""
-        first, second = (
-            own[np.isin(nodes[own], shared)]
-            for own in (nodes_of(apart, solid) for solid in joint.solids)
+        sides = [pair.first, pair.second]
+        if pair.solids != joint.solids:
+            sides.reverse()
+        (first,), (second,) = sides  # one family: drawn parts and STEP
+        here = np.isin(nodes[second.connectivity], shared).all(axis=1)
+        faces = second.connectivity[here]
+        own, at = np.unique(faces, return_index=True)
+        return cls(
+            nodes=(first.connectivity[here].ravel()[at], own), faces=faces, family=second.family
         )
-        sides = [
-            block.connectivity[:, list(face.nodes)]
-            for block in apart.blocks
-            if block.solid == joint.solids[1]
-            for face in block.topology.faces
-        ]
-        faces = np.vstack(sides)
-        return cls(nodes=(first, second), faces=faces[np.isin(faces, second).all(axis=1)])
 
     @property
-    def ends(self) -> NDArray[np.int64]:
-        """Places of the end nodes in :attr:`nodes`."""
-        node, count = np.unique(self.faces[:, :2], return_counts=True)
-        return np.searchsorted(self.nodes[1], node[count == 1])
+    def ends(self) -> Ints:
+        """Places of the corner nodes at the rim in :attr:`nodes`."""
+        of_face = FAMILIES[self.family].faces
+        ways = [f.nodes[:2] for f in of_face] or [(0,), (1,)]
+        rims = np.sort(np.vstack([self.faces[:, list(way)] for way in ways]), axis=1)
+        rim, count = np.unique(rims, axis=0, return_counts=True)
+        return np.searchsorted(self.nodes[1], np.unique(rim[count == 1]))
 
-    def pressure(
-        self, apart: Mesh, force: NDArray[np.float64], joint: Joint
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Height of the middle of each side [m], and its mean pressure [Pa] of these forces."""
-        z = apart.points[self.faces, 1]
-        area = 2.0 * np.pi * joint.radius * np.abs(z[:, 1] - z[:, 0])
+    def pressure(self, apart: Mesh, push: Floats) -> tuple[Floats, Floats, Floats]:
+        """Middle of each side (n, d) [m], its area [m^2] and mean pressure [Pa].
+
+        ``push`` are the forces along the normal at the nodes of the second part [N].
+        """
+        N, x, size, _ = face_points(apart, FaceBlock(self.family, self.faces))
         local = np.searchsorted(self.nodes[1], self.faces)
-        row, column = np.broadcast_arrays(local[:, :, None], local[:, None, :])
-        mass = coo_array(
-            ((area[:, None, None] * _LINE3).ravel(), (row.ravel(), column.ravel())),
-            shape=(len(self.nodes[1]),) * 2,
-        )
-        nodal = spsolve(mass.tocsc(), force[2 * self.nodes[1]])
-        order = np.argsort(z[:, 2])
-        return z[order, 2], (nodal[local] @ np.array([1.0, 1.0, 4.0]) / 6.0)[order]
+        along = np.broadcast_to(N, (len(local), *N.shape))
+        nodal = spsolve(over_faces([(local, along, size)], len(push), 1).tocsc(), push)
+        area = size.sum(axis=1)
+        mean = np.einsum("fq,qi,fi->f", size, N, nodal[local]) / area
+        return np.einsum("fq,fqa->fa", size, x) / area[:, None], area, mean
 
 
-def nodes_of(mesh: Mesh, solid: str) -> NDArray[np.int64]:
+def nodes_of(mesh: Mesh, solid: str) -> Ints:
     """Sorted nodes of a solid."""
     return np.unique(
         np.concatenate([b.connectivity.ravel() for b in mesh.blocks if b.solid == solid])
     )
 
 
-def _glued_parts(mesh: Mesh, joints: Sequence[Joint | FlatJoint]) -> list[set[str]]:
-    """Solids that share an edge, except those of a joint: glued to each other."""
-    pressed = [set(joint.solids) for joint in joints]
-    middles = {  # an edge has a middle, a corner that two solids share has none
-        solid: np.concatenate(
-            [
-                b.connectivity[:, b.topology.corners :].ravel()
-                for b in mesh.blocks
-                if b.solid == solid
-            ]
-        )
-        for solid in mesh.solids
-    }
-    parts = [{solid} for solid in mesh.solids]
-    for pair in map(set, combinations(mesh.solids, 2)):
-        a, b = pair
-        if pair not in pressed and np.isin(middles[a], middles[b]).any():
-            joined = [part for part in parts if part & pair]
-            parts = [part for part in parts if not part & pair] + [set().union(*joined)]
-    for joint, pair in zip(joints, pressed, strict=True):
-        if any(pair <= part for part in parts):
+def _shared(mesh: Mesh, one: str, two: str) -> Ints:
+    return np.intersect1d(nodes_of(mesh, one), nodes_of(mesh, two))
+
+
+def _glued_parts(apart: Mesh, joints: Sequence[Joint | FlatJoint]) -> list[set[str]]:
+    """Solids that still share nodes: glued to each other."""
+    parts = [{solid} for solid in apart.solids]
+    for one, two in combinations(apart.solids, 2):
+        if len(_shared(apart, one, two)):
+            joined = [part for part in parts if part & {one, two}]
+            parts = [part for part in parts if part not in joined] + [set().union(*joined)]
+    for joint in joints:
+        if any({*joint.solids} <= part for part in parts):
             raise InputError(
                 f"{joint.key}.{joint.name}",
                 got="'{}' and '{}', glued to each other by other parts".format(*joint.solids),
@@ -317,16 +399,15 @@ def _glued_parts(mesh: Mesh, joints: Sequence[Joint | FlatJoint]) -> list[set[st
     return parts
 
 
-def _sharp_corners(apart: Mesh, sides: Sequence[JointSides]) -> NDArray[np.float64]:
-    """Inner corners of the parts, and ends of joints where a part continues, shape (n, 2) [m]."""
+def _sharp_corners(apart: Mesh, sides: Sequence[JointSides]) -> Floats:
+    """Inner corners of the parts, and ends of joints where a part continues, shape (n, d) [m]."""
     around = np.zeros(apart.node_count)
     for block in apart.blocks:
-        corner = block.connectivity[:, : block.topology.corners]
-        x = apart.points[corner]
-        before, after = (np.roll(x, by, axis=1) - x for by in (1, -1))
-        cross = after[..., 0] * before[..., 1] - after[..., 1] * before[..., 0]
-        np.add.at(around, corner, np.arctan2(cross, np.sum(before * after, axis=-1)))
-    own = np.flatnonzero((around > _SHARP) & (around < 2.0 * np.pi - 1e-6))
+        angle = _solid_angles if apart.dimension == 3 else _angles
+        np.add.at(
+            around, block.connectivity[:, : block.topology.corners], angle(apart.points, block)
+        )
+    own = np.flatnonzero((around > _SHARP) & (around < 1.0 - 1e-6))
     ends = [
         side.nodes[1][k]
         for side in sides
@@ -336,9 +417,36 @@ def _sharp_corners(apart: Mesh, sides: Sequence[JointSides]) -> NDArray[np.float
     return apart.points[np.concatenate([own, np.array(ends, dtype=np.int64)])]
 
 
-def far_from(
-    corners: NDArray[np.float64], points: NDArray[np.float64], radius: float
-) -> NDArray[np.bool_]:
+def _angles(points: Floats, block: ElementBlock) -> Floats:
+    """Angle of each plane element at its corners, over the full one."""
+    x = points[block.connectivity[:, : block.topology.corners]]
+    before, after = (np.roll(x, by, axis=1) - x for by in (1, -1))
+    cross = after[..., 0] * before[..., 1] - after[..., 1] * before[..., 0]
+    return np.asarray(np.arctan2(cross, np.sum(before * after, axis=-1)) / (2.0 * np.pi))
+
+
+def _solid_angles(points: Floats, block: ElementBlock) -> Floats:
+    """Solid angle of each tet10 between its curved edges at its corners, over the full one.
+
+    Van Oosterom & Strackee 1983.
+    """
+    x = points[block.connectivity]
+    result = np.zeros((len(x), block.topology.corners))
+    for corner in range(block.topology.corners):
+        ways = []
+        for k, edge in enumerate(block.topology.edges):
+            if corner in edge:
+                other = edge[1] if edge[0] == corner else edge[0]
+                way = 4.0 * x[:, block.topology.corners + k] - 3.0 * x[:, corner] - x[:, other]
+                ways.append(way / np.linalg.norm(way, axis=1)[:, None])
+        a, b, c = ways
+        volume = np.abs(np.einsum("ei,ei->e", a, np.cross(b, c)))
+        cosines = [np.einsum("ei,ei->e", p, q) for p, q in ((a, b), (b, c), (c, a))]
+        result[:, corner] = np.arctan2(volume, 1.0 + np.add.reduce(cosines)) / (2.0 * np.pi)
+    return result
+
+
+def far_from(corners: Floats, points: Floats, radius: float) -> NDArray[np.bool_]:
     """Which points are farther from all corners than the radius; all where none is."""
     if not len(corners):
         return np.ones(len(points), dtype=bool)
