@@ -18,6 +18,7 @@ rejected.
 
 import warnings
 from dataclasses import dataclass
+from math import floor
 
 import numpy as np
 from numpy.typing import NDArray
@@ -120,9 +121,9 @@ def consistent_law(static: StaticContact, modal_compliance: float) -> LocalLaw:
     lowest = float(min(share.min(), tangent_share.min()))
     if lowest < _FAIR_SHARE:
         warnings.warn(
-            f"contact: only {100 * lowest:.2g} % of the static compliance is left to the "
-            f"local law at its lowest point ({100 * _FAIR_SHARE:.0f} % or more is safe). Keep "
-            "fewer modes, or only those with a high static participation.",
+            f"contact: only {floor(1000 * lowest) / 10:g} % of the static compliance is left to "
+            f"the local law at its lowest point ({100 * _FAIR_SHARE:.0f} % or more is safe). Keep "
+            "fewer modes; where a doubt asks for more of them, neither helps, but level interface.",
             AccuracyWarning,
             stacklevel=2,
         )

@@ -1015,11 +1015,12 @@ class SceneView {
 
   // what klack inspect tells of a body; its surfaces stand in the list of names
   aboutBody(body) {
+    const several = body.packed.rows.filter(([what]) => what === 'solid').length > 1;  // one may have the name of its body
     const list = rows => {
       const node = el('dl');
       for (const [what, name, content] of rows) {
         const kind = what === 'solid' && /mm(³|\^3)/.test(content) ? 'volume' : what;
-        node.append(el('dt', {text: name && name !== body.name ? `${kind} ${name}` : kind}), el('dd', {text: content || name}));
+        node.append(el('dt', {text: name && (several || name !== body.name) ? `${kind} ${name}` : kind}), el('dd', {text: content || name}));
       }
       return node;
     };

@@ -83,6 +83,7 @@ def run_three_bodies(case: Case, *, progress: Progress, threads: int | None = No
         warnings=(
             *dict.fromkeys(map(_at_section, notes)),
             *filter(None, (joint.opening_doubt for joint in bolts)),
+            *_early_opening(row, results[_LEVEL]),
             *trust_notes(results, _LEVEL, {}),
         ),
         estimate_doubt=_NO_ESTIMATE,
@@ -179,6 +180,24 @@ def _doubts(
             highest = (float(body.frequencies.max(initial=0.0)) for body in kept)
             if doubt := flat_doubt(case, pair, contact.closing, highest):
                 yield f"{surfaces}: {doubt}"
+
+
+def _early_opening(row: BodyRow, level: LevelResult) -> Iterator[str]:
+    """A contact below that opens before the kept modes can have carried the blow to it."""
+    below = level.backing
+    assert below is not None
+    pair = row.contact(BACKING).pair
+    highest = float(row.valve.reduced[pair.upper.name].frequencies.max(initial=0.0))
+    touched = float(level.history.edges[np.argmax(level.history.force > 0.0)])
+    after = below.lift_off - touched
+    if highest * after < 1.0:  # False for nan: it stays closed
+        yield (
+            f"{below.surfaces} opens {format_si(after, 's', 2)} after the needle touches, within "
+            f"the shortest period of the kept modes of '{pair.upper.name}' "
+            f"({format_si(1.0 / highest, 's', 2)}): so early the modes that are left out decide, and "
+            f"the time of opening is known to that period. Try: more modes "
+            f"(reduction.modes.{pair.upper.name}), and compare."
+        )
 
 
 def _bodies(row: BodyRow) -> tuple[BodySummary, ...]:
