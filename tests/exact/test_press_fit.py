@@ -19,12 +19,13 @@ from klack.bodies.elasticity.stress import work_of_stress
 from klack.errors import InputError
 from klack.exchange.calculix_run import find_calculix
 from klack.materials.material import Material
-from klack.mesh.joint import cylinder_joint, solid_joint
+from klack.mesh.joint import cylinder_joint
 from klack.mesh.meridian import mesh_meridian
 from klack.mesh.profile import Line, Profile
 from klack.mesh.rigid import Pose
 from klack.mesh.sizing import MeshSizing
 from klack.mesh.solid import mesh_step, write_step_revolved
+from klack.mesh.solid_joint import solid_joint
 from klack.verification.lattice import STEEL, lattice_mesh
 
 IRON = Material(name="iron", young=120e9, poisson=0.25, density=7300.0)

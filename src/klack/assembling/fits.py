@@ -17,10 +17,11 @@ from klack.case.geometry import StepFile
 from klack.case.placed_errors import tells_place
 from klack.errors import InputError
 from klack.materials.material import Material
-from klack.mesh.joint import Joint, cylinder_joint, solid_joint
+from klack.mesh.joint import Joint, cylinder_joint
 from klack.mesh.mesh import Mesh
 from klack.mesh.profile import Profile
 from klack.mesh.sizing import MeshSizing
+from klack.mesh.solid_joint import solid_joint
 from klack.mesh.step_content import step_content
 from klack.units import format_si
 

@@ -194,8 +194,8 @@ def _early_opening(row: BodyRow, level: LevelResult) -> Iterator[str]:
         yield (
             f"{below.surfaces} opens {format_si(after, 's', 2)} after the needle touches, within "
             f"the shortest period of the kept modes of '{pair.upper.name}' "
-            f"({format_si(1.0 / highest, 's', 2)}): so early the modes that are left out decide, and "
-            f"the time of opening is known to that period. Try: more modes "
+            f"({format_si(1.0 / highest, 's', 2)}): so early the modes that are left out decide, "
+            f"and the time of opening is known to that period. Try: more modes "
             f"(reduction.modes.{pair.upper.name}), and compare."
         )
 
