@@ -338,6 +338,7 @@ def test_parameters_and_parts_of_a_case_are_shown(capsys, tmp_path):
     for words in (
         "parameter lift 80 um, a length",
         "injector3_magnet.time[2] 900 us, from '= 500 us + delay'",
+        "injector1_face.area 1.130973 mm^2, from '= pi/4 * d_seat^2'",
         "component injector4_nozzle seat, components.nozzle of injector.yaml",
         "connection 1 supply.b, rail.fluid, injector1_bore.a, injector2_bore.a",
     ):

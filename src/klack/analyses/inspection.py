@@ -37,7 +37,7 @@ from klack.mesh.moments import Moments
 from klack.mesh.profile import Profile
 from klack.mesh.quality import corner_moments, corner_volume, mesh_summary
 from klack.mesh.step_content import StepContent, StepPart, step_content
-from klack.units import format_si, parse_quantity
+from klack.units import format_in, format_si, parse_quantity, takes_prefix, unit_in
 
 __all__ = [
     "INSPECTED",
@@ -100,7 +100,10 @@ def _value(case: CaseFile, found: ExpandedCase, key: Key) -> str:
         node, field = written_at(found.data, key), None
     kind = kind_at(node, field)
     if isinstance(node, float | int) and kind is not None:
-        node = format_si(float(node), kind.unit, 7)
+        if takes_prefix(kind.unit):
+            node = format_si(float(node), kind.unit, 7)
+        else:  # as the field writes it: mm^2, g, degC
+            node = format_in(float(node), *unit_in(kind.example, kind), 7)
     elif isinstance(node, Computed):
         return str(node)
     return f"{node}, from '{found.expressions[key].text}'"
