@@ -1013,7 +1013,7 @@ class SceneView {
     }
   }
 
-  // what klack inspect tells of a body; its surfaces stand in the list of names
+  // what klack inspect prints about a body; its surfaces stand in the list of names
   aboutBody(body) {
     const several = body.packed.rows.filter(([what]) => what === 'solid').length > 1;  // one may have the name of its body
     const list = rows => {
