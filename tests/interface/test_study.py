@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import klack
-from klack.analyses.study.analysis import study_to_json
+from klack.analyses.study.analysis import STUDY as ANALYSIS
 from klack.analyses.study.asked_points import PointRow, PointSteps, groups_of
 from klack.analyses.study.evaluation import KeptPoint, point_key
 from klack.analyses.study.kinds import ask
@@ -197,7 +197,7 @@ class TestSteps:
         steps = columns(record, "parameters")["run.step"]
         np.testing.assert_array_equal(record.halvings > 0.0, steps == 200e-9)
         assert (record.step_changes <= 0.5).all()
-        found = study_to_json(record)
+        found = ANALYSIS.to_json(record)
         assert found["halvings"] == record.halvings.tolist()
         assert found["step_changes"] == record.step_changes.tolist()
         (told,) = steps_texts(record)

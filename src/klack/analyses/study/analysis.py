@@ -3,27 +3,15 @@
 ``result.zarr/study/measures/0/values`` holds one number per point.
 """
 
-from collections.abc import Iterator
-from typing import Annotated, Any, Literal
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
-from pydantic import Field
-from typing_extensions import TypedDict
 
 from klack.analyses.analysis import StoredAnalysis
-from klack.analyses.json_parts import Real, Version
-from klack.analyses.measures import number_or_none
+from klack.analyses.json_parts import CASE, JsonForm, Key, Real, schema_key
 from klack.analyses.store import RecordFormat
-from klack.analyses.study.record import (
-    MissedBound,
-    Optimum,
-    Screening,
-    Sensitivity,
-    StudyColumn,
-    StudyRecord,
-    StudySurrogate,
-    SurrogateEffect,
-)
+from klack.analyses.study.record import Optimum, StudyColumn, StudyRecord, SurrogateEffect
 from klack.analyses.study.wording import (
     EFFECT_COLUMNS,
     MISSED_COLUMNS,
@@ -42,263 +30,189 @@ from klack.analyses.study.wording import (
 )
 from klack.terminal.tables import TextTable
 
-__all__ = ["STUDY", "study_to_json"]
+__all__ = ["STUDY"]
 
 
-class StudyColumnJson(TypedDict):
-    """A parameter, what follows from parameters, or a measure, at every point."""
-
-    unit: Annotated[str, Field(description="SI; 1 for a pure number, empty for words.")]
-    spread: Annotated[str, Field(description="How it varies, or its expression.")]
-    today: Annotated[Real, Field(description="In the case without changes.")]
-    values: Annotated[list[Real | str], Field(description="One for each point.")]
+def _by_parameter(item: Any) -> dict[str, Any]:
+    return {name: (item, k) for k, name in enumerate(item.parameters)}
 
 
-class IndexJson(TypedDict):
-    """Share of the variance of a measure that a parameter causes."""
-
-    first: Annotated[Real, Field(description="Alone.")]
-    first_low: Real
-    first_high: Real
-    total: Annotated[Real, Field(description="With interactions.")]
-    total_low: Real
-    total_high: Real
+def _of_parameter(name: str) -> Callable[[Any], Any]:
+    """Reads the number of one parameter from an item and its index."""
+    return lambda pair: getattr(pair[0], name)[pair[1]]
 
 
-class EffectJson(TypedDict):
-    """Elementary effects of a parameter on a measure, over its whole range."""
-
-    size: Annotated[Real, Field(description="Mean of their sizes, mu*.")]
-    size_error: Annotated[Real, Field(description="Its standard error.")]
-    mean: Annotated[Real, Field(description="Mean with their signs, mu.")]
-    scatter: Annotated[Real, Field(description="Standard deviation, sigma.")]
-    effects: Annotated[int, Field(description="How many.")]
+def _in_words(item: StudyColumn | SurrogateEffect, values: np.ndarray) -> Any:
+    return [item.words[int(value)] for value in values] if item.words else values
 
 
-class SurrogateEffectJson(TypedDict):
-    """Mean of a surrogate over all parameters but one."""
+_COLUMN = JsonForm(
+    "StudyColumnJson",
+    "A parameter, what follows from parameters, or a measure, at every point.",
+    Key("unit", str, "SI; 1 for a pure number, empty for words."),
+    Key("spread", str, "How it varies, or its expression."),
+    Key("today", Real, "In the case without changes."),
+    Key(
+        "values", list[Real | str], "One for each point.", lambda item: _in_words(item, item.values)
+    ),
+)
+_INDEX = JsonForm(
+    "IndexJson",
+    "Share of the variance of a measure that a parameter causes.",
+    *(
+        Key(name, Real, words, _of_parameter(name))
+        for name, words in (
+            ("first", "Alone."),
+            ("first_low", ""),
+            ("first_high", ""),
+            ("total", "With interactions."),
+            ("total_low", ""),
+            ("total_high", ""),
+        )
+    ),
+)
+_EFFECT = JsonForm(
+    "EffectJson",
+    "Elementary effects of a parameter on a measure, over its whole range.",
+    Key("size", Real, "Mean of their sizes, mu*.", _of_parameter("size")),
+    Key("size_error", Real, "Its standard error.", _of_parameter("size_error")),
+    Key("mean", Real, "Mean with their signs, mu.", _of_parameter("mean")),
+    Key("scatter", Real, "Standard deviation, sigma.", _of_parameter("scatter")),
+    Key("effects", int, "How many.", lambda pair: int(pair[0].effects[pair[1]])),
+)
+_SURROGATE_EFFECT = JsonForm(
+    "SurrogateEffectJson",
+    "Mean of a surrogate over all parameters but one.",
+    Key(
+        "at",
+        list[Real | str],
+        "Values of the parameter, SI, or words.",
+        lambda item: _in_words(item, item.at),
+    ),
+    Key("mean", list[Real], "In the unit of the measure."),
+)
+_SURROGATE = JsonForm(
+    "SurrogateJson",
+    "Function fitted to the points of a measure; it replaces no computed value.",
+    Key("kind", str),
+    Key("made_of", str),
+    Key("points", int, "Different points that it was fitted to."),
+    Key("failed", int, "Points without a value, left out."),
+    Key("repeated", int, "Points that repeat another one, left out."),
+    Key("predictivity", Real, "Q2, each point predicted from the others."),
+    Key("error", Real, "Root mean square of the leave-one-out residuals."),
+    Key("largest_error", Real, "The largest of them, without sign.", "largest"),
+    Key("residuals", list[Real], "Value minus prediction from the other points."),
+    Key("reason", str, "Why nothing follows from it; empty if it does."),
+    Key(
+        "shares",
+        {str: _INDEX},
+        "Sobol's indices, and how far the error can move them.",
+        lambda item: {} if item.reason else _by_parameter(item),
+    ),
+    Key(
+        "effects",
+        {str: _SURROGATE_EFFECT},
+        "By parameter.",
+        lambda item: {of.parameter: of for of in item.effects},
+    ),
+)
+_MISSED = JsonForm(
+    "MissedBoundJson",
+    "How often drawn points miss a bound.",
+    Key("bound", str),
+    Key("missed", int),
+    Key("points", int, "With a value."),
+    Key("failed", int, "Without."),
+    Key("probability", Real),
+    Key("low", Real, "Of the interval of 95 %."),
+    Key("high", Real),
+    Key("at_most", Real, "One-sided bound of 95 %."),
+)
+_OPTIMUM = JsonForm(
+    "OptimumJson",
+    "What a search has found.",
+    Key("algorithm", str),
+    Key(
+        "objectives",
+        dict[str, str],
+        "Measure: minimise or maximise.",
+        lambda found: dict(zip(found.objectives, found.ways, strict=True)),
+    ),
+    Key("bounds", list[str]),
+    Key("kept", list[bool], "Whether each point keeps all bounds."),
+    Key("front", list[int], "Points that no other one beats."),
+    Key(
+        "best",
+        int | None,
+        "Point of the front nearest to the ideal one.",
+        lambda found: found.best if found.best >= 0 else None,
+    ),
+    Key("feasible", bool, "Whether any point keeps all bounds."),
+)
 
-    at: Annotated[list[Real | str], Field(description="Values of the parameter, SI, or words.")]
-    mean: Annotated[list[Real], Field(description="In the unit of the measure.")]
+
+def _columns(of: str) -> Key:
+    return Key(
+        of, {str: _COLUMN}, of=lambda record: {item.name: item for item in getattr(record, of)}
+    )
 
 
-class SurrogateJson(TypedDict):
-    """Function fitted to the points of a measure; it replaces no computed value."""
+def _shares(of: str, form: JsonForm, words: str) -> Key:
+    def found(record: StudyRecord) -> dict[str, Any]:
+        return {item.measure: _by_parameter(item) for item in getattr(record, of)}
 
-    kind: str
-    made_of: str
-    points: Annotated[int, Field(description="Different points that it was fitted to.")]
-    failed: Annotated[int, Field(description="Points without a value, left out.")]
-    repeated: Annotated[int, Field(description="Points that repeat another one, left out.")]
-    predictivity: Annotated[Real, Field(description="Q2, each point predicted from the others.")]
-    error: Annotated[Real, Field(description="Root mean square of the leave-one-out residuals.")]
-    largest_error: Annotated[Real, Field(description="The largest of them, without sign.")]
-    residuals: Annotated[
-        list[Real], Field(description="Value minus prediction from the other points.")
-    ]
-    reason: Annotated[str, Field(description="Why nothing follows from it; empty if it does.")]
-    shares: Annotated[
-        dict[str, IndexJson],
-        Field(description="Sobol's indices, and how far the error can move them."),
-    ]
-    effects: Annotated[dict[str, SurrogateEffectJson], Field(description="By parameter.")]
+    return Key(of, {str: {str: form}}, words, found)
 
 
-class MissedBoundJson(TypedDict):
-    """How often drawn points miss a bound."""
-
-    bound: str
-    missed: int
-    points: Annotated[int, Field(description="With a value.")]
-    failed: Annotated[int, Field(description="Without.")]
-    probability: Real
-    low: Annotated[Real, Field(description="Of the interval of 95 %.")]
-    high: Real
-    at_most: Annotated[Real, Field(description="One-sided bound of 95 %.")]
-
-
-class OptimumJson(TypedDict):
-    """What a search has found."""
-
-    algorithm: str
-    objectives: Annotated[dict[str, str], Field(description="Measure: minimise or maximise.")]
-    bounds: list[str]
-    kept: Annotated[list[bool], Field(description="Whether each point keeps all bounds.")]
-    front: Annotated[list[int], Field(description="Points that no other one beats.")]
-    best: Annotated[int | None, Field(description="Point of the front nearest to the ideal one.")]
-    feasible: Annotated[bool, Field(description="Whether any point keeps all bounds.")]
-
-
-class StudyJson(TypedDict):
-    """``klack study``."""
-
-    schema: Literal["klack-study/1"]
-    case: str
-    klack: Version
-    variant: Annotated[
-        str, Field(description="Of the stroke; of an impact its level, 'shots', or both.")
-    ]
-    model: Annotated[str, Field(description="Of impact and shots: modes, law and meshes.")]
-    design: str
-    points: int
-    failed: int
-    parameters: dict[str, StudyColumnJson]
-    linked: dict[str, StudyColumnJson]
-    measures: dict[str, StudyColumnJson]
-    sensitivities: Annotated[
-        dict[str, dict[str, IndexJson]],
-        Field(description="Sobol's indices by measure and parameter, of Saltelli's design."),
-    ]
-    screenings: Annotated[
-        dict[str, dict[str, EffectJson]],
-        Field(description="Elementary effects by measure and parameter, of Morris's design."),
-    ]
-    surrogates: Annotated[dict[str, SurrogateJson], Field(description="By measure.")]
-    missed_bounds: Annotated[
-        list[MissedBoundJson], Field(description="Of drawn points, for each bound.")
-    ]
-    optimum: Annotated[OptimumJson | None, Field(description="Of klack optimise.")]
-    failures: Annotated[list[str], Field(description="Empty where a point was computed.")]
-    notes: Annotated[list[str], Field(description="Doubts about the numbers of each point.")]
-    halvings: Annotated[
-        list[Real], Field(description="How often all steps of each stroke were halved.")
-    ]
-    step_changes: Annotated[
+_STUDY = JsonForm(
+    "StudyJson",
+    "``klack study``.",
+    schema_key("klack-study/1"),
+    *CASE,
+    Key("variant", str, "Of the stroke; of an impact its level, 'shots', or both."),
+    Key("model", str, "Of impact and shots: modes, law and meshes."),
+    Key("design", str),
+    Key("points", int, of="count"),
+    Key("failed", int, of=lambda record: int(record.failed.sum())),
+    _columns("parameters"),
+    _columns("linked"),
+    _columns("measures"),
+    _shares(
+        "sensitivities",
+        _INDEX,
+        "Sobol's indices by measure and parameter, of Saltelli's design.",
+    ),
+    _shares(
+        "screenings",
+        _EFFECT,
+        "Elementary effects by measure and parameter, of Morris's design.",
+    ),
+    Key(
+        "surrogates",
+        {str: _SURROGATE},
+        "By measure.",
+        lambda record: {item.measure: item for item in record.surrogates},
+    ),
+    Key("missed_bounds", [_MISSED], "Of drawn points, for each bound.", "missed"),
+    Key("optimum", (_OPTIMUM, None), "Of klack optimise."),
+    Key("failures", list[str], "Empty where a point was computed."),
+    Key("notes", list[str], "Doubts about the numbers of each point."),
+    Key("halvings", list[Real], "How often all steps of each stroke were halved."),
+    Key(
+        "step_changes",
         list[Real],
-        Field(
-            description="Largest change of the impacts that the measures of a stroke depend on, "
-            "with all steps twice as long, over what the accuracy promises: certified up to 0.5; "
-            "null where nothing was checked, or an impact has no counterpart."
-        ),
-    ]
-    wall_time_s: Real
-    point_time_s: Real
-    computed: Annotated[int, Field(description="Points computed now.")]
-    kept: Annotated[int, Field(description="Points that an earlier run had left.")]
-    threads: Annotated[int, Field(description="Points that were computed at a time.")]
-    workers: Annotated[str, Field(description="What computed them: threads, processes, ...")]
-
-
-def study_to_json(record: StudyRecord) -> StudyJson:
-    """Numbers of a study, SI."""
-    return {
-        "schema": "klack-study/1",
-        "case": record.case,
-        "klack": record.version,
-        "variant": record.variant,
-        "model": record.model,
-        "design": record.design,
-        "points": record.count,
-        "failed": int(record.failed.sum()),
-        "parameters": {item.name: _column(item) for item in record.parameters},
-        "linked": {item.name: _column(item) for item in record.linked},
-        "measures": {item.name: _column(item) for item in record.measures},
-        "sensitivities": {
-            item.measure: {name: _indices(item, k) for k, name in enumerate(item.parameters)}
-            for item in record.sensitivities
-        },
-        "screenings": {
-            item.measure: {name: _effects(item, k) for k, name in enumerate(item.parameters)}
-            for item in record.screenings
-        },
-        "surrogates": {item.measure: _surrogate(item) for item in record.surrogates},
-        "missed_bounds": [_missed(item) for item in record.missed],
-        "optimum": None if record.optimum is None else _optimum(record.optimum),
-        "failures": list(record.failures),
-        "notes": list(record.notes),
-        "halvings": list(map(number_or_none, record.halvings)),
-        "step_changes": list(map(number_or_none, record.step_changes)),
-        "wall_time_s": record.wall_time,
-        "point_time_s": record.point_time,
-        "computed": record.computed,
-        "kept": record.kept,
-        "threads": record.threads,
-        "workers": record.workers,
-    }
-
-
-def _effects(item: Screening, k: int) -> EffectJson:
-    return {
-        "size": number_or_none(item.size[k]),
-        "size_error": number_or_none(item.size_error[k]),
-        "mean": number_or_none(item.mean[k]),
-        "scatter": number_or_none(item.scatter[k]),
-        "effects": int(item.effects[k]),
-    }
-
-
-def _missed(item: MissedBound) -> MissedBoundJson:
-    return {
-        "bound": item.bound,
-        "missed": item.missed,
-        "points": item.points,
-        "failed": item.failed,
-        "probability": number_or_none(item.probability),
-        "low": number_or_none(item.low),
-        "high": number_or_none(item.high),
-        "at_most": number_or_none(item.at_most),
-    }
-
-
-def _optimum(found: Optimum) -> OptimumJson:
-    return {
-        "algorithm": found.algorithm,
-        "objectives": dict(zip(found.objectives, found.ways, strict=True)),
-        "bounds": list(found.bounds),
-        "kept": found.kept.tolist(),
-        "front": found.front.tolist(),
-        "best": found.best if found.best >= 0 else None,
-        "feasible": found.feasible,
-    }
-
-
-def _surrogate(item: StudySurrogate) -> SurrogateJson:
-    return {
-        "kind": item.kind,
-        "made_of": item.made_of,
-        "points": item.points,
-        "failed": item.failed,
-        "repeated": item.repeated,
-        "predictivity": number_or_none(item.predictivity),
-        "error": number_or_none(item.error),
-        "largest_error": number_or_none(item.largest),
-        "residuals": [number_or_none(value) for value in item.residuals],
-        "reason": item.reason,
-        "shares": {}
-        if item.reason
-        else {name: _indices(item, k) for k, name in enumerate(item.parameters)},
-        "effects": {of.parameter: _effect_curve(of) for of in item.effects},
-    }
-
-
-def _effect_curve(item: SurrogateEffect) -> SurrogateEffectJson:
-    at: list[Any] = item.at.tolist()
-    if item.words:
-        at = [item.words[int(value)] for value in item.at]
-    return {"at": at, "mean": item.mean.tolist()}
-
-
-def _indices(item: Sensitivity | StudySurrogate, k: int) -> IndexJson:
-    return {
-        "first": number_or_none(item.first[k]),
-        "first_low": number_or_none(item.first_low[k]),
-        "first_high": number_or_none(item.first_high[k]),
-        "total": number_or_none(item.total[k]),
-        "total_low": number_or_none(item.total_low[k]),
-        "total_high": number_or_none(item.total_high[k]),
-    }
-
-
-def _column(item: StudyColumn) -> StudyColumnJson:
-    values: list[Any] = [number_or_none(value) for value in item.values]
-    if item.words:
-        values = [item.words[int(value)] for value in item.values]
-    return {
-        "unit": item.unit,
-        "spread": item.spread,
-        "today": number_or_none(item.today),
-        "values": values,
-    }
+        "Largest change of the impacts that the measures of a stroke depend on, "
+        "with all steps twice as long, over what the accuracy promises: certified up to 0.5; "
+        "null where nothing was checked, or an impact has no counterpart.",
+    ),
+    Key("wall_time_s", Real, of="wall_time"),
+    Key("point_time_s", Real, of="point_time"),
+    Key("computed", int, "Points computed now."),
+    Key("kept", int, "Points that an earlier run had left."),
+    Key("threads", int, "Points that were computed at a time."),
+    Key("workers", str, "What computed them: threads, processes, ..."),
+)
 
 
 def study_told(record: StudyRecord) -> Iterator[TextTable | str]:
@@ -398,8 +312,8 @@ STUDY = StoredAnalysis(
         name="klack study of points", version=1, kind=StudyRecord, command="klack study", units={}
     ),
     page="study.content:study_content",
-    json=StudyJson,
-    to_json=study_to_json,
+    json=_STUDY.type,
+    to_json=_STUDY.json,
     told=study_told,
 )
 """Record of ``klack study``."""
