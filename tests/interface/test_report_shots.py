@@ -23,7 +23,7 @@ from klack.analyses.shots.analysis import SHOTS
 from klack.analyses.shots.content import shots_content
 from klack.analyses.shots.figures import distribution_chart
 from klack.analyses.shots.record import RuleVerdict, ShotColumns, ShotsStudy, ShotTraces
-from klack.analyses.stroke_shots.analysis import STROKE_SHOTS, stroke_shots_to_json
+from klack.analyses.stroke_shots.analysis import STROKE_SHOTS
 from klack.analyses.stroke_shots.record import (
     StopColumns,
     StrokeColumns,
@@ -542,7 +542,7 @@ def test_the_answers_are_those_of_the_numbers():
 
 
 def test_json_is_that_of_its_schema():
-    numbers = json.loads(json.dumps(stroke_shots_to_json(study_report())))
+    numbers = json.loads(json.dumps(STROKE_SHOTS.to_json(study_report())))
 
     require_documented(numbers)
     dry = numbers["variants"]["dry"]
@@ -579,7 +579,7 @@ def test_strokes_without_an_impact_leave_a_report(missing):
 
     assert "strokes, in a row" in content.subtitle
     assert render_pdf(content).startswith(b"%PDF")
-    json.dumps(stroke_shots_to_json(study_report(variants={"dry": shots})), allow_nan=False)
+    json.dumps(STROKE_SHOTS.to_json(study_report(variants={"dry": shots})), allow_nan=False)
 
 
 def test_a_dataset_has_every_stroke_and_the_centred_one_last():

@@ -13,7 +13,7 @@ import pytest
 from same_shots import ROUND_OFF, columns_of, same
 from scipy import stats
 
-from klack.analyses.shots.analysis import SHOTS, shots_to_json
+from klack.analyses.shots.analysis import SHOTS
 from klack.analyses.shots.content import shots_content
 from klack.analyses.shots.draw import centric_draw, draw_shot
 from klack.analyses.shots.model import build_shots
@@ -204,7 +204,7 @@ def test_two_processes_and_the_log_give_the_same_shots(rubbing, tmp_path):
 
 @pytest.mark.slow
 def test_the_columns_are_in_json_measures_and_report(study):
-    data = shots_to_json(study)
+    data = SHOTS.to_json(study)
     drawn = [shot["contact_friction"] for shot in data["shots"]]
     assert drawn == [draw_shot(case(UNIFORM), 1, index, 0.0).contact_friction for index in (0, 1)]
     assert data["centric"]["contact_friction"] == 0.125

@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 import klack
-from klack.analyses.shots.analysis import shots_to_json
+from klack.analyses.shots.analysis import SHOTS
 from klack.analyses.shots.model import build_shots
 from klack.analyses.shots.one_shot import shot_log
 from klack.analyses.shots.record import RESULTS, ShotColumns
@@ -108,7 +108,7 @@ def test_every_point_has_the_bits_of_klack_shots(needle, tmp_path):
         single = run_shots(changed(needle, row), workers=1)
         for name, values in columns(record).items():
             assert values[i] == by_hand(single, name), name
-        moments = shots_to_json(single)["distribution"]["restitution"]
+        moments = SHOTS.to_json(single)["distribution"]["restitution"]
         assert moments["standard_error"] == columns(record)["shots.restitution.standard_error"][i]
     assert record.model.startswith("shots at the interface level, 6 + 6 modes; needle ")
 

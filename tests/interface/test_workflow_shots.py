@@ -16,7 +16,6 @@ from klack.analyses.shots.analysis import (
     DISTRIBUTION_COLUMNS,
     SHOTS,
     distribution_rows,
-    shots_to_json,
 )
 from klack.analyses.shots.draw import centric_draw, draw_shot
 from klack.analyses.shots.model import build_shots
@@ -231,7 +230,7 @@ def test_a_study_comes_back_from_disk(study, tmp_path: Path):
 
 
 def test_numbers_for_scripts(study):
-    data = shots_to_json(study)
+    data = SHOTS.to_json(study)
 
     assert data["seed"] == 1
     assert len(data["shots"]) == 4

@@ -4,14 +4,10 @@
 """
 
 from collections.abc import Iterator
-from typing import Annotated, Any, Literal, cast
-
-from pydantic import Field
-from typing_extensions import TypedDict
+from typing import Any
 
 from klack.analyses.analysis import Measured, StoredAnalysis
-from klack.analyses.json_parts import Real, Version
-from klack.analyses.measures import json_of, number_or_none, with_measures
+from klack.analyses.json_parts import CASE, JsonForm, Key, Real, measured_keys, schema_key
 from klack.analyses.run_columns import told_value
 from klack.analyses.sample import STATISTICS, moments
 from klack.analyses.shots.record import (
@@ -23,7 +19,7 @@ from klack.analyses.shots.record import (
 from klack.analyses.store import RecordFormat
 from klack.terminal.tables import TextTable
 
-__all__ = ["DISTRIBUTION_COLUMNS", "SHOTS", "distribution_rows", "shots_to_json"]
+__all__ = ["DISTRIBUTION_COLUMNS", "SHOTS", "distribution_rows"]
 
 
 _TOLD = tuple(
@@ -37,74 +33,41 @@ DISTRIBUTION_COLUMNS = (
 )
 
 
-@with_measures(SHOT_MEASURES)
-class ShotJson(TypedDict):
-    """One shot."""
+def _distribution(study: ShotsStudy) -> dict[str, Any]:
+    return {m.json_key: moments(getattr(study.shots, m.key)) for m in FIRST_IMPACT}
 
 
-@with_measures(RULE_MEASURES)
-class HighestRuleJson(TypedDict):
-    """Highest rebound against the centred shot."""
-
-    holds: bool
-    sentence: str
-
-
-class ShotsJson(TypedDict):
-    """``klack shots``."""
-
-    schema: Literal["klack-shots/1"]
-    case: str
-    klack: Version
-    seed: int
-    centric: Annotated[ShotJson, Field(description="The centred shot.")]
-    shots: list[ShotJson]
-    highest: Annotated[int, Field(description="Index of the highest rebound.")]
-    distribution: Annotated[
+_SHOT = JsonForm("ShotJson", "One shot.", *measured_keys(SHOT_MEASURES))
+_RULE = JsonForm(
+    "HighestRuleJson",
+    "Highest rebound against the centred shot.",
+    Key("holds", bool),
+    *measured_keys(RULE_MEASURES),
+    Key("sentence", str),
+)
+_SHOTS = JsonForm(
+    "ShotsJson",
+    "``klack shots``.",
+    schema_key("klack-shots/1"),
+    *CASE,
+    Key("seed", int),
+    Key("centric", _SHOT, "The centred shot.", lambda study: study.centric.row(0)),
+    Key("shots", [_SHOT], of=lambda study: map(study.shots.row, range(study.shots.count))),
+    Key("highest", int, "Index of the highest rebound."),
+    Key(
+        "distribution",
         dict[str, dict[str, Real]],
-        Field(
-            description="By measure: mean, standard_deviation, standard_error (of the mean), "
-            "quantile_0 to quantile_1."
-        ),
-    ]
-    rule: HighestRuleJson
-    wall_time_s: Real
-    shot_time_s: Real
-    workers: int
-    resumed: Annotated[int, Field(description="Shots resumed from an interrupted run.")]
-    warnings: list[str]
-
-
-def shots_to_json(study: ShotsStudy) -> ShotsJson:
-    """Plain numbers in SI, the unit in the key; None for nan.
-
-    Returns
-    -------
-    dict
-        ``case``, ``seed``; ``centric`` and ``shots``: the numbers of the centred shot and of every
-        other; ``highest``: index of the highest rebound; ``distribution``: per measure its mean,
-        standard deviation and quantiles; ``rule``: highest rebound minus centred shot.
-    """
-    shots, rule = study.shots, study.rule
-    found: Any = {
-        "schema": "klack-shots/1",
-        "case": study.case,
-        "klack": study.version,
-        "seed": study.seed,
-        "centric": json_of(SHOT_MEASURES, study.centric.row(0)),
-        "shots": [json_of(SHOT_MEASURES, shots.row(i)) for i in range(shots.count)],
-        "highest": study.highest,
-        "distribution": {
-            measure.json_key: moments(getattr(shots, measure.key)) for measure in FIRST_IMPACT
-        },
-        "rule": {"holds": rule.holds, **json_of(RULE_MEASURES, rule), "sentence": rule.sentence},
-        "wall_time_s": number_or_none(study.wall_time),
-        "shot_time_s": number_or_none(study.shot_time),
-        "workers": study.workers,
-        "resumed": study.resumed,
-        "warnings": list(study.warnings),
-    }
-    return cast(ShotsJson, found)
+        "By measure: mean, standard_deviation, standard_error (of the mean), "
+        "quantile_0 to quantile_1.",
+        _distribution,
+    ),
+    Key("rule", _RULE),
+    Key("wall_time_s", Real, of="wall_time"),
+    Key("shot_time_s", Real, of="shot_time"),
+    Key("workers", int),
+    Key("resumed", int, "Shots resumed from an interrupted run."),
+    Key("warnings", list[str]),
+)
 
 
 def shots_told(study: ShotsStudy) -> Iterator[TextTable | str]:
@@ -154,8 +117,8 @@ SHOTS = StoredAnalysis(
         },
     ),
     page="shots.content:shots_content",
-    json=ShotsJson,
-    to_json=shots_to_json,
+    json=_SHOTS.type,
+    to_json=_SHOTS.json,
     told=shots_told,
     measures={"shot": SHOT_MEASURES, "highest rebound": RULE_MEASURES},
     measured=shots_measured,

@@ -3,17 +3,14 @@
 ``result.zarr/study/variants/dry/stops/seat/peak_force`` holds one number per stroke.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from math import isfinite
-from typing import Annotated, Any, Literal
+from typing import Any, NamedTuple
 
 import numpy as np
-from pydantic import Field
-from typing_extensions import TypedDict
 
 from klack.analyses.analysis import Measured, StoredAnalysis
-from klack.analyses.json_parts import Real, Version
-from klack.analyses.measures import json_of, number_or_none, with_measures
+from klack.analyses.json_parts import CASE, JsonForm, Key, Real, measured_keys, schema_key
 from klack.analyses.run_columns import told_value
 from klack.analyses.sample import moments
 from klack.analyses.store import RecordFormat
@@ -46,7 +43,6 @@ __all__ = [
     "correlation_rows",
     "ratio_rows",
     "scatter_rows",
-    "stroke_shots_to_json",
 ]
 
 
@@ -63,148 +59,120 @@ SCATTER_COLUMNS = (
 RATIO_COLUMNS = ("standard deviation", "wet", "dry", "wet / dry", "its 95 % interval")
 
 
-@with_measures(FIRST_TOUCH_MEASURES)
-class StrokeStopJson(TypedDict):
-    """First impact on one stop, and the position at touch."""
+class _Stroke(NamedTuple):
+    """One stroke of a variant."""
+
+    strokes: StrokeColumns
+    columns: Mapping[str, StopColumns]
+    index: int
+    failure: str | None = None
+
+    @property
+    def row(self) -> Any:
+        return self.strokes.row(self.index)
+
+    @property
+    def stops(self) -> dict[str, Any]:
+        return {name: columns.row(self.index) for name, columns in self.columns.items()}
 
 
-@with_measures(STROKE_MEASURES)
-class StrokeShotJson(TypedDict):
-    """One stroke of many."""
-
-    stops: Annotated[dict[str, StrokeStopJson], Field(description="By end stop.")]
-    failure: Annotated[str | None, Field(description="Why it ended early.")]
+def _centric(shots: Variant) -> _Stroke:
+    return _Stroke(shots.centric, shots.centric_stops, 0)
 
 
-@with_measures(HIGHEST_MEASURES)
-class HighestReboundJson(TypedDict):
-    """The stroke with the highest rebound from a stop."""
-
-    is_most_centred: bool
+def _strokes(shots: Variant) -> Iterator[_Stroke]:
+    for i in range(shots.strokes.count):
+        yield _Stroke(shots.strokes, shots.stops, i, shots.failures.get(str(i)))
 
 
-class RatioJson(TypedDict):
-    """Standard deviation wet over dry."""
-
-    ratio: Real
-    low: Annotated[Real, Field(description="Begin of its 95 % interval.")]
-    high: Real
-    pairs: Annotated[int, Field(description="Strokes with a value in both.")]
+def _distribution(shots: Variant) -> dict[str, Any]:
+    return {item.key: _moments(item) for item in scattered(shots)}
 
 
-class StrokeVariantJson(TypedDict):
-    """All strokes of one variant."""
-
-    label: str
-    centric: Annotated[StrokeShotJson, Field(description="The stroke that starts centred.")]
-    strokes: list[StrokeShotJson]
-    distribution: Annotated[
-        dict[str, dict[str, Real]],
-        Field(
-            description="By measure (STOP.measure of a first impact): mean, standard_deviation, "
-            "standard_error (of the mean), quantile_0 to quantile_1, and the 95 % interval of the "
-            "median, median_low and median_high."
-        ),
-    ]
-    correlation: Annotated[
-        dict[str, dict[str, Real]],
-        Field(
-            description="By measure: rank correlation with eccentricity and tilt at touch, and "
-            "with the friction in the guide and between the faces where they are drawn; null with "
-            "fewer than five strokes that have both values, or where one of them is constant."
-        ),
-    ]
-    highest: Annotated[
-        dict[str, HighestReboundJson | None],
-        Field(description="By end stop; null where no stroke rebounds."),
-    ]
-
-
-class StrokeShotsJson(TypedDict):
-    """``klack shots`` of a whole valve."""
-
-    schema: Literal["klack-stroke-shots/1"]
-    case: str
-    klack: Version
-    seed: int
-    carry: Annotated[
-        bool, Field(description="Whether each stroke starts where the one before has ended.")
-    ]
-    variants: dict[str, StrokeVariantJson]
-    wet_over_dry: Annotated[
-        dict[str, RatioJson], Field(description="By measure; empty without both variants.")
-    ]
-    answers: list[str]
-    wall_time_s: Real
-    stroke_time_s: Real
-    workers: int
-    resumed: Annotated[int, Field(description="Strokes resumed from an interrupted run.")]
-    warnings: list[str]
-
-
-def stroke_shots_to_json(study: StrokeShotsStudy) -> StrokeShotsJson:
-    """Plain numbers in SI, the unit in the key; None for nan."""
-    return {
-        "schema": "klack-stroke-shots/1",
-        "case": study.case,
-        "klack": study.version,
-        "seed": study.seed,
-        "carry": study.carry,
-        "variants": {name: _variant(shots) for name, shots in study.variants.items()},
-        "wet_over_dry": {key: _ratio(wet, dry) for key, (wet, dry) in wet_and_dry(study).items()},
-        "answers": list(stroke_answers(study)),
-        "wall_time_s": number_or_none(study.wall_time),
-        "stroke_time_s": number_or_none(study.stroke_time),
-        "workers": study.workers,
-        "resumed": study.resumed,
-        "warnings": list(study.warnings),
-    }
-
-
-def _variant(shots: Variant) -> StrokeVariantJson:
-    items = scattered(shots)
-    return {
-        "label": shots.label,
-        "centric": _stroke(shots.centric, shots.centric_stops, 0, None),
-        "strokes": [
-            _stroke(shots.strokes, shots.stops, i, shots.failures.get(str(i)))
-            for i in range(shots.strokes.count)
-        ],
-        "distribution": {item.key: _moments(item) for item in items},
-        "correlation": {
-            item.key: {key: number_or_none(r) for key, r in correlations(shots, item).items()}
-            for item in items
-        },
-        "highest": {stop: _highest(shots, stop) for stop in shots.stops},
-    }
-
-
-def _stroke(strokes: StrokeColumns, stops: Any, index: int, failure: str | None) -> Any:
-    first = {name: json_of(FIRST_TOUCH_MEASURES, c.row(index)) for name, c in stops.items()}
-    return {**json_of(STROKE_MEASURES, strokes.row(index)), "stops": first, "failure": failure}
-
-
-def _moments(item: Scattered) -> dict[str, Real]:
+def _moments(item: Scattered) -> dict[str, Any]:
     low, high = median_interval(item.values)
-    ends = {"median_low": number_or_none(low), "median_high": number_or_none(high)}
-    return {**moments(item.values), **ends}
+    return {**moments(item.values), "median_low": low, "median_high": high}
 
 
-def _highest(shots: Variant, stop: str) -> Any:
-    found = highest_rebound(shots, stop)
-    if found is None:
-        return None
-    return {**json_of(HIGHEST_MEASURES, found), "is_most_centred": found.is_most_centred}
+_STOP = JsonForm(
+    "StrokeStopJson",
+    "First impact on one stop, and the position at touch.",
+    *measured_keys(FIRST_TOUCH_MEASURES),
+)
+_STROKE = JsonForm(
+    "StrokeShotJson",
+    "One stroke of many.",
+    *measured_keys(STROKE_MEASURES, "row"),
+    Key("stops", {str: _STOP}, "By end stop."),
+    Key("failure", str | None, "Why it ended early."),
+)
+_HIGHEST = JsonForm(
+    "HighestReboundJson",
+    "The stroke with the highest rebound from a stop.",
+    *measured_keys(HIGHEST_MEASURES),
+    Key("is_most_centred", bool),
+)
+_RATIO = JsonForm(
+    "RatioJson",
+    "Standard deviation wet over dry.",
+    Key("ratio", Real),
+    Key("low", Real, "Begin of its 95 % interval."),
+    Key("high", Real),
+    Key("pairs", int, "Strokes with a value in both."),
+)
+_VARIANT = JsonForm(
+    "StrokeVariantJson",
+    "All strokes of one variant.",
+    Key("label", str),
+    Key("centric", _STROKE, "The stroke that starts centred.", _centric),
+    Key("strokes", [_STROKE], of=_strokes),
+    Key(
+        "distribution",
+        dict[str, dict[str, Real]],
+        "By measure (STOP.measure of a first impact): mean, standard_deviation, "
+        "standard_error (of the mean), quantile_0 to quantile_1, and the 95 % interval of the "
+        "median, median_low and median_high.",
+        _distribution,
+    ),
+    Key(
+        "correlation",
+        dict[str, dict[str, Real]],
+        "By measure: rank correlation with eccentricity and tilt at touch, and "
+        "with the friction in the guide and between the faces where they are drawn; null with "
+        "fewer than five strokes that have both values, or where one of them is constant.",
+        lambda shots: {item.key: correlations(shots, item) for item in scattered(shots)},
+    ),
+    Key(
+        "highest",
+        {str: (_HIGHEST, None)},
+        "By end stop; null where no stroke rebounds.",
+        lambda shots: {stop: highest_rebound(shots, stop) for stop in shots.stops},
+    ),
+)
 
 
-def _ratio(wet: Scattered, dry: Scattered) -> RatioJson:
-    found = scatter_ratio(wet.values, dry.values)
+def _ratios(study: StrokeShotsStudy) -> dict[str, Any]:
     return {
-        "ratio": number_or_none(found.ratio),
-        "low": number_or_none(found.low),
-        "high": number_or_none(found.high),
-        "pairs": found.pairs,
+        key: scatter_ratio(wet.values, dry.values) for key, (wet, dry) in wet_and_dry(study).items()
     }
+
+
+_SHOTS = JsonForm(
+    "StrokeShotsJson",
+    "``klack shots`` of a whole valve.",
+    schema_key("klack-stroke-shots/1"),
+    *CASE,
+    Key("seed", int),
+    Key("carry", bool, "Whether each stroke starts where the one before has ended."),
+    Key("variants", {str: _VARIANT}),
+    Key("wet_over_dry", {str: _RATIO}, "By measure; empty without both variants.", _ratios),
+    Key("answers", list[str], of=lambda study: list(stroke_answers(study))),
+    Key("wall_time_s", Real, of="wall_time"),
+    Key("stroke_time_s", Real, of="stroke_time"),
+    Key("workers", int),
+    Key("resumed", int, "Strokes resumed from an interrupted run."),
+    Key("warnings", list[str]),
+)
 
 
 def stroke_shots_told(study: StrokeShotsStudy) -> Iterator[TextTable | str]:
@@ -305,8 +273,8 @@ STROKE_SHOTS = StoredAnalysis(
         },
     ),
     page="stroke_shots.content:stroke_shots_content",
-    json=StrokeShotsJson,
-    to_json=stroke_shots_to_json,
+    json=_SHOTS.type,
+    to_json=_SHOTS.json,
     told=stroke_shots_told,
     measures={
         "stroke of many": STROKE_MEASURES,
