@@ -15,6 +15,7 @@ from klack.analyses.measures import JSON_TYPES, Measure
 
 __all__ = [
     "CASE",
+    "MISSING",
     "OWN_COMPONENTS",
     "REJECTED",
     "JsonForm",
@@ -27,6 +28,8 @@ __all__ = [
     "schema_key",
 ]
 
+MISSING: Any = object()
+"""Read for a key of type ``NotRequired`` that an object does not have."""
 Real = float | None
 """A number, or null where there is none (nan, infinite)."""
 OwnComponents = Annotated[
@@ -86,7 +89,8 @@ class JsonForm:
 
     def json(self, record: Any) -> dict[str, Any]:
         """The object of a record."""
-        return {key.name: key.value(record) for key in self.keys}
+        found = {key.name: key.value(record) for key in self.keys}
+        return {name: value for name, value in found.items() if value is not MISSING}
 
     @cached_property
     def type(self) -> Any:

@@ -8,10 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import isfinite, log10
-from typing import Annotated, Any, Generic, Literal, TypeVar, cast
-
-from pydantic import Field
-from typing_extensions import TypedDict
+from typing import Any, Generic, Literal, TypeVar
 
 from klack.report.wording import count, fixed, power, quantity, share, signed, signed_share
 from klack.terminal.tables import TextTable
@@ -28,16 +25,13 @@ __all__ = [
     "glossary",
     "heads",
     "json_of",
-    "number_or_none",
     "page_cells",
     "page_heads",
     "text_table",
-    "with_measures",
 ]
 
 Of = TypeVar("Of", contravariant=True)
 
-Kind = TypeVar("Kind", bound=type)
 
 Value = float | int | bool | None
 
@@ -300,27 +294,6 @@ def page_cells(measures: Iterable[Measure[Of]], of: Of) -> tuple[str, ...]:
 def json_of(measures: Iterable[Measure[Of]], of: Of) -> dict[str, Value]:
     """Values by JSON key; None where there is no number."""
     return {measure.json_key: measure.json(of) for measure in measures}
-
-
-def number_or_none(value: float) -> float | None:
-    """None for nan and infinity, which JSON does not have."""
-    return float(value) if isfinite(value) else None
-
-
-def with_measures(measures: Iterable[Measure[Any]]) -> Callable[[Kind], Kind]:
-    """Add the keys of :func:`json_of` to a typed dictionary, for the schema."""
-    keys: dict[str, Any] = {
-        item.json_key: Annotated[JSON_TYPES[item.kind], Field(description=item.definition)]
-        for item in measures
-    }
-
-    def extended(kind: Kind) -> Kind:
-        every = {**keys, **kind.__annotations__}
-        found: Any = TypedDict(kind.__name__, every)  # type: ignore[misc]
-        found.__doc__ = kind.__doc__
-        return cast(Kind, found)
-
-    return extended
 
 
 def described(measures: Iterable[Measure[Any]]) -> list[dict[str, str]]:

@@ -1,11 +1,8 @@
 """A calibration on disk; see :mod:`klack.analyses.store`."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from math import isfinite
-from typing import Annotated, Any, Literal, NotRequired, cast
-
-from pydantic import Field
-from typing_extensions import TypedDict
+from typing import Any, NamedTuple, NotRequired
 
 from klack.analyses.analysis import Measured, StoredAnalysis
 from klack.analyses.calibration.record import (
@@ -19,9 +16,19 @@ from klack.analyses.calibration.record import (
     VALUE,
     CalibratedParameter,
     CalibrationStudy,
+    ProfileCurve,
 )
-from klack.analyses.json_parts import OwnComponents, Real, Version
-from klack.analyses.measures import Measure, json_of, number_or_none, with_measures
+from klack.analyses.json_parts import (
+    CASE,
+    MISSING,
+    OWN_COMPONENTS,
+    JsonForm,
+    Key,
+    Real,
+    measured_keys,
+    schema_key,
+)
+from klack.analyses.measures import Measure
 from klack.analyses.store import RecordFormat
 from klack.terminal.tables import TextTable
 
@@ -38,71 +45,52 @@ PARAMETER_COLUMNS = (
 )
 
 
-@with_measures(PARAMETER_MEASURES)
-class CalibratedJson(TypedDict):
-    """One calibrated parameter, in ``unit``."""
+class _Parameter(NamedTuple):
+    """A parameter and, if that was followed, its profile likelihood."""
 
-    unit: str
-    profile_lower_95: NotRequired[Real]
-    profile_upper_95: NotRequired[Real]
+    fitted: CalibratedParameter
+    profile: ProfileCurve | None
 
 
-@with_measures(FITTED_MEASURES)
-class FittedJson(TypedDict):
-    """First impact on a stop."""
+def _end_of_profile(name: str) -> Callable[[_Parameter], Any]:
+    def found(item: _Parameter) -> Any:
+        return MISSING if item.profile is None else getattr(item.profile, name)
+
+    return found
 
 
-@with_measures(CALIBRATION_MEASURES)
-class CalibrationJson(TypedDict):
-    """``klack calibrate``."""
-
-    schema: Literal["klack-calibrate/1"]
-    case: str
-    klack: Version
-    own_components: OwnComponents
-    variant: str
-    parameters: Annotated[dict[str, CalibratedJson], Field(description="By their path.")]
-    impacts: Annotated[
-        dict[str, FittedJson], Field(description="First impacts, by stop, from the trigger.")
-    ]
-    correlation: Annotated[
-        list[list[Real]], Field(description="Of the estimates, in the order of the parameters.")
-    ]
-    warnings: list[str]
-
-
-def calibration_to_json(study: CalibrationStudy) -> CalibrationJson:
-    """Plain numbers in SI, the unit in the key or beside the value; None for nan and inf.
-
-    Returns
-    -------
-    dict
-        ``parameters``: per name its value, standard error, 95 % interval, start and unit, and the
-        interval of its profile likelihood if that was followed; ``residual_rms_um``: of the lift;
-        ``correlation`` of the estimates in the order of the parameters; ``warnings``.
-    """
+def _parameters(study: CalibrationStudy) -> dict[str, _Parameter]:
     profiles = {profile.name: profile for profile in study.profiles}
-    parameters: dict[str, Any] = {}
-    for item in study.parameters:
-        parameters[item.name] = {**json_of(PARAMETER_MEASURES, item), "unit": item.unit}
-        if item.name in profiles:
-            parameters[item.name] |= {
-                "profile_lower_95": number_or_none(profiles[item.name].lower),
-                "profile_upper_95": number_or_none(profiles[item.name].upper),
-            }
-    found: Any = {
-        "schema": "klack-calibrate/1",
-        "case": study.case,
-        "klack": study.version,
-        "own_components": dict(study.own_components),
-        "variant": study.variant,
-        **json_of(CALIBRATION_MEASURES, study),
-        "parameters": parameters,
-        "impacts": {item.stop: json_of(FITTED_MEASURES, item) for item in study.impacts},
-        "correlation": [[number_or_none(x) for x in row] for row in study.correlation.tolist()],
-        "warnings": list(study.warnings),
-    }
-    return cast(CalibrationJson, found)
+    return {item.name: _Parameter(item, profiles.get(item.name)) for item in study.parameters}
+
+
+_PARAMETER = JsonForm(
+    "CalibratedJson",
+    "One calibrated parameter, in ``unit``.",
+    *measured_keys(PARAMETER_MEASURES, "fitted"),
+    Key("unit", str, of="fitted.unit"),
+    Key("profile_lower_95", NotRequired[Real], of=_end_of_profile("lower")),
+    Key("profile_upper_95", NotRequired[Real], of=_end_of_profile("upper")),
+)
+_FITTED = JsonForm("FittedJson", "First impact on a stop.", *measured_keys(FITTED_MEASURES))
+_CALIBRATION = JsonForm(
+    "CalibrationJson",
+    "``klack calibrate``.",
+    schema_key("klack-calibrate/1"),
+    *CASE,
+    OWN_COMPONENTS,
+    Key("variant", str),
+    *measured_keys(CALIBRATION_MEASURES),
+    Key("parameters", {str: _PARAMETER}, "By their path.", _parameters),
+    Key(
+        "impacts",
+        {str: _FITTED},
+        "First impacts, by stop, from the trigger.",
+        lambda study: {item.stop: item for item in study.impacts},
+    ),
+    Key("correlation", list[list[Real]], "Of the estimates, in the order of the parameters."),
+    Key("warnings", list[str]),
+)
 
 
 def calibration_measured(study: CalibrationStudy) -> Iterator[Measured]:
@@ -158,8 +146,8 @@ CALIBRATION = StoredAnalysis(
         },
     ),
     page="calibration.content:calibration_content",
-    json=CalibrationJson,
-    to_json=calibration_to_json,
+    json=_CALIBRATION.type,
+    to_json=_CALIBRATION.json,
     told=calibration_told,
     measures={
         "calibration": CALIBRATION_MEASURES,

@@ -64,16 +64,16 @@ class _Stroke(NamedTuple):
 
     strokes: StrokeColumns
     columns: Mapping[str, StopColumns]
-    index: int
+    number: int
     failure: str | None = None
 
     @property
     def row(self) -> Any:
-        return self.strokes.row(self.index)
+        return self.strokes.row(self.number)
 
     @property
     def stops(self) -> dict[str, Any]:
-        return {name: columns.row(self.index) for name, columns in self.columns.items()}
+        return {name: columns.row(self.number) for name, columns in self.columns.items()}
 
 
 def _centric(shots: Variant) -> _Stroke:
