@@ -26,10 +26,10 @@ from klack.analyses.unfinished import LogForm, UnfinishedLog, fingerprint
 from klack.assembling.valve import Valve, build_valve
 from klack.case.levels import Variant
 from klack.case.placed_errors import tells_place
+from klack.case.spatial_consistency import require_axial
 from klack.case.thermal import CaseThermal
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles, find_roles
-from klack.errors import InputError
 from klack.machine.cache.result_cache import result_cache
 from klack.machine.progress import Progress, silent
 from klack.machine.stages import StageClock, collected_warnings
@@ -141,7 +141,7 @@ def run_heat(
     aspects = aspects_of(case)
     thermal = case.thermal
     assert thermal is not None  # refused by aspects_of
-    _require_axial(case)
+    require_axial(case, "klack heat")
     clock = StageClock(progress, result_cache())
     network = heat_network(case.network.network())
     assert network is not None  # a section thermal names its nodes
@@ -190,16 +190,6 @@ def run_heat(
         cpu_time=strokes.cpu_time,
         warnings=(*warned, *strokes.doubts, *found.doubts),
     )
-
-
-def _require_axial(case: ValveCase) -> None:
-    if case.motion == "three-dimensional":
-        raise InputError(
-            "motion",
-            got="three-dimensional",
-            expected="axial, for a warm-up",
-            hint="leave out motion, guide and placement.",
-        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -32,6 +32,7 @@ from klack.assembling.valve import Valve, build_valve
 from klack.case.any_case import CaseTree
 from klack.case.levels import Variant
 from klack.case.placed_errors import tells_place
+from klack.case.spatial_consistency import require_axial
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import find_roles
 from klack.errors import InputError, KlackError
@@ -144,13 +145,7 @@ def run_linearisation(
     """
     begin = perf_counter()
     name = case.one_variant(variant)
-    if case.motion == "three-dimensional":
-        raise InputError(
-            "motion",
-            got="three-dimensional",
-            expected="axial, for a linearisation",
-            hint="leave out motion, guide and placement.",
-        )
+    require_axial(case, "klack linearise")
     clock = StageClock(progress, result_cache())
     roles = find_roles(case)
     with collected_warnings() as warned:

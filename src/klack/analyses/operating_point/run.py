@@ -28,6 +28,7 @@ from klack.case.any_case import CaseTree
 from klack.case.levels import Variant
 from klack.case.placed_errors import tells_place
 from klack.case.points import case_at
+from klack.case.spatial_consistency import require_axial
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles, find_roles
 from klack.errors import AccuracyWarning, ConvergenceError, InputError, KlackError
@@ -100,13 +101,7 @@ def run_operating_points(
     """
     begin = perf_counter()
     name = case.one_variant(variant)
-    if case.motion == "three-dimensional":
-        raise InputError(
-            "motion",
-            got="three-dimensional",
-            expected="axial, for an operating point",
-            hint="leave out motion, guide and placement.",
-        )
+    require_axial(case, "klack stroke --steady")
     clock = StageClock(progress, result_cache())
     roles = find_roles(case)
     with collected_warnings() as warned:
