@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from pages import HOW_TO
 
 from klack.cli.main import main
 
@@ -68,3 +69,12 @@ def test_a_search_for_nothing_computes_nothing(monkeypatch, capsys):
 
     assert main(["optimise", "demo-stroke"]) == 2
     assert "no objectives" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["linearise", "stroke --steady", "advise", "sensitivities"])
+def test_commands_of_the_axis_alone_refuse_a_motion_in_space(command, capsys):
+    name, *options = command.split()
+
+    assert main([name, str(HOW_TO / "armature_off_axis.yaml"), *options]) == 2
+    told = capsys.readouterr().err
+    assert f"armature_off_axis.yaml: motion: got 'three-dimensional' in klack {command}" in told
