@@ -20,9 +20,8 @@ __all__ = [
     "REJECTED",
     "JsonForm",
     "Key",
-    "OwnComponents",
     "Real",
-    "Version",
+    "by_name",
     "inherited",
     "measured_keys",
     "schema_key",
@@ -118,6 +117,11 @@ def inherited(form: JsonForm, of: Read) -> tuple[Key, ...]:
         )
 
     return tuple(map(within, form.keys))
+
+
+def by_name(of: Read, name: str = "name") -> Callable[[Any], dict[str, Any]]:
+    """Read a list as objects by an attribute of theirs."""
+    return lambda record: {getattr(item, name): item for item in _read(of, record)}
 
 
 def measured_keys(

@@ -25,6 +25,7 @@ from klack.analyses.json_parts import (
     JsonForm,
     Key,
     Real,
+    by_name,
     measured_keys,
     schema_key,
 )
@@ -86,7 +87,7 @@ _CALIBRATION = JsonForm(
         "impacts",
         {str: _FITTED},
         "First impacts, by stop, from the trigger.",
-        lambda study: {item.stop: item for item in study.impacts},
+        by_name("impacts", "stop"),
     ),
     Key("correlation", list[list[Real]], "Of the estimates, in the order of the parameters."),
     Key("warnings", list[str]),

@@ -12,7 +12,7 @@ import numpy as np
 from klack.analyses.analysis import StoredAnalysis
 from klack.analyses.heat.heated_stroke import ASPECTS
 from klack.analyses.heat.record import CauseRow, HeatStudy, WarmColumn
-from klack.analyses.json_parts import CASE, OWN_COMPONENTS, JsonForm, Key, Real, schema_key
+from klack.analyses.json_parts import CASE, OWN_COMPONENTS, JsonForm, Key, Real, by_name, schema_key
 from klack.analyses.store import RecordFormat
 from klack.report.wording import listed, quantity
 from klack.terminal.tables import TextTable
@@ -46,10 +46,6 @@ def _values(name: str) -> Callable[[HeatStudy], dict[str, Any]]:
     return lambda record: {x.name: x.values for x in getattr(record, name)}
 
 
-def _columns(name: str) -> Callable[[HeatStudy], dict[str, WarmColumn]]:
-    return lambda record: {x.name: x for x in getattr(record, name)}
-
-
 HEAT_FORM = JsonForm(
     "HeatJson",
     "``klack heat``.",
@@ -67,8 +63,8 @@ HEAT_FORM = JsonForm(
     Key("time_s", list[Real], "null for the steady state.", "time"),
     Key("temperature_K", dict[str, list[Real]], "By node.", _values("temperature")),
     Key("heat_W", dict[str, list[Real]], "Mean heat of the strokes.", _values("heat")),
-    Key("strokes", {str: _COLUMN}, "Delays and peaks.", _columns("numbers")),
-    Key("values", {str: _COLUMN}, "Resistances and gaps.", _columns("values")),
+    Key("strokes", {str: _COLUMN}, "Delays and peaks.", by_name("numbers")),
+    Key("values", {str: _COLUMN}, "Resistances and gaps.", by_name("values")),
     Key("causes", [_CAUSE]),
     Key("supplied_J", dict[str, float], "Heat into each node.", "supplied"),
     Key("stored_J", dict[str, float], of="stored"),

@@ -19,6 +19,7 @@ from klack.analyses.json_parts import (
     JsonForm,
     Key,
     Real,
+    by_name,
     inherited,
     measured_keys,
     schema_key,
@@ -114,7 +115,7 @@ _MOUNTS = JsonForm(
         "freedoms",
         {str: _FREEDOM},
         "By name, flange.z.",
-        lambda source: {item.name: item for item in source.freedoms},
+        by_name("freedoms"),
     ),
 )
 _INTERFACE = JsonForm(
@@ -157,7 +158,7 @@ _EAR = JsonForm(
         "re (20 uPa)^2 s.",
         lambda ear: _levels(ear.bands, PRESSURE_REFERENCE),
     ),
-    Key("paths", {str: _PATH}, "By freedom.", lambda ear: {x.name: x for x in ear.paths}),
+    Key("paths", {str: _PATH}, "By freedom.", by_name("paths")),
 )
 _IN_SITU_FREEDOM = JsonForm(
     "InSituFreedomJson", "One freedom of a virtual test.", *measured_keys(IN_SITU_MEASURES)
@@ -168,7 +169,7 @@ _IN_SITU = JsonForm(
     Key("indicators", list[str]),
     Key("deviation", float, "Largest over all lines, relative."),
     Key("condition", float, "Largest of the mobilities from the interface to the indicators."),
-    Key("freedoms", {str: _IN_SITU_FREEDOM}, of=lambda test: {x.name: x for x in test.freedoms}),
+    Key("freedoms", {str: _IN_SITU_FREEDOM}, of=by_name("freedoms")),
 )
 _MACHINE = JsonForm(
     "MachineJson",
@@ -184,10 +185,8 @@ _MACHINE = JsonForm(
         "Highest velocity of the mounts along z over that of the needle.",
         "motion",
     ),
-    Key(
-        "freedoms", {str: _INTERFACE}, "By name.", lambda found: {x.name: x for x in found.freedoms}
-    ),
-    Key("ears", {str: _EAR}, "By name.", lambda found: {x.name: x for x in found.ears}),
+    Key("freedoms", {str: _INTERFACE}, "By name.", by_name("freedoms")),
+    Key("ears", {str: _EAR}, "By name.", by_name("ears")),
     Key("virtual_test", (_IN_SITU, None), "With --virtual-test.", "in_situ"),
 )
 _DESIGN = JsonForm(
@@ -203,8 +202,8 @@ _DESIGN = JsonForm(
         lambda design: _bands(design.stops[0].bands, design.band_energy),
     ),
     *measured_keys(DESIGN_MEASURES),
-    Key("stops", {str: _STOP}, "By stop.", lambda design: {x.stop: x for x in design.stops}),
-    Key("bodies", {str: _BODY}, "By body.", lambda design: {x.name: x for x in design.bodies}),
+    Key("stops", {str: _STOP}, "By stop.", by_name("stops", "stop")),
+    Key("bodies", {str: _BODY}, "By body.", by_name("bodies")),
     Key(
         "mounts",
         {str: _MOUNTS},
@@ -223,7 +222,7 @@ _STUDY = JsonForm(
         "designs",
         {str: _DESIGN},
         "All of them by name.",
-        lambda study: {design.name: design for design in study.designs},
+        by_name("designs"),
     ),
     Key("warnings", list[str]),
 )

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.analyses.analysis import StoredAnalysis
-from klack.analyses.json_parts import CASE, OWN_COMPONENTS, JsonForm, Key, Real, schema_key
+from klack.analyses.json_parts import CASE, OWN_COMPONENTS, JsonForm, Key, Real, by_name, schema_key
 from klack.analyses.operating_point.record import OperatingPoints, PointQuantity
 from klack.analyses.store import RecordFormat
 from klack.analyses.study.wording import number_text
@@ -59,7 +59,7 @@ OPERATING_POINTS = JsonForm(
         "swept",
         {str: _SWEPT},
         "By name; empty for one point.",
-        lambda record: {item.name: item for item in record.swept},
+        by_name("swept"),
     ),
     Key("quantities", [_QUANTITY]),
     Key("residuals", _LEFT, of=lambda record: record),

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from klack.analyses.analysis import Analysis, Measured
 from klack.analyses.impact.transfer import TRANSFER_COUNTS
-from klack.analyses.json_parts import JsonForm, Key, measured_keys, schema_key
+from klack.analyses.json_parts import JsonForm, Key, by_name, measured_keys, schema_key
 from klack.analyses.measures import Column, Measure, described_in, text_table
 from klack.analyses.reduction.one_node import corrected_label, place_words
 from klack.analyses.reduction.run import ReductionStudy
@@ -180,7 +180,7 @@ _STUDY = JsonForm(
     "``klack reduce``.",
     schema_key("klack-reduce/1"),
     Key("case", str),
-    Key("bodies", {str: _BODY}, "By name.", lambda study: {x.name: x for x in study.bodies}),
+    Key("bodies", {str: _BODY}, "By name.", by_name("bodies")),
     Key("transfer", {str: _TRANSFER}, "By body.", lambda study: _by_body(study.transfer)),
     Key(
         "one_node",

@@ -5,7 +5,7 @@ from operator import itemgetter
 from typing import Literal, NamedTuple
 
 from klack.analyses.analysis import Analysis
-from klack.analyses.json_parts import CASE, JsonForm, Key, Real, schema_key
+from klack.analyses.json_parts import CASE, JsonForm, Key, Real, by_name, schema_key
 from klack.analyses.sensitivities.record import MeasureSlopes, SensitivityRecord, SlopeParameter
 from klack.analyses.study.wording import shown_unit
 from klack.terminal.tables import TextTable
@@ -87,7 +87,7 @@ _RECORD = JsonForm(
     schema_key("klack-sensitivities/1"),
     *CASE,
     Key("variant", str),
-    Key("parameters", {str: _PARAMETER}, of=lambda record: {x.name: x for x in record.parameters}),
+    Key("parameters", {str: _PARAMETER}, of=by_name("parameters")),
     Key("measures", {str: _MEASURE}, of=_sloped),
     Key("impacts", [_IMPACT]),
     Key(

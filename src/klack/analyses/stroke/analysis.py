@@ -21,6 +21,7 @@ from klack.analyses.json_parts import (
     JsonForm,
     Key,
     Real,
+    by_name,
     inherited,
     measured_keys,
     schema_key,
@@ -283,7 +284,7 @@ STUDY = JsonForm(
         "stops",
         {str: CONTACT},
         "By the name of the end stop; all variants but lumped ones share them.",
-        lambda study: {stop.name: stop for stop in study.stops},
+        by_name("stops"),
     ),
     Key("warnings", list[str]),
 )

@@ -3,13 +3,13 @@
 ``result.zarr/study/measures/0/values`` holds one number per point.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from klack.analyses.analysis import StoredAnalysis
-from klack.analyses.json_parts import CASE, JsonForm, Key, Real, schema_key
+from klack.analyses.json_parts import CASE, JsonForm, Key, Real, by_name, schema_key
 from klack.analyses.store import RecordFormat
 from klack.analyses.study.record import Optimum, StudyColumn, StudyRecord, SurrogateEffect
 from klack.analyses.study.wording import (
@@ -37,9 +37,9 @@ def _by_parameter(item: Any) -> dict[str, Any]:
     return {name: (item, k) for k, name in enumerate(item.parameters)}
 
 
-def _of_parameter(name: str) -> Callable[[Any], Any]:
-    """Reads the number of one parameter from an item and its index."""
-    return lambda pair: getattr(pair[0], name)[pair[1]]
+def _number(name: str, words: str = "", kind: Any = Real) -> Key:
+    """Number of one parameter, read from an item and its index."""
+    return Key(name, kind, words, lambda pair: getattr(pair[0], name)[pair[1]])
 
 
 def _in_words(item: StudyColumn | SurrogateEffect, values: np.ndarray) -> Any:
@@ -59,26 +59,21 @@ _COLUMN = JsonForm(
 _INDEX = JsonForm(
     "IndexJson",
     "Share of the variance of a measure that a parameter causes.",
-    *(
-        Key(name, Real, words, _of_parameter(name))
-        for name, words in (
-            ("first", "Alone."),
-            ("first_low", ""),
-            ("first_high", ""),
-            ("total", "With interactions."),
-            ("total_low", ""),
-            ("total_high", ""),
-        )
-    ),
+    _number("first", "Alone."),
+    _number("first_low"),
+    _number("first_high"),
+    _number("total", "With interactions."),
+    _number("total_low"),
+    _number("total_high"),
 )
 _EFFECT = JsonForm(
     "EffectJson",
     "Elementary effects of a parameter on a measure, over its whole range.",
-    Key("size", Real, "Mean of their sizes, mu*.", _of_parameter("size")),
-    Key("size_error", Real, "Its standard error.", _of_parameter("size_error")),
-    Key("mean", Real, "Mean with their signs, mu.", _of_parameter("mean")),
-    Key("scatter", Real, "Standard deviation, sigma.", _of_parameter("scatter")),
-    Key("effects", int, "How many.", lambda pair: int(pair[0].effects[pair[1]])),
+    _number("size", "Mean of their sizes, mu*."),
+    _number("size_error", "Its standard error."),
+    _number("mean", "Mean with their signs, mu."),
+    _number("scatter", "Standard deviation, sigma."),
+    _number("effects", "How many.", int),
 )
 _SURROGATE_EFFECT = JsonForm(
     "SurrogateEffectJson",
@@ -114,7 +109,7 @@ _SURROGATE = JsonForm(
         "effects",
         {str: _SURROGATE_EFFECT},
         "By parameter.",
-        lambda item: {of.parameter: of for of in item.effects},
+        by_name("effects", "parameter"),
     ),
 )
 _MISSED = JsonForm(
@@ -153,9 +148,7 @@ _OPTIMUM = JsonForm(
 
 
 def _columns(of: str) -> Key:
-    return Key(
-        of, {str: _COLUMN}, of=lambda record: {item.name: item for item in getattr(record, of)}
-    )
+    return Key(of, {str: _COLUMN}, of=by_name(of))
 
 
 def _shares(of: str, form: JsonForm, words: str) -> Key:
@@ -192,7 +185,7 @@ _STUDY = JsonForm(
         "surrogates",
         {str: _SURROGATE},
         "By measure.",
-        lambda record: {item.measure: item for item in record.surrogates},
+        by_name("surrogates", "measure"),
     ),
     Key("missed_bounds", [_MISSED], "Of drawn points, for each bound.", "missed"),
     Key("optimum", (_OPTIMUM, None), "Of klack optimise."),
