@@ -328,6 +328,16 @@ def test_a_drawn_body_shows_its_edges_volume_and_mass(capsys):
         assert words in shown
 
 
+def test_a_computed_number_without_unit_is_followed_by_its_expression(capsys, tmp_path):
+    text = find_case("two-rods").read_text("utf-8")
+    assert text.count("poisson: 0.0") == 1
+    file = tmp_path / "case.yaml"
+    file.write_text(text.replace("poisson: 0.0", "poisson: '= 0.6 / 2'"), "utf-8")
+
+    assert main(["inspect", str(file)]) == 0
+    assert " 0.3, from '= 0.6 / 2'" in capsys.readouterr().out
+
+
 def test_parameters_and_parts_of_a_case_are_shown(capsys, tmp_path):
     """Truth: the files of the page on parameters and parts."""
     case = Path(__file__).parents[2] / "docs" / "how-to" / "four_injectors.yaml"

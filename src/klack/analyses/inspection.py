@@ -100,10 +100,11 @@ def _value(case: CaseFile, found: ExpandedCase, key: Key) -> str:
         node, field = written_at(found.data, key), None
     kind = kind_at(node, field)
     if isinstance(node, float | int) and kind is not None:
-        if takes_prefix(kind.unit):
+        unit, size = unit_in(kind.example, kind)
+        if takes_prefix(kind.unit) or not unit:
             node = format_si(float(node), kind.unit, 7)
         else:  # as the field writes it: mm^2, g, degC
-            node = format_in(float(node), *unit_in(kind.example, kind), 7)
+            node = format_in(float(node), unit, size, 7)
     elif isinstance(node, Computed):
         return str(node)
     return f"{node}, from '{found.expressions[key].text}'"
