@@ -14,12 +14,14 @@ import pytest
 from draws import program
 
 import klack
+from klack.analyses.heat.run import run_heat
 from klack.analyses.stroke import run as stroke_run
 from klack.analyses.stroke.analysis import STROKE
 from klack.analyses.stroke.measures import steps_told
 from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
 from klack.analyses.stroke.run import run_stroke
 from klack.analyses.stroke.step_check import ImpactChange, checked_steps, impact_changes, told
+from klack.app.explorer import Explorer
 from klack.case.any_case import load_valve_case, read_valve_case
 from klack.errors import InputError
 from klack.network.accuracy import PROMISED
@@ -221,6 +223,68 @@ def test_points_of_a_study_are_computed_in_steps_that_are_short_enough(truth):
     assert 0.0 < found["step_change"][0] <= 0.5
     assert plain["halvings"][0] == 0.0
     assert isnan(plain["step_change"][0])
+
+
+@pytest.mark.slow
+def test_sliders_take_the_steps_that_the_stroke_of_the_case_requires(truth):
+    """Truth: fine steps alone; a preload that makes impacts faster, and so depend on them more."""
+    path = HOW_TO / "small_valve.yaml"
+    text = path.read_text().replace("step: 20 ns", "step: 100 ns")
+
+    def first_peak(text: str) -> float:
+        opened = Explorer().open(text, str(path))
+        return next(n.value for n in opened.first.numbers if n.key == "peak_opening")
+
+    unchecked = first_peak(text.replace("step: 100 ns", "step: 100 ns, check_steps: false"))
+    peak = truth[0][1]
+    assert abs(first_peak(text) / peak - 1.0) < 5e-4 < abs(unchecked / peak - 1.0)
+
+
+def test_sliders_say_where_their_steps_are_too_long():
+    """Far from the case: shorter steps, which klack stroke takes there, have no doubt."""
+    path = HOW_TO / "small_valve.yaml"
+    text = path.read_text().replace("duration: 2 ms, step: 20 ns", "duration: 300 us, step: 40 ns")
+    explorer = Explorer()
+    explorer.open(text, str(path))
+    heavy = {"network.components.spring.preload": 0.5, "network.components.opening.gap": 4e-4}
+
+    here, there = explorer.judge({}), explorer.judge(heavy)
+
+    assert (here.grade, "The time steps are short enough." in here.words) == ("none", True)
+    assert (there.grade, "too long for this valve" in there.words) == ("out", True)
+
+
+@pytest.mark.slow
+def test_derivatives_are_those_of_strokes_in_steps_that_are_short_enough(truth):
+    """Unasked, as of a single stroke: the values are those of the truth."""
+    names = ["opening.peak_force", "opening.2.peak_force"]
+    case = klack.load_case(HOW_TO / "small_valve.yaml")
+    key = "network.components.spring.preload"
+
+    def off(**run: Any) -> float:
+        changed = case
+        for name, value in {"step": "100 ns", **run}.items():
+            changed = changed.with_value(f"run.{name}", value)
+        found = klack.sensitivities(changed, parameters=[key], measures=names, variant="dry")
+        pairs = zip(found.measures, truth, strict=False)
+        return max(abs((one.value or 0.0) / peak - 1.0) for one, (_, peak) in pairs)
+
+    assert off() < 5e-4 < off(check_steps=False)
+
+
+def test_a_warm_up_takes_the_steps_that_its_stroke_requires():
+    """Truth: the same in steps that need not be halved (0.02 %, promised 0.05 %)."""
+    case = load_valve_case(ROOT / "cases" / "warm-valve" / "case.yaml")
+
+    def soaked(**changes: Any) -> dict[str, Any]:
+        run = case.run.model_copy(update=changes)
+        found = run_heat(case.model_copy(update={"run": run}), soak=[353.15])
+        return {column.name: column.values[0] for column in found.numbers}
+
+    fine, checked, plain = soaked(), soaked(step=4e-7), soaked(step=4e-7, check_steps=False)
+    peaks = ["first peak at the stop", "first peak at the seat"]
+    assert all(checked[name] == pytest.approx(fine[name], rel=5e-5) for name in peaks)
+    assert any(abs(plain[name] / fine[name] - 1.0) > 1e-4 for name in peaks)
 
 
 @pytest.mark.slow

@@ -109,6 +109,17 @@ def test_placements_decide_where_the_needle_touches(alone):
     assert others[1].stops["opening"]["peak_force"] != centred.stops["opening"]["peak_force"]
 
 
+def test_two_strokes_tell_how_far_impacts_depend_on_the_steps(setup, starts, alone):
+    """The centred and the first one, as klack stroke does; in steps of 1 us they are off."""
+    case = setup.valve.case
+    run = case.run.model_copy(update={"step": 1e-6, "duration": 0.5 * case.run.duration})
+    coarse = replace(setup, valve=replace(setup.valve, case=case.model_copy(update={"run": run})))
+    begun = [starts.centred(), starts.drawn(0), starts.drawn(1)]
+    found = [run_one_stroke(coarse, StrokeTask(variant="dry", start=start)) for start in begun]
+    told = ["all time steps twice as long" in " ".join(one.doubts) for one in found]
+    assert told == [True, True, False]
+
+
 def test_strokes_keep_the_energy_balance(alone):
     for outcome in alone:
         assert abs(outcome.stroke["energy_residual"]) < 1e-9

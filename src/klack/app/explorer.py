@@ -36,6 +36,7 @@ from klack.analyses.stroke.analysis import first_impact
 from klack.analyses.stroke.missing import missing_notes
 from klack.analyses.stroke.record import StrokeChannels, StrokeVariant
 from klack.analyses.stroke.run import (
+    VariantRun,
     body_summaries,
     one_variant,
     stop_summaries,
@@ -49,11 +50,12 @@ from klack.assembling.valve import Valve, build_valve, filled_network
 from klack.bodies.elasticity.loads import NearLoads
 from klack.case.any_case import AnyCase, CaseTree, tree_of
 from klack.case.key_path import quantity_at, written_at
+from klack.case.levels import Variant
 from klack.case.points import case_at, checked_parts
 from klack.case.rewriting import with_values
 from klack.case.schema import Case
 from klack.case.valve import ValveCase
-from klack.case.valve_roles import find_roles
+from klack.case.valve_roles import ValveRoles, find_roles
 from klack.contact.history import ImpactHistory
 from klack.errors import InputError, KlackError
 from klack.input.problem import CaseProblem, Key
@@ -627,17 +629,26 @@ class _Strokes:
         self.run = str(case.one_variant(None))
         self._notes = notes
         self._transfers = Transfers()
+        self._halvings = 0
+        if case.motion == "axial":  # in the steps that the stroke of the case requires
+            self._halvings = self._stroke(case, check=True)[-1].variant.halvings
 
     def close(self) -> None:
         """Nothing has to be freed."""
 
-    def at(self, case: ValveCase) -> _Computed:
+    def _stroke(
+        self, case: ValveCase, *, check: bool = False
+    ) -> tuple[Valve, ValveRoles, Variant, VariantRun]:
         network = filled_network(case, self._valve.reduced, self._valve.laws)
         valve = replace(self._valve, case=case, network=network)
-        roles = find_roles(case, network)
-        variant = case.one_variant(self.run)
+        roles, variant = find_roles(case, network), case.one_variant(self.run)
+        halvings = self._halvings
+        run = one_variant(valve, roles, variant, silent, halvings=halvings, check=check)
+        return valve, roles, variant, run
+
+    def at(self, case: ValveCase) -> _Computed:
         with collected_warnings() as caught:
-            run = one_variant(valve, roles, variant, silent, check=False)
+            valve, roles, variant, run = self._stroke(case)
             study = study_of_run(valve, roles, variant, run, self._bodies, self._stops)
             source = stroke_sources(study, case=case)[0]
         found = run.variant
@@ -662,9 +673,21 @@ class _Strokes:
         )
 
     def judged(self, case: ValveCase) -> tuple[str, str]:
-        """No estimate is known for strokes."""
+        """Whether impacts depend on the steps; no other estimate is known for strokes."""
+        steps = None
+        if case.motion == "axial":
+            steps = self._stroke(case, check=True)[-1].steps
+        if steps is not None and steps.doubt:
+            return "out", f"{steps.doubt[0].upper()}{steps.doubt[1:]}"
+        if steps is not None and steps.halvings:
+            return "out", (
+                "The time steps of the sliders are too long for this valve: klack stroke halves "
+                f"them {steps.halvings} more times. Try: save this case, and open its sliders."
+            )
+        are_short = "The time steps are short enough. " if steps is not None else ""
         return "none", (
-            "klack has no error estimate for strokes; klack advise gives one for a step and a mesh."
+            f"{are_short}klack has no other error estimate for strokes; klack advise gives one for "
+            "a step and a mesh."
         )
 
 

@@ -276,6 +276,7 @@ def run_tangents(
     accuracy: Accuracy = "normal",
     step: float | None = None,
     coarse: int | None = None,
+    sizes: StepSizes | None = None,
     record: float = 0.5e-6,
     start: Literal["rest", "free"] = "rest",
     progress: Callable[[float], None] = lambda fraction: None,
@@ -284,7 +285,7 @@ def run_tangents(
 
     Parameters
     ----------
-    rows, duration, accuracy, step, coarse, record, start, progress
+    rows, duration, accuracy, step, coarse, sizes, record, start, progress
         As of :func:`klack.simulation.network_run.simulate_network`.
     directions
         At most :data:`DIRECTIONS`.
@@ -302,7 +303,7 @@ def run_tangents(
             expected="compiled components only",
             hint="klack study with a few values of each parameter asks the program as it is.",
         )
-    sizes = step_sizes(rows, accuracy, step=step, coarse=coarse)
+    sizes = sizes or step_sizes(rows, accuracy, step=step, coarse=coarse)
     begin = process_time()
     running = _Running(rows, directions, sizes, duration, record, start)
     found = running.run(progress)

@@ -244,14 +244,16 @@ def heated_stroke(
     roles: ValveRoles,
     variant: Variant,
     at: Mapping[Aspect, Mapping[str, float]],
+    halvings: int = 0,
 ) -> HeatedStroke:
     """Compute a stroke, from rest, at temperatures [K] that stay constant in it.
 
+    ``halvings`` of all steps are those that the stroke of the case requires.
     ConvergenceError for a stroke that does not reach its end.
     """
     warm = warm_valve(valve, at)
     with trial():  # its warnings are those of the same stroke of klack stroke
-        run = one_variant(warm.valve, roles, variant, silent, check=False)
+        run = one_variant(warm.valve, roles, variant, silent, halvings=halvings, check=False)
     if run.failure is not None:
         shown = {
             f"{name} {T - 273.15:.4g} °C" for nodes in at.values() for name, T in nodes.items()

@@ -22,6 +22,7 @@ from klack.analyses.heat.heated_stroke import (
 )
 from klack.analyses.heat.record import CauseRow, HeatStudy, WarmColumn
 from klack.analyses.record import case_fields, run_fields
+from klack.analyses.stroke.run import one_variant
 from klack.analyses.unfinished import LogForm, UnfinishedLog, fingerprint
 from klack.assembling.valve import Valve, build_valve
 from klack.case.levels import Variant
@@ -97,6 +98,7 @@ class _Strokes:
     log: HeatLog
     progress: Progress
     aspects: tuple[Aspect, ...]
+    halvings: int
     asked: set[str] = field(default_factory=set)
     cpu_time: float = 0.0
     doubts: dict[str, None] = field(default_factory=dict)
@@ -114,11 +116,14 @@ class _Strokes:
         self.progress("strokes", 0.0)
         if key not in self.log.done:
             begin = process_time()
-            self.log.add(key, heated_stroke(self.valve, self.roles, self.variant, nodes))
+            self.log.add(key, self._stroke(nodes))
             self.cpu_time += process_time() - begin
         found = self.log.done[key]
         self.doubts |= dict.fromkeys(found.doubts)
         return found
+
+    def _stroke(self, nodes: Mapping[Aspect, Temperatures]) -> HeatedStroke:
+        return heated_stroke(self.valve, self.roles, self.variant, nodes, self.halvings)
 
 
 @tells_place
@@ -147,7 +152,9 @@ def run_heat(
     assert network is not None  # a section thermal names its nodes
     with collected_warnings() as warned, HEAT_LOG.open(folder, heat_mark(case, threads)) as log:
         valve = build_valve(case, clock, threads=threads)
-        strokes = _Strokes(valve, find_roles(case), name, log, clock, aspects)
+        roles = find_roles(case)
+        cold = one_variant(valve, roles, name, clock)  # warns if impacts depend on the steps
+        strokes = _Strokes(valve, roles, name, log, clock, aspects, cold.variant.halvings)
         if soak:
             found = _soaked(strokes, network, soak)
         else:

@@ -69,6 +69,7 @@ def run_sensitivities(
     clock = StageClock(progress)
     with collected_warnings() as notes:
         runner = SlopeRunner(case, tree, space, name, clock, threads)
+        runner.check_steps()
         runs = runner.tangents()
         slopes = runner.slopes(runs, chosen)
         others, not_checked = _others_of(runner) if check else (None, ())

@@ -34,6 +34,7 @@ from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
 from klack.analyses.stroke.run import (
     VariantRun,
     body_summaries,
+    halved,
     one_variant,
     stop_summaries,
     study_of_run,
@@ -215,6 +216,7 @@ class SlopeRunner:
     ) -> None:
         self.space, self.name, self.clock = space, name, clock
         self.runs_time = 0.0
+        self.halvings = 0
         written = space.written({})
         points = points_of(case, tree, [written])
         self._places = {key.name: key.place for key in points.keys}
@@ -262,9 +264,7 @@ class SlopeRunner:
                     rows,
                     part,
                     duration=run.duration,
-                    accuracy=run.accuracy,
-                    step=run.step,
-                    coarse=run.coarse,
+                    sizes=halved(self.valve.case, rows, self.halvings),
                     record=run.record,
                     progress=partial(self._tell, done, share),
                 )
@@ -290,6 +290,11 @@ class SlopeRunner:
                 ) from None
         return Direction(name=item.name, plus=ends[0], minus=ends[1], distance=2.0 * shift)
 
+    def check_steps(self) -> None:
+        """Halve all steps as often as the stroke in the middle requires, and warn of the rest."""
+        run = one_variant(self.valve, self.roles, self.name, self.clock)
+        self.halvings = run.variant.halvings
+
     def stroke(self, shifts: Mapping[str, float]) -> StrokeOfPoint:
         """Stroke without derivatives, with shifted parameters."""
         valve = self.at(shifts)
@@ -298,7 +303,9 @@ class SlopeRunner:
             self.clock("check", done)
 
         # in the steps of the run with derivatives
-        run = one_variant(valve, self.roles, self.name, progress, check=False)
+        run = one_variant(
+            valve, self.roles, self.name, progress, halvings=self.halvings, check=False
+        )
         if run.failure is not None:
             raise run.failure
 

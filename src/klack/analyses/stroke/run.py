@@ -52,12 +52,13 @@ from klack.schematic.picture import schematic_svg
 from klack.simulation.displaced_liquid import told_once
 from klack.simulation.network_result import IncompleteRunError, NetworkResult
 from klack.simulation.network_run import SpatialMotion, State, Watch, simulate_network
-from klack.simulation.step_sizes import StepSizes, scaled
+from klack.simulation.step_sizes import StepSizes, scaled, step_sizes
 from klack.units import format_si
 
 __all__ = [
     "VariantRun",
     "body_summaries",
+    "halved",
     "one_variant",
     "run_stroke",
     "run_variant",
@@ -311,7 +312,7 @@ def one_variant(
     progress: Progress,
     *,
     after: NetworkResult | None = None,
-    sizes: StepSizes | None = None,
+    halvings: int = 0,
     check: bool = True,
     until: Callable[[StrokeVariant], float] | None = None,
 ) -> VariantRun:
@@ -319,8 +320,8 @@ def one_variant(
 
     Parameters
     ----------
-    sizes
-        Of steps that are not checked.
+    halvings
+        How often all steps are halved from the start: what the check of a like stroke has found.
     check
         Whether steps are checked, and halved where impacts depend on them, unless the case says.
     until
@@ -334,11 +335,11 @@ def one_variant(
     begin = perf_counter()
     progress = _LiftAndForces(progress, roles, str(name))
     asked = valve.case.run.check_steps
-    checked = sizes is None and (check if asked is None else asked)
+    checked = check if asked is None else asked
     progress(f"run {name}", 0.0)
     kept: AbstractContextManager[Warned] = trial() if checked else nullcontext([])
     with kept as caught:
-        run = _attempt(valve, name, progress, after=after, sizes=sizes)
+        run = _attempt(valve, name, progress, after=after, halvings=halvings)
     setup_time = perf_counter() - begin - run.result.wall_time
     steps: CheckedSteps | None = None
     if checked and after is not None:
@@ -357,10 +358,17 @@ def one_variant(
     show(caught)
     variant = variant_of(valve, roles, name, run.rows, run.result, setup_time)
     if steps is not None:
-        variant = replace(variant, changes=steps.changes, halvings=steps.halvings)
+        variant = replace(variant, changes=steps.changes, halvings=halvings + steps.halvings)
         if steps.doubt:
             warnings.warn(f"'{name}': {steps.doubt}", AccuracyWarning, stacklevel=2)
     return VariantRun(variant=variant, rows=run.rows, failure=run.failure, steps=steps)
+
+
+def halved(case: ValveCase, rows: Rows, halvings: int) -> StepSizes:
+    """Steps that the case asks for, all of them halved that often."""
+    run = case.run
+    sizes = step_sizes(rows, run.accuracy, step=run.step, coarse=run.coarse)
+    return scaled(rows, sizes, 0.5**halvings) if halvings else sizes
 
 
 class _LiftAndForces:
@@ -402,6 +410,7 @@ def _attempt(
     progress: Progress,
     *,
     after: NetworkResult | None = None,
+    halvings: int = 0,
     sizes: StepSizes | None = None,
     watch: Watch | None = None,
 ) -> _Attempt:
@@ -409,6 +418,8 @@ def _attempt(
     rows = variant_network(valve, name).rows()
     if after is not None and after.sizes.step != valve.case.run.fine_step:
         sizes = after.sizes  # halved by a check
+    elif halvings:
+        sizes = halved(valve.case, rows, halvings)
     try:
         result = run_variant(
             valve.case,

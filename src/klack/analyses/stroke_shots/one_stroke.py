@@ -201,6 +201,8 @@ Numbers = dict[str, float]
 _TRACE_POINTS = 600
 _AT_REST = 0.01  # [m/s] of the centre of mass: a bounce of 5 um under 10 g
 _NAN = float("nan")
+_CHECKED = (CENTRED, 0)
+"""Strokes whose steps are checked: others of the same valve depend on theirs as much."""
 _ENERGIES = {
     measure.key: measure
     for measure in DESIGN_MEASURES
@@ -263,7 +265,8 @@ def run_one_stroke(setup: StrokeSetup, task: StrokeTask) -> StrokeOutcome:
     valve = replace(setup.valve, spatial=spatial)
     with collected_warnings() as doubts, threadpool_limits(limits=1, user_api="blas"):
         try:
-            run = one_variant(valve, setup.roles, task.variant, silent, check=False)
+            check = start.index in _CHECKED
+            run = one_variant(valve, setup.roles, task.variant, silent, check=check)
         except ConvergenceError as error:  # before the first record
             return _nothing(setup, task, str(error))
         energies, notes = _energies(valve, setup, task.variant, run)
