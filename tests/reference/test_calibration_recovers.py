@@ -81,6 +81,21 @@ def test_profile_of_a_nearly_linear_parameter_is_its_interval():
     assert profile.upper == pytest.approx(friction.upper_95, abs=0.15 * width)
 
 
+def test_steps_that_are_too_long_are_halved(studies):
+    """Truth: the same fit in short steps; without the check it is 8 times as far, and says so."""
+    text = NO_PROFILE.replace("step: 0.2 us", "step: 1 us")
+    checked = calibrate(measured(0), text)
+    plain = calibrate(measured(0), text.replace("step: 1 us", "step: 1 us, check_steps: false"))
+
+    def off(study):
+        pairs = zip(study.parameters, studies[0].parameters, strict=True)
+        return max(abs(a.value - b.value) / b.standard_error for a, b in pairs)
+
+    assert off(checked) < 0.02 < off(plain)
+    assert checked.warnings == ()
+    assert ["too low by about" in note for note in plain.warnings] == [True, True]
+
+
 def test_an_offset_that_is_zeroed_away_is_said_to_be_invisible():
     strokes = measured(2, count=3, begin=-0.1e-3)
     zeroed = tuple(

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.analyses.stroke.run import halved
 from klack.analyses.unfinished import LogForm, UnfinishedLog, fingerprint
 from klack.analyses.workers import LoggedWork
 from klack.assembling.modes import damping_of
@@ -25,6 +26,7 @@ from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles
 from klack.errors import InputError
 from klack.input.problem import Key, one_of
+from klack.machine.stages import trial
 from klack.measurement.channels import LiftSensor, Trigger
 from klack.measurement.lift_sensor import recorded_stroke
 from klack.measurement.stroke_measures import StrokeSet
@@ -74,6 +76,7 @@ class MotionModel:
 
     ``parameters`` are those of the motion, ``channels`` recorded ones by role; ``record`` [s] is
     the spacing of the records; ``by_layers`` [-] are damping ratios by the layers of bodies.
+    ``halvings`` of all steps are those that the stroke of the case requires.
     """
 
     tree: CaseTree
@@ -85,6 +88,7 @@ class MotionModel:
     by_layers: Mapping[str, NDArray[np.float64]]
     laws: Mapping[str, StopFaces]
     record: float
+    halvings: int = 0
 
     def changes(self, values: Sequence[float]) -> dict[Key, str | float]:
         """Texts for the case at parameter values [SI]."""
@@ -94,8 +98,8 @@ class MotionModel:
             for place in parameter.places
         }
 
-    def run(self, values: Sequence[float], duration: float) -> Motion:
-        """Compute one stroke with these values [SI] of the parameters.
+    def at(self, values: Sequence[float]) -> tuple[ValveCase, Network]:
+        """Case and network with these values [SI] of the parameters.
 
         InputError for values that the case refuses.
         """
@@ -108,18 +112,27 @@ class MotionModel:
             )
             for name, body in self.reduced.items()
         }
-        network = filled_network(case, damped, self.laws)
+        return case, filled_network(case, damped, self.laws)
+
+    def run(self, values: Sequence[float], duration: float) -> Motion:
+        """Compute one stroke with these values [SI] of the parameters.
+
+        InputError for values that the case refuses.
+        """
+        case, network = self.at(values)
         if self.variant == "dry":
             network = network.dry()
-        run = case.run
-        result = simulate_network(
-            network.rows(),
-            duration=duration,
-            accuracy=run.accuracy,
-            step=run.fine_step / _FINER,
-            coarse=None if run.coarse is None else min(run.coarse * _FINER, _MOST_COARSE),
-            record=min(self.record, run.record),
-        )
+        run, rows = case.run, network.rows()
+        with trial():  # the fitted stroke warns
+            result = simulate_network(
+                rows,
+                duration=duration,
+                sizes=halved(case, rows, self.halvings) if self.halvings else None,
+                accuracy=run.accuracy,
+                step=run.fine_step / _FINER,
+                coarse=None if run.coarse is None else min(run.coarse * _FINER, _MOST_COARSE),
+                record=min(self.record, run.record),
+            )
         names = {"opening": self.roles.opening_stop, "seat": self.roles.seat}
         return Motion(
             step=float(result.time[1] - result.time[0]),

@@ -1,5 +1,6 @@
 """``klack calibrate``: fit parameters of a valve to measured strokes."""
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -27,8 +28,9 @@ from klack.analyses.calibration.record import (
 )
 from klack.analyses.comparison.strokes import require_same_way
 from klack.analyses.record import case_fields, run_fields
+from klack.analyses.stroke.run import one_variant
 from klack.assembling.modes import damping_of
-from klack.assembling.valve import build_valve
+from klack.assembling.valve import Valve, build_valve
 from klack.case.any_case import CaseTree, read_valve_case
 from klack.case.free_parameters import FreeParameter, free_parameters
 from klack.case.key_path import written_at
@@ -36,12 +38,12 @@ from klack.case.measurement import CaseCalibration, CaseMeasurement
 from klack.case.rewriting import moved_files, rewritten, written_quantity
 from klack.case.spatial_consistency import require_axial
 from klack.case.valve import ValveCase
-from klack.case.valve_roles import find_roles
-from klack.errors import InputError, refuse_if
+from klack.case.valve_roles import ValveRoles, find_roles
+from klack.errors import AccuracyWarning, InputError, refuse_if
 from klack.input.problem import one_of
 from klack.machine.cores import available_cores
 from klack.machine.progress import Progress, silent
-from klack.machine.stages import StageClock, collected_warnings
+from klack.machine.stages import StageClock, collected_warnings, trial
 from klack.measurement.channels import ROLES, LiftSensor
 from klack.measurement.fit_window import (
     FitWindow,
@@ -123,7 +125,12 @@ def run_calibration(
     mark = calibration_mark(case, strokes)
     with trial_log(folder, mark) as log, collected_warnings() as notes:
         resumed = len(log.done)
-        model = _motion_model(case, tree, parameters, strokes, measurement, clock, threads)
+        valve, roles = build_valve(case, clock, threads=threads), find_roles(case)
+        with trial():  # the fitted stroke warns
+            first = one_variant(valve, roles, section.variant, clock)
+        model = _motion_model(
+            tree, parameters, strokes, measurement, valve, roles, first.variant.halvings
+        )
         with TrialPool(model, workers, log) as pool:
             clock("first strokes", 0.0)
             shown = StrokeModel(
@@ -140,6 +147,9 @@ def run_calibration(
             found, doubts = _calibrate(case, section, strokes, shown, clock)
             evaluations = len(pool.used)
             resumed = sum(key in pool.used for key in list(log.done)[:resumed])
+        pairs = zip(parameters, found["parameters"], strict=True)
+        values = [fitted.value for one, fitted in pairs if not one.of_sensor]
+        _check_steps(model, valve, values, clock)
     return CalibrationStudy(
         **case_fields(case),
         **run_fields(begin, clock),
@@ -191,18 +201,35 @@ def _require_channels(strokes: StrokeSet, section: CaseCalibration) -> None:
     )
 
 
+def _check_steps(
+    model: MotionModel, valve: Valve, values: Sequence[float], progress: Progress
+) -> None:
+    """Warn of what ``klack stroke`` warns of, and of steps too long for the fitted ``values``."""
+    case, network = model.at(values)
+    valve = replace(valve, case=case, network=network)
+    name, halvings = case.one_variant(model.variant), model.halvings
+    last = one_variant(valve, model.roles, name, progress, halvings=halvings).variant
+    if last.halvings > halvings:
+        warnings.warn(
+            f"the fitted stroke depends on its time steps more than the one at the start: it needs "
+            f"them halved {last.halvings} times, and was fitted with {halvings}. Try: calibrate "
+            "again from the fitted values.",
+            AccuracyWarning,
+            stacklevel=2,
+        )
+
+
 def _motion_model(
-    case: ValveCase,
     tree: CaseTree,
     parameters: tuple[FreeParameter, ...],
     strokes: StrokeSet,
     measurement: CaseMeasurement,
-    clock: StageClock,
-    threads: int | None,
+    valve: Valve,
+    roles: ValveRoles,
+    halvings: int,
 ) -> MotionModel:
+    case = valve.case
     section = calibration_of(case)
-    roles = find_roles(case)
-    valve = build_valve(case, clock, threads=threads)
     trigger = measurement.trigger
     wanted = dict.fromkeys(["lift", *section.channels, *([trigger.channel] if trigger else [])])
     return MotionModel(
@@ -219,6 +246,7 @@ def _motion_model(
         },
         laws=valve.laws,
         record=max(strokes.step / _FINER, _FINEST),
+        halvings=halvings,
     )
 
 
