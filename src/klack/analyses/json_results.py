@@ -1,207 +1,162 @@
 """Output of ``--json`` of each command: one type for the code, the schema and the docs.
 
 Every analysis has a type of its own (:attr:`Analysis.json`); those of the other commands stand
-here.  Functions that make the JSON are annotated with these types, so that the type checker
-compares their keys; the schema that ``klack schema --kind result`` prints and the page of the
-reference are generated from them.  Numbers are SI, the unit in the key; what does not exist (nan,
+here.  The JSON, the schema that ``klack schema --kind result`` prints and the page of the reference
+are generated from them.  Numbers are SI, the unit in the key; what does not exist (nan,
 infinite) is null.  The number behind the slash of ``schema`` goes up when a key goes or changes its
 meaning.
 """
 
-from typing import Annotated, Any, Literal
+from operator import itemgetter
+from types import SimpleNamespace
+from typing import Any
 
-from pydantic import Field, TypeAdapter
-from typing_extensions import TypedDict
+from pydantic import TypeAdapter
 
 from klack.analyses.catalogue import analyses
-from klack.analyses.json_parts import Real
+from klack.analyses.json_parts import JsonForm, Key, Real, by_name, schema_key
 from klack.analyses.measures import described
 
-__all__ = [
-    "AboutJson",
-    "CacheJson",
-    "ComponentsJson",
-    "ExportJson",
-    "InspectionJson",
-    "ReportJson",
-    "ShowJson",
-    "VerificationJson",
-    "WarmJson",
-    "measures_catalogue",
-    "result_schema",
-]
+__all__ = ["command_json", "measures_catalogue", "result_schema"]
 
 
-class CheckJson(TypedDict):
-    """One verification check."""
-
-    group: str
-    name: str
-    expected: Real
-    computed: Real
-    deviation: Real
-    deviation_unit: str
-    tolerance: float
-    headroom: Real
-    wide: bool
-    passed: bool
-    source: str
-    reason: str
-
-
-class VerificationJson(TypedDict):
-    """``klack verify``."""
-
-    schema: Literal["klack-verify/1"]
-    about: Annotated[dict[str, str], Field(description="Versions and machine.")]
-    checks: list[CheckJson]
-
-
-class AboutJson(TypedDict):
-    """``klack about``."""
-
-    schema: Literal["klack-about/1"]
-    about: Annotated[dict[str, str], Field(description="By name; for people.")]
-
-
-class CacheJson(TypedDict):
-    """``klack cache``."""
-
-    schema: Literal["klack-cache/1"]
-    folder: Annotated[str | None, Field(description="Null where the cache is off.")]
-    count: int
-    size_B: int
-    limit_B: int
-
-
-class WarmedJson(TypedDict):
-    """One group of compiled functions."""
-
-    compiled: Annotated[int, Field(description="Functions; 0 if all were there.")]
-    compile_time_s: float
-
-
-class WarmJson(TypedDict):
-    """``klack warm``."""
-
-    schema: Literal["klack-warm/1"]
-    folder: str
-    count: int
-    size_B: int
-    groups: dict[str, WarmedJson]
-
-
-class InspectedRowJson(TypedDict):
-    """One row of the table."""
-
-    what: str
-    name: str
-    content: str
-
-
-class InspectionJson(TypedDict):
-    """``klack inspect``."""
-
-    schema: Literal["klack-inspect/1"]
-    file: str
-    parts: Annotated[
-        dict[str, list[InspectedRowJson]],
-        Field(
-            description="By the name of the file, or of each body of a case; also 'case: "
-            "parameters', 'case: values of expressions', 'case: components', 'case: connections'."
-        ),
-    ]
-
-
-class ShownNodeJson(TypedDict):
-    """One connection of a network."""
-
-    domain: str
-    ports: Annotated[list[str], Field(description="As component.port.")]
-    fixed: Annotated[str | None, Field(description="ground or ambient, if it is that.")]
-
-
-class ShowJson(TypedDict):
-    """``klack show``."""
-
-    schema: Literal["klack-show/1"]
-    case: str
-    file: str
-    bodies: Annotated[
-        dict[str, list[str]], Field(description="Named surfaces of each body that is drawn.")
-    ]
-    components: Annotated[
-        dict[str, str], Field(description="Type by name; none without a network.")
-    ]
-    nodes: list[ShownNodeJson]
-
-
-class ComponentPortJson(TypedDict):
-    """Port of a component type."""
-
-    domain: str
-    optional: bool
-
-
-class ComponentKeyJson(TypedDict):
-    """Key of a component type."""
-
-    unit: Annotated[str, Field(description="SI; empty for words and whole numbers.")]
-    required: bool
-    meaning: str
-
-
-class ComponentTypeJson(TypedDict):
-    """A component type."""
-
-    summary: str
-    ports: Annotated[
-        dict[str, ComponentPortJson],
-        Field(description="Empty for a body, whose ports are its points."),
-    ]
-    keys: dict[str, ComponentKeyJson]
-    equation: Annotated[str, Field(description="LaTeX; empty if there is none.")]
-    source: Annotated[str, Field(description="Empty for a definition.")]
-
-
-class ComponentsJson(TypedDict):
-    """``klack show --components``."""
-
-    schema: Literal["klack-show-components/1"]
-    types: Annotated[dict[str, ComponentTypeJson], Field(description="By type.")]
-
-
-class ReportJson(TypedDict):
-    """``klack report``."""
-
-    schema: Literal["klack-report/1"]
-    case: str
-    result: Annotated[str, Field(description="Folder of the result.")]
-    folder: Annotated[str, Field(description="Where the report is.")]
-    files: list[str]
-
-
-class ExportJson(TypedDict):
-    """``klack export``."""
-
-    schema: Literal["klack-export/1"]
-    case: str
-    to: Annotated[str, Field(description="Format.")]
-    folder: Annotated[str, Field(description="Where the files are.")]
-    files: Annotated[list[str], Field(description="Names of the files and folders written.")]
-
-
-_OTHERS = (
-    InspectionJson,
-    ShowJson,
-    ComponentsJson,
-    ReportJson,
-    ExportJson,
-    VerificationJson,
-    CacheJson,
-    WarmJson,
-    AboutJson,
+_CHECK = JsonForm(
+    "CheckJson",
+    "One verification check.",
+    Key("group", str),
+    Key("name", str),
+    Key("expected", Real),
+    Key("computed", Real),
+    Key("deviation", Real),
+    Key("deviation_unit", str),
+    Key("tolerance", float),
+    Key("headroom", Real),
+    Key("wide", bool, of="is_wide"),
+    Key("passed", bool),
+    Key("source", str),
+    Key("reason", str),
 )
+_WARMED = JsonForm(
+    "WarmedJson",
+    "One group of compiled functions.",
+    Key("compiled", int, "Functions; 0 if all were there.", "functions"),
+    Key("compile_time_s", float, of="seconds"),
+)
+_ROW = JsonForm(
+    "InspectedRowJson",
+    "One row of the table.",
+    *(Key(name, str, of=itemgetter(i)) for i, name in enumerate(("what", "name", "content"))),
+)
+_NODE = JsonForm(
+    "ShownNodeJson",
+    "One connection of a network.",
+    Key("domain", str),
+    Key("ports", list[str], "As component.port.", lambda node: list(map(str, node.joints))),
+    Key("fixed", str | None, "ground or ambient, if it is that.", lambda node: node.word or None),
+)
+_PORT = JsonForm(
+    "ComponentPortJson", "Port of a component type.", Key("domain", str), Key("optional", bool)
+)
+_KEY = JsonForm(
+    "ComponentKeyJson",
+    "Key of a component type.",
+    Key("unit", str, "SI; empty for words and whole numbers."),
+    Key("required", bool),
+    Key("meaning", str),
+)
+_TYPE = JsonForm(
+    "ComponentTypeJson",
+    "A component type.",
+    Key("summary", str),
+    Key("ports", {str: _PORT}, "Empty for a body, whose ports are its points."),
+    Key("keys", {str: _KEY}),
+    Key("equation", str, "LaTeX; empty if there is none."),
+    Key("source", str, "Empty for a definition."),
+)
+_COMMANDS = {
+    "inspect": JsonForm(
+        "InspectionJson",
+        "``klack inspect``.",
+        schema_key("klack-inspect/1"),
+        Key("file", str),
+        Key(
+            "parts",
+            {str: [_ROW]},
+            "By the name of the file, or of each body of a case; also 'case: "
+            "parameters', 'case: values of expressions', 'case: components', 'case: connections'.",
+        ),
+    ),
+    "show": JsonForm(
+        "ShowJson",
+        "``klack show``.",
+        schema_key("klack-show/1"),
+        Key("case", str),
+        Key("file", str),
+        Key("bodies", dict[str, list[str]], "Named surfaces of each body that is drawn."),
+        Key("components", dict[str, str], "Type by name; none without a network."),
+        Key("nodes", [_NODE]),
+    ),
+    "show-components": JsonForm(
+        "ComponentsJson",
+        "``klack show --components``.",
+        schema_key("klack-show-components/1"),
+        Key("types", {str: _TYPE}, "By type.", by_name("types", "word")),
+    ),
+    "report": JsonForm(
+        "ReportJson",
+        "``klack report``.",
+        schema_key("klack-report/1"),
+        Key("case", str),
+        Key("result", str, "Folder of the result."),
+        Key("folder", str, "Where the report is."),
+        Key("files", list[str]),
+    ),
+    "export": JsonForm(
+        "ExportJson",
+        "``klack export``.",
+        schema_key("klack-export/1"),
+        Key("case", str),
+        Key("to", str, "Format."),
+        Key("folder", str, "Where the files are."),
+        Key("files", list[str], "Names of the files and folders written."),
+    ),
+    "verify": JsonForm(
+        "VerificationJson",
+        "``klack verify``.",
+        schema_key("klack-verify/1"),
+        Key("about", dict[str, str], "Versions and machine."),
+        Key("checks", [_CHECK]),
+    ),
+    "cache": JsonForm(
+        "CacheJson",
+        "``klack cache``.",
+        schema_key("klack-cache/1"),
+        Key("folder", str | None, "Null where the cache is off."),
+        Key("count", int),
+        Key("size_B", int),
+        Key("limit_B", int),
+    ),
+    "warm": JsonForm(
+        "WarmJson",
+        "``klack warm``.",
+        schema_key("klack-warm/1"),
+        Key("folder", str),
+        Key("count", int),
+        Key("size_B", int),
+        Key("groups", {str: _WARMED}, of=by_name("groups")),
+    ),
+    "about": JsonForm(
+        "AboutJson",
+        "``klack about``.",
+        schema_key("klack-about/1"),
+        Key("about", dict[str, str], "By name; for people."),
+    ),
+}
+
+
+def command_json(command: str, **values: Any) -> dict[str, Any]:
+    """JSON of a command that is no analysis."""
+    return _COMMANDS[command].json(SimpleNamespace(**values))
 
 
 def measures_catalogue() -> dict[str, Any]:
@@ -218,7 +173,10 @@ def result_schema() -> dict[str, Any]:
     The key ``schema`` of a result tells which of the choices it is; ``x-measures`` is the catalogue
     of measures.
     """
-    kinds = (*(analysis.json for analysis in analyses()), *_OTHERS)
+    kinds = (
+        *(analysis.json for analysis in analyses()),
+        *(form.type for form in _COMMANDS.values()),
+    )
     references, definitions = TypeAdapter.json_schemas(
         [(kind.__name__, "serialization", TypeAdapter(kind)) for kind in kinds]
     )

@@ -1,6 +1,6 @@
 """Analyses, pages and commands by text, loaded when asked for."""
 
-from importlib import import_module
+from pkgutil import resolve_name
 from typing import Any
 
 __all__ = ["named"]
@@ -8,5 +8,4 @@ __all__ = ["named"]
 
 def named(place: str) -> Any:
     """Object of a module below :mod:`klack.analyses`: ``"noise.content:noise_content"``."""
-    module, _, name = place.partition(":")
-    return getattr(import_module(f"klack.analyses.{module}"), name)
+    return resolve_name(f"klack.analyses.{place}")

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from klack.case.parts import self_contained
-from klack.case.reader import Lines, parse, schema_of, text_of, validated
+from klack.case.reader import Lines, find_case, parse, schema_of, text_of, validated
 from klack.case.schema import Case
 from klack.case.valve import ValveCase, require_valve
 from klack.input.problem import Key
@@ -46,13 +46,13 @@ def load_valve_case(path: str | Path, components: OwnComponents = ()) -> ValveCa
     A case file runs no code: ``components`` of the user's own are classes that the caller hands
     over, named ``package.module:Class`` in the file.
     """
-    path = Path(path)
+    path = find_case(path)
     return read_valve_case(text_of(path), path, components)
 
 
 def load_any_case(path: str | Path, components: OwnComponents = ()) -> AnyCase:
     """Read and check a case file of either kind."""
-    path = Path(path)
+    path = find_case(path)
     return read_any_case(text_of(path), path, components)
 
 
@@ -102,8 +102,9 @@ class CaseTree:
         return validated(kind, self.text, self.path, self.data, self.lines, self.components)
 
 
-def read_case_tree(path: Path, components: OwnComponents = ()) -> CaseTree:
+def read_case_tree(path: str | Path, components: OwnComponents = ()) -> CaseTree:
     """Read the file of a case; ``components`` as of :func:`load_valve_case`."""
+    path = find_case(path)
     return tree_of(text_of(path), path, components)
 
 

@@ -102,12 +102,12 @@ _Kind = TypeVar("_Kind", bound=Section)
 
 
 def load_case(path: str | Path) -> Case:
-    """Read and check the case file of an impact.
+    """Read and check the case file of an impact; ``path`` as of :func:`find_case`.
 
     Files that it names are relative to its folder. The error names file, line, key, what came,
     what was expected and what to try.
     """
-    path = Path(path)
+    path = find_case(path)
     return read_case(text_of(path), path)
 
 

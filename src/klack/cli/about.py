@@ -4,13 +4,9 @@ import subprocess
 from importlib.metadata import PackageNotFoundError, version
 from os.path import expanduser
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from klack.terminal.options import SHOWN, Shown
 from klack.terminal.tables import TextTable
-
-if TYPE_CHECKING:
-    from klack.analyses.json_results import AboutJson
 
 __all__ = ["about"]
 
@@ -25,6 +21,7 @@ def about(*, wanted: Shown = SHOWN) -> int:
 
     For the report of a fault: copy all of it.
     """
+    from klack.analyses.json_results import command_json
     from klack.machine.cache.result_cache import result_cache
     from klack.machine.compiling.compiled_folder import compiled_folder
     from klack.verification.run_conditions import run_conditions
@@ -41,11 +38,8 @@ def about(*, wanted: Shown = SHOWN) -> int:
     wanted.show(
         [TextTable(title="klack", columns=("what", "is"), rows=tuple(found.items()), left=2)]
     )
-    written: AboutJson = {
-        "schema": "klack-about/1",
-        "about": {key.replace(" ", "_"): text for key, text in found.items()},
-    }
-    wanted.write(lambda: written)
+    written = {key.replace(" ", "_"): text for key, text in found.items()}
+    wanted.write(lambda: command_json("about", about=written))
     return 0
 
 

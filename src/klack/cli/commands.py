@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable, Iterable, Mapping
 from inspect import getdoc
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import App, Parameter
@@ -39,7 +40,6 @@ from klack.terminal.tables import TextTable
 
 if TYPE_CHECKING:
     from klack.analyses.inspection import Row
-    from klack.analyses.json_results import CacheJson, InspectionJson, ReportJson, WarmJson
     from klack.app.guard import Access
     from klack.warming.run import Warmed
 
@@ -120,15 +120,6 @@ def _open(address: str) -> None:
     webbrowser.open(Path(file.name).as_uri())
 
 
-_CACHE_OFF: "CacheJson" = {
-    "schema": "klack-cache/1",
-    "folder": None,
-    "count": 0,
-    "size_B": 0,
-    "limit_B": 0,
-}
-
-
 def cache(
     *,
     clear: Annotated[bool, Parameter(negative="", help="Delete everything in it.")] = False,
@@ -141,6 +132,7 @@ def cache(
     Meshes, modes and static solutions are kept, under a key of all that matters.
     Deleting them costs nothing but time.
     """
+    from klack.analyses.json_results import command_json
     from klack.machine.cache.result_cache import result_cache
     from klack.machine.memory import in_words
 
@@ -148,7 +140,8 @@ def cache(
     results = result_cache()
     if results is None:
         wanted.say("The cache is off (KLACK_CACHE, or a user without a home directory).")
-        wanted.write(lambda: _CACHE_OFF)
+        off = dict.fromkeys(("count", "size_B", "limit_B"), 0)
+        wanted.write(lambda: command_json("cache", folder=None, **off))
         return 0
     if clear:
         try:
@@ -166,13 +159,8 @@ def cache(
         f"Folder: {results.folder}\n"
         f"Results: {there.count}, {in_words(there.size)} of at most {in_words(results.limit)}"
     )
-    found: CacheJson = _CACHE_OFF | {
-        "folder": str(results.folder),
-        "count": there.count,
-        "size_B": there.size,
-        "limit_B": results.limit,
-    }
-    wanted.write(lambda: found)
+    numbers = {"count": there.count, "size_B": there.size, "limit_B": results.limit}
+    wanted.write(lambda: command_json("cache", folder=str(results.folder), **numbers))
     return 0
 
 
@@ -238,7 +226,7 @@ def inspect(
     bodies, checked as a run checks them; of a valve, what moves, what meets, and a first speed.
     """
     from klack.analyses.inspection import inspect_case, inspect_file
-    from klack.case.reader import find_case, shipped_cases
+    from klack.case.reader import shipped_cases
     from klack.mesh.files.catalogue import STEP_ENDINGS
     from klack.units import LENGTH, parse_quantity
 
@@ -246,7 +234,7 @@ def inspect(
     if is_case or (not file.exists() and str(file) in shipped_cases()):
         from klack.case.any_case import load_any_case
 
-        parts = inspect_case(load_any_case(find_case(file), imported(component)))
+        parts = inspect_case(load_any_case(file, imported(component)))
         _show(str(file), parts, wanted)
         return 0
     length = None if unit is None else parse_quantity(f"1 {unit}", LENGTH, "--unit")
@@ -263,13 +251,13 @@ def inspect(
 
 def _show(file: str, parts: "Iterable[tuple[str, tuple[Row, ...]]]", wanted: Shown) -> None:
     """Print each part as soon as it is known, and write all of them as JSON."""
-    found: InspectionJson = {"schema": "klack-inspect/1", "file": file, "parts": {}}
+    from klack.analyses.json_results import command_json
+
+    found: dict[str, tuple[Row, ...]] = {}
     for name, rows in parts:
         wanted.show([TextTable(title=name, columns=_COLUMNS, rows=rows, left=3)])
-        found["parts"][name] = [
-            {"what": what, "name": of, "content": content} for what, of, content in rows
-        ]
-    wanted.write(lambda: found)
+        found[name] = rows
+    wanted.write(lambda: command_json("inspect", file=file, parts=found))
 
 
 def report(
@@ -288,6 +276,7 @@ def report(
     from klack.analyses.catalogue import analysis_in
     from klack.analyses.ending import REPORTS, beside_result, write_reports
     from klack.analyses.incomplete import missing_in
+    from klack.analyses.json_results import command_json
 
     folder = out if out is not None else result
     beside = beside_result(folder) if folder.absolute() == result.absolute() else {}
@@ -298,15 +287,17 @@ def report(
         write_reports(analysis.content(record, result=str(result)), stage)
     wanted.warn(missing_in(record))
     wanted.say(f"Report in {folder}: {', '.join(REPORTS)}")
-    made: ReportJson = {
-        "schema": "klack-report/1",
-        "case": record.case,
-        "result": str(result),
-        "folder": str(folder),
-        "files": list(REPORTS),
-    }
-    wanted.write(lambda: made)
+    places = {"result": str(result), "folder": str(folder)}
+    wanted.write(lambda: command_json("report", case=record.case, **places, files=REPORTS))
     return 0
+
+
+_CASES = {
+    "impact": "case.schema:Case",
+    "stroke": "case.valve:ValveCase",
+    "magnet": "analyses.magnet.case:MagnetCase",
+    "study": "case.study:StudyFile",
+}
 
 
 def schema(
@@ -337,31 +328,13 @@ def schema(
 
 
 def _schema_of(kind: str) -> dict[str, Any]:
-    # the components of a network take a while to import
-    if kind == "stroke":
-        from klack.case.any_case import valve_case_schema
-
-        return valve_case_schema()
-
-    if kind == "magnet":
-        from klack.analyses.magnet.case import magnet_case_schema
-
-        return magnet_case_schema()
-
-    if kind == "study":
-        from klack.case.reader import schema_of
-        from klack.case.study import StudyFile
-
-        return schema_of(StudyFile)
-
     if kind == "result":
         from klack.analyses.json_results import result_schema
 
         return result_schema()
+    from klack.case.reader import schema_of
 
-    from klack.case import case_schema
-
-    return case_schema()
+    return schema_of(resolve_name(f"klack.{_CASES[kind]}"))
 
 
 def warm(
@@ -377,6 +350,7 @@ def warm(
     What is there already is not compiled again.
     NUMBA_CACHE_DIR names another folder for compiled functions.
     """
+    from klack.analyses.json_results import command_json
     from klack.machine.compiling.compiled_folder import (
         FOLDER_VARIABLE,
         clear_folder,
@@ -428,24 +402,10 @@ def warm(
             f"Functions: {count}, {in_words(size)}",
         ]
     )
-    wanted.write(lambda: _of_groups(done, str(folder), count, size))
+    wanted.write(
+        lambda: command_json("warm", folder=str(folder), count=count, size_B=size, groups=done)
+    )
     return 0
-
-
-def _of_groups(done: "list[Warmed]", folder: str, count: int, size: int) -> "WarmJson":
-    return {
-        "schema": "klack-warm/1",
-        "folder": folder,
-        "count": count,
-        "size_B": size,
-        "groups": {
-            group.name: {
-                "compiled": group.functions,
-                "compile_time_s": group.seconds,
-            }
-            for group in done
-        },
-    }
 
 
 def completion(

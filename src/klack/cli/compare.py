@@ -204,10 +204,10 @@ def _with_pulses(
 
 def _low_pass_in(case: Path, study: "ImpactStudy", sensor: _Sensor) -> "LowPass | None":
     from klack.analyses.comparison.impacts import gauge_of
-    from klack.case.reader import find_case, load_case
+    from klack.case.reader import load_case
 
     name = gauge_of(study, sensor.level, sensor.output).name
-    outputs = {item.name: item for item in load_case(find_case(case)).outputs}
+    outputs = {item.name: item for item in load_case(case).outputs}
     if name not in outputs:
         raise InputError(
             f"--case {case}",
@@ -255,11 +255,10 @@ def _section(
 ) -> "tuple[CaseMeasurement | None, str | None]":
     """Section ``measurement`` of the result, or of another case with its text."""
     from klack.case.any_case import load_any_case, read_any_case
-    from klack.case.reader import find_case
 
     if case is None:
         return read_any_case(text, result / "case.yaml", own).measurement, None
-    other = load_any_case(find_case(case), own)
+    other = load_any_case(case, own)
     return other.measurement, other.source
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
@@ -14,7 +15,6 @@ from klack.terminal.output import Written, require_folder, staged_folder
 from klack.terminal.progress import show_progress
 
 if TYPE_CHECKING:
-    from klack.analyses.json_results import ExportJson
     from klack.analyses.study.record import StudyRecord
     from klack.case.any_case import OwnComponents
     from klack.case.schema import Case
@@ -40,11 +40,22 @@ _Target = Annotated[
         "over time; calculix: a deck of the impact.",
     ),
 ]
-_MODELS = ("mat", "csv", "fmu", "modelica")
-_RESULTS = ("mat", "csv", "netcdf", "mdf", "parquet")
+_MODELS = {
+    "mat": "matlab_model:write_matlab",
+    "csv": "text_model:write_text",
+    "fmu": "fmu.build:build_fmu",
+    "modelica": "modelica:write_modelica",
+}
+_CURVES = {
+    "mat": ("mat:write_mat", ".mat"),
+    "csv": ("csv_files:write_csv", ""),
+    "netcdf": ("netcdf:write_netcdf", ".nc"),
+    "mdf": ("mdf:write_mdf", ".mf4"),
+}
+_RESULTS = (*_CURVES, "parquet")
 _USED_BY: Mapping[str, tuple[str, ...]] = {
-    "part": _MODELS,
-    "body": _MODELS,
+    "part": tuple(_MODELS),
+    "body": tuple(_MODELS),
     "fmi": ("fmu",),
     "platform": ("fmu",),
     "level": ("vtk",),
@@ -215,9 +226,8 @@ def export(
         raise _parquet_is_for_studies(f"'{source}', which is no stored result")
 
     from klack.case.any_case import load_any_case
-    from klack.case.reader import find_case
 
-    case = load_any_case(find_case(source), imported(component))
+    case = load_any_case(source, imported(component))
     folder = out if out is not None else Path("klack-results") / case.name
     require_folder(folder)
     incomplete: Exception | None = None
@@ -238,15 +248,12 @@ def export(
 
 
 def _tell(case: str, made: Written, to: str, wanted: Wanted) -> None:
+    from klack.analyses.json_results import command_json
+
     wanted.say("\n".join(made.lines))
-    result: ExportJson = {
-        "schema": "klack-export/1",
-        "case": case,
-        "to": to,
-        "folder": str(made.folder),
-        "files": list(made.files),
-    }
-    wanted.write(lambda: result)
+    wanted.write(
+        lambda: command_json("export", case=case, to=to, folder=str(made.folder), files=made.files)
+    )
 
 
 def _export_stored(source: Path, to: str, out: Path | None, wanted: Wanted) -> tuple[str, Written]:
@@ -343,24 +350,13 @@ def _export_models(
 
 
 def _write_models(models: Sequence["ModalModel"], to: str, folder: Path, choice: Choice) -> None:
-    if to == "mat":
-        from klack.exchange.matlab_model import write_matlab
-
-        write_matlab(models, folder)
-    elif to == "csv":
-        from klack.exchange.text_model import write_text
-
-        write_text(models, folder)
-    elif to == "modelica":
-        from klack.exchange.modelica import write_modelica
-
-        write_modelica(models, folder)
-    else:
-        from klack.exchange.fmu.build import build_fmu
-
-        for model in models:
-            path = folder / f"{model.name}.fmu"
-            build_fmu(model, path, fmi=3 if choice.fmi == "3" else 2, platforms=choice.platforms)
+    write = resolve_name(f"klack.exchange.{_MODELS[to]}")
+    if to != "fmu":
+        write(models, folder)
+        return
+    fmi = 3 if choice.fmi == "3" else 2
+    for model in models:
+        write(model, folder / f"{model.name}.fmu", fmi=fmi, platforms=choice.platforms)
 
 
 def _described(model: "ModalModel") -> str:
@@ -390,24 +386,10 @@ def _export_result(study: Any, to: str, folder: Path) -> Written:
     if to == "parquet":
         raise _parquet_is_for_studies("a stored result with curves")
     table = result_table(study)
-    name = f"{study.case}_result"
     with staged_folder(folder) as stage:
-        if to == "netcdf":
-            from klack.exchange.results.netcdf import write_netcdf
-
-            write_netcdf(table, stage / f"{name}.nc")
-        elif to == "mdf":
-            from klack.exchange.results.mdf import write_mdf
-
-            write_mdf(table, stage / f"{name}.mf4")
-        elif to == "mat":
-            from klack.exchange.results.mat import write_mat
-
-            write_mat(table, stage / f"{name}.mat")
-        else:
-            from klack.exchange.results.csv_files import write_csv
-
-            write_csv(table, stage)
+        write, ending = _CURVES[to]
+        target = stage / f"{study.case}_result{ending}" if ending else stage
+        resolve_name(f"klack.exchange.results.{write}")(table, target)
         return Written.of(folder, stage)
 
 
@@ -441,7 +423,6 @@ def _parquet_is_for_studies(got: str) -> InputError:
 
 def _export_point(source: Path, point: int | None, out: Path | None) -> tuple[str, Written]:
     from klack.analyses.catalogue import load_result
-    from klack.analyses.ending import is_result
     from klack.analyses.study.point_case import case_of_point
     from klack.analyses.study.record import StudyRecord
 

@@ -12,7 +12,6 @@ from klack.terminal.output import require_file_target
 from klack.terminal.tables import TextTable, plain_math
 
 if TYPE_CHECKING:
-    from klack.analyses.json_results import ComponentsJson, ShowJson
     from klack.case.valve import ValveCase
     from klack.network.component import Component
     from klack.network.described import DescribedKey, DescribedType
@@ -89,12 +88,11 @@ def _draw_schematic(
 ) -> int:
     from klack.analyses.ending import is_result
     from klack.case.any_case import load_valve_case
-    from klack.case.reader import find_case
     from klack.schematic.picture import schematic_svg
 
     if is_result(source):
         return _draw_stored(source, out, wanted)
-    case = load_valve_case(find_case(source), own)
+    case = load_valve_case(source, own)
     network = case.network.network()
     picture = schematic_svg(network, f"{case.name}: {case.title}".rstrip(": "))
     words = f"{len(network.components)} components, {len(network.nodes)} connections.\nPicture: "
@@ -167,13 +165,14 @@ def _list(source: Path | None, out: Path | None, component: list[str] | None, wa
                 hint="klack show --components",
             )
 
+    from klack.analyses.json_results import command_json
     from klack.network.catalogue import component_classes
     from klack.network.described import described_type
 
     types = [described_type(kind) for kind in component_classes()]
     types += [described_type(kind, own=True) for kind in imported(component)]
     wanted.show(_component_tables(types))
-    wanted.write(lambda: _components_json(types))
+    wanted.write(lambda: command_json("show-components", types=types))
     return 0
 
 
@@ -202,6 +201,7 @@ def _end(
     view: "View | None" = None,
 ) -> int:
     """Write a picture and say so."""
+    from klack.analyses.json_results import command_json
     from klack.files.whole import whole_file
 
     require_file_target("--out", file)
@@ -217,33 +217,18 @@ def _end(
     with whole_file(file, refuse) as new:
         new.write_text(picture, encoding="utf-8")
     wanted.say(f"{words}{file}{more}")
-    wanted.write(lambda: _numbers(name, file, network, view))
-    return 0
-
-
-def _numbers(name: str, file: Path, network: "ValveCase | None", view: "View | None") -> "ShowJson":
     drawn = None if network is None else network.network.network()
-    return {
-        "schema": "klack-show/1",
-        "case": name,
-        "file": str(file),
-        "bodies": {}
-        if view is None
-        else {body.name: list(body.skin.faces) for body in view.bodies},
-        "components": {}
-        if drawn is None
-        else {part_name: part.type for part_name, part in drawn.components.items()},
-        "nodes": []
-        if drawn is None
-        else [
-            {
-                "domain": node.domain,
-                "ports": [str(joint) for joint in node.joints],
-                "fixed": node.word or None,
-            }
-            for node in drawn.nodes
-        ],
-    }
+    wanted.write(
+        lambda: command_json(
+            "show",
+            case=name,
+            file=str(file),
+            bodies={body.name: list(body.skin.faces) for body in (view.bodies if view else ())},
+            components={key: part.type for key, part in drawn.components.items()} if drawn else {},
+            nodes=drawn.nodes if drawn else (),
+        )
+    )
+    return 0
 
 
 _NONE = "-"
@@ -300,25 +285,3 @@ def _keys(keys: "Mapping[str, DescribedKey]") -> str:
 
 def _key(name: str, key: "DescribedKey") -> str:
     return f"{name} [{key.unit}]" if key.unit not in ("", "-") else name
-
-
-def _components_json(types: "Sequence[DescribedType]") -> "ComponentsJson":
-    return {
-        "schema": "klack-show-components/1",
-        "types": {
-            item.word: {
-                "summary": item.summary,
-                "ports": {
-                    name: {"domain": port.domain, "optional": port.optional}
-                    for name, port in item.ports.items()
-                },
-                "keys": {
-                    name: {"unit": key.unit, "required": key.required, "meaning": key.meaning}
-                    for name, key in item.keys.items()
-                },
-                "equation": item.equation,
-                "source": item.source,
-            }
-            for item in types
-        },
-    }

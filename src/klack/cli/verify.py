@@ -15,7 +15,6 @@ from klack.terminal.tables import print_table
 from klack.verification.check import COVERS, GROUPS
 
 if TYPE_CHECKING:
-    from klack.analyses.json_results import CheckJson, VerificationJson
     from klack.verification import Check
 
 __all__ = ["verify"]
@@ -133,6 +132,7 @@ def verify(
     if listing:
         print_groups()
         return 0
+    from klack.analyses.json_results import command_json
     from klack.verification import iterate_checks
     from klack.verification.run_conditions import run_conditions
 
@@ -151,33 +151,5 @@ def verify(
         print_checks(checks, every=every, to_stderr=wanted.to_stderr)
         if html is not None and not wanted.to_stderr:
             print(f"Page in {html}")
-    wanted.write(lambda: _results(run_conditions(), checks))
+    wanted.write(lambda: command_json("verify", about=run_conditions(), checks=checks))
     return 0 if all(check.passed for check in checks) else 1
-
-
-def _results(about: dict[str, str], checks: "list[Check]") -> "VerificationJson":
-    return {
-        "schema": "klack-verify/1",
-        "about": about,
-        "checks": [_numbers(check) for check in checks],
-    }
-
-
-def _numbers(check: "Check") -> "CheckJson":
-    def finite(value: float) -> float | None:
-        return value if abs(value) < float("inf") else None
-
-    return {
-        "group": check.group,
-        "name": check.name,
-        "expected": finite(check.expected),
-        "computed": finite(check.computed),
-        "deviation": finite(check.deviation),
-        "deviation_unit": check.deviation_unit,
-        "tolerance": check.tolerance,
-        "headroom": finite(check.headroom),
-        "wide": check.is_wide,
-        "passed": check.passed,
-        "source": check.source,
-        "reason": check.reason,
-    }

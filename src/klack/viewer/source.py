@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 from klack.analyses.catalogue import load_result
 from klack.analyses.ending import is_result
 from klack.case.any_case import load_any_case
-from klack.case.reader import find_case
 from klack.case.valve import ValveCase
 from klack.errors import InputError
 from klack.machine.progress import Progress, silent
@@ -56,14 +55,14 @@ def view_of_source(
         )
     if is_result(source):
         return view_of_result(load_result(source), source, tuple(components), progress)
-    return view_of_case(load_any_case(find_case(source), components), progress)
+    return view_of_case(load_any_case(source, components), progress)
 
 
 def named_case(source: Path, components: Iterable[type[Component]] = ()) -> ValveCase | None:
     """The case of a whole valve, if that is what the source names."""
     if is_result(source) or source.suffix.lower() in (*STEP_ENDINGS, *MESH_FORMATS):
         return None
-    case = load_any_case(find_case(source), components)
+    case = load_any_case(source, components)
     return case if isinstance(case, ValveCase) else None
 
 

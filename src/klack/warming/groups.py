@@ -75,9 +75,8 @@ def all_steps() -> set[Any]:
 def _valve() -> None:
     from klack.analyses.stroke.run import run_stroke
     from klack.case.any_case import load_valve_case
-    from klack.case.reader import find_case
 
-    case = load_valve_case(find_case("demo-stroke"))
+    case = load_valve_case("demo-stroke")
     short = case.run.model_copy(update={"duration": 2e-6, "check_steps": False})
     run_stroke(case.model_copy(update={"run": short}))
 
@@ -96,9 +95,9 @@ def _small(impacts: str) -> None:
 
 def _impact() -> None:
     from klack.analyses.impact.run import run_impact
-    from klack.case.reader import find_case, load_case
+    from klack.case.reader import load_case
 
-    run_impact(load_case(find_case("witness")), levels=("reduced", "interface"))
+    run_impact(load_case("witness"), levels=("reduced", "interface"))
 
 
 def _radiation() -> None:

@@ -69,9 +69,8 @@ def advise(
     highest = None if up_to is None else parse_quantity(up_to, FREQUENCY, "--up-to")
 
     from klack.case.any_case import read_any_case, read_case_tree
-    from klack.case.reader import find_case
 
-    tree = read_case_tree(find_case(case), imported(component))
+    tree = read_case_tree(case, imported(component))
     checked = read_any_case(tree.text, tree.path, tree.components.values())
 
     from klack import __version__

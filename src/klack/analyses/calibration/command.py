@@ -57,9 +57,8 @@ def calibrate(
             require_positive(option, number, unit)
 
     from klack.case.any_case import read_case_tree
-    from klack.case.reader import find_case
 
-    tree = read_case_tree(find_case(case), imported(component))
+    tree = read_case_tree(case, imported(component))
     checked = tree.case()
 
     from klack.analyses.calibration.run import calibration_of, run_calibration

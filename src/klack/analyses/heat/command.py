@@ -57,9 +57,8 @@ def heat(
         )
     with show_progress(wanted.quiet):
         from klack.case.any_case import load_valve_case
-        from klack.case.reader import find_case
 
-        checked = load_valve_case(find_case(case), imported(component))
+        checked = load_valve_case(case, imported(component))
     if duration is not None and checked.thermal is not None:
         length = parse_quantity(duration, TIME, "--duration")
         require_positive("--duration", length, "s")

@@ -36,10 +36,10 @@ def impact(
 
 def run_case(case: Path, level: list[str], wanted: WantedResult, *, certify: bool = True) -> Path:
     """Run a case, write and print the results; return their folder."""
-    from klack.case import find_case, load_case
+    from klack.case import load_case
 
     with show_progress(wanted.quiet):
-        checked = load_case(find_case(case))
+        checked = load_case(case)
         levels = checked.require_levels(level if level else checked.run.levels)
         ending = Ending.of(wanted, checked.name, case=case)
 

@@ -106,9 +106,8 @@ def linearise(
     """Linear state space about the operating point: eigenvalues, response, margins, stability."""
     with show_progress(asked.quiet):
         from klack.case.any_case import read_case_tree
-        from klack.case.reader import find_case
 
-        tree = read_case_tree(find_case(case), imported(component))
+        tree = read_case_tree(case, imported(component))
         checked = tree.case()
 
         from klack.analyses.linearisation.analysis import LINEARISATION

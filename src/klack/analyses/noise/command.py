@@ -90,9 +90,8 @@ def noise(
 
 def _cases(paths: Sequence[Path], own: "OwnComponents") -> "list[AnyCase | None]":
     from klack.case.any_case import load_any_case
-    from klack.case.reader import find_case
 
-    return [None if is_result(path) else load_any_case(find_case(path), own) for path in paths]
+    return [None if is_result(path) else load_any_case(path, own) for path in paths]
 
 
 def _short(path: Path) -> str:

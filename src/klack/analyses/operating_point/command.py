@@ -30,10 +30,9 @@ def show_operating_points(
         from klack.analyses.operating_point.content import CSV_NAME, sweep_charts, write_csv
         from klack.analyses.operating_point.run import run_operating_points
         from klack.case.any_case import read_case_tree
-        from klack.case.reader import find_case
         from klack.units import CURRENT, LENGTH, VOLTAGE, parse_quantity
 
-        tree = read_case_tree(find_case(path), imported(component))
+        tree = read_case_tree(path, imported(component))
         case = tree.case()
     wanted = [name for item in variants for name in item.split(",") if name]
     if len(wanted) > 1:

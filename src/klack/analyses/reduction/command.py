@@ -17,9 +17,9 @@ def reduce(
     wanted: Wanted = WANTED,
 ) -> int:
     """Reduce both bodies and compare transfer functions with and without correction."""
-    from klack.case import find_case, load_case
+    from klack.case import load_case
 
-    checked = load_case(find_case(case))
+    checked = load_case(case)
     folder = out if out is not None else Path("klack-results") / checked.name
     require_folder(folder)
 

@@ -64,10 +64,9 @@ def sensitivities(
 
     with show_progress(wanted.quiet):
         from klack.case.any_case import read_case_tree
-        from klack.case.reader import find_case
         from klack.case.study_source import study_if_any
 
-        tree = read_case_tree(find_case(case), imported(component))
+        tree = read_case_tree(case, imported(component))
         checked = tree.any_case()
         source = study_if_any(checked, tree, study)
 

@@ -69,10 +69,9 @@ def shots(
 
     from klack.analyses.shots.draw import shots_of
     from klack.case.any_case import load_any_case
-    from klack.case.reader import find_case
     from klack.case.valve import ValveCase
 
-    checked = load_any_case(find_case(case), imported(component))
+    checked = load_any_case(case, imported(component))
     if isinstance(checked, ValveCase):
         return _strokes(checked, count, seed, workers, tuple(variant or ()), wanted)
     _refuse_variants(variant)

@@ -100,13 +100,10 @@ def stroke(
         from klack.analyses.operating_point.command import show_operating_points
 
         return show_operating_points(case, variant or (), at_rest, component, asked)
-    from klack.case.reader import find_case
 
     with show_progress(asked.quiet):
-        case_file, components = find_case(case), imported(component)
-        checked = _checked_case(
-            case_file, duration, step, accuracy, components, check_steps=check_steps
-        )
+        own = imported(component)
+        checked = _checked_case(case, duration, step, accuracy, own, check_steps=check_steps)
         if controller:
             from klack.analyses.stroke.controllers import controller_files, with_controllers
 

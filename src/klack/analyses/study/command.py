@@ -92,11 +92,10 @@ def optimise(
 
 def _tree(case: Path, component: Components, check_steps: bool | None) -> "CaseTree":
     from klack.case.any_case import read_case_tree, tree_of
-    from klack.case.reader import find_case
     from klack.case.rewriting import with_values
 
     own = imported(component)
-    tree = read_case_tree(find_case(case), own)
+    tree = read_case_tree(case, own)
     if check_steps is None:
         return tree
     value = "true" if check_steps else "false"
