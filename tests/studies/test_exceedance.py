@@ -26,7 +26,6 @@ from klack.studies.samples import (
     count_exceedance,
     exceedance_of,
     mean_and_margin,
-    runs_for_quantile,
     sample_quantile,
 )
 
@@ -39,10 +38,10 @@ def binomial(counts, runs, probability):
 
 @pytest.mark.parametrize(("exceeded", "runs"), [(1, 10), (3, 50), (9, 10), (17, 60)])
 def test_ends_leave_exact_binomial_tails(exceeded, runs):
-    found = count_exceedance(exceeded, runs, confidence=0.9)
-    assert binomial(range(exceeded, runs + 1), runs, found.low) == pytest.approx(0.05, rel=1e-9)
-    assert binomial(range(exceeded + 1), runs, found.high) == pytest.approx(0.05, rel=1e-9)
-    assert binomial(range(exceeded + 1), runs, found.at_most) == pytest.approx(0.1, rel=1e-9)
+    found = count_exceedance(exceeded, runs)
+    assert binomial(range(exceeded, runs + 1), runs, found.low) == pytest.approx(0.025, rel=1e-9)
+    assert binomial(range(exceeded + 1), runs, found.high) == pytest.approx(0.025, rel=1e-9)
+    assert binomial(range(exceeded + 1), runs, found.at_most) == pytest.approx(0.05, rel=1e-9)
     assert found.estimate == exceeded / runs
 
 
@@ -104,20 +103,17 @@ def test_intervals_hold_the_true_probability_as_often_as_stated(probability, run
 @each("probability", [0.06, 0.5, 0.91, 0.99])
 @each("runs", [1, 5, 59, 60, 150])
 def test_ranks_of_a_quantile_are_the_narrowest_that_binomials_allow(probability, runs):
-    found = sample_quantile(np.arange(1.0, runs + 1.0), probability, confidence=0.9)
+    found = sample_quantile(np.arange(1.0, runs + 1.0), probability)
     lower = max(
-        rank for rank in range(runs + 1) if binomial(range(rank), runs, probability) <= 0.05
+        rank for rank in range(runs + 1) if binomial(range(rank), runs, probability) <= 0.025
     )
     upper = min(
         rank
         for rank in range(1, runs + 2)
-        if binomial(range(rank, runs + 1), runs, probability) <= 0.05
+        if binomial(range(rank, runs + 1), runs, probability) <= 0.025
     )
     assert found.low == (lower if lower else -np.inf)
     assert found.high == (upper if upper <= runs else np.inf)
-    exact = binomial(range(lower, upper), runs, probability)
-    assert found.coverage == pytest.approx(exact, abs=1e-12)
-    assert found.coverage >= 0.9
 
 
 @pytest.mark.slow
@@ -126,80 +122,23 @@ def test_quantiles_are_covered_as_often_as_stated():
     for probability, truth in ((0.5, np.log(2.0)), (0.9, np.log(10.0))):
         found = [sample_quantile(rng.exponential(size=80), probability) for _ in range(2000)]
         held = np.mean([f.low <= truth <= f.high for f in found])
-        assert held == pytest.approx(found[0].coverage, abs=0.012)
+        assert 0.95 - 0.012 < held < 0.985
         below = np.mean([f.estimate < truth for f in found])
         assert below == pytest.approx(0.5, abs=0.04)  # median-unbiased
 
 
-def test_failed_runs_move_the_ends_of_a_quantile():
-    values = np.random.default_rng(1).permutation(np.arange(1.0, 101.0))
-    clean = sample_quantile(values, 0.5)
-    assert (clean.low_if_low, clean.high_if_high) == (clean.low, clean.high)
-    doubtful = sample_quantile([*values, *[np.nan] * 20], 0.5)
-    assert (doubtful.low, doubtful.high, doubtful.failed) == (clean.low, clean.high, 20)
-    worst = sample_quantile([*values, *range(1000, 1020)], 0.5)
-    best = sample_quantile([*values, *range(-1000, -980)], 0.5)
-    assert (doubtful.low_if_low, doubtful.high_if_high) == (best.low, worst.high)
-    assert sample_quantile([1.0, np.nan, np.nan], 0.5).low_if_low == -np.inf
-
-
-@pytest.mark.parametrize("probability", [0.001, 0.05, 0.5, 0.99])
-@pytest.mark.parametrize("confidence", [0.5, 0.9, 0.999])
-def test_fewest_runs_are_just_enough(probability, confidence):
-    runs = runs_for_quantile(probability, confidence=confidence)
-    enough = sample_quantile(np.arange(runs), probability, confidence=confidence)
-    assert np.isfinite([enough.low, enough.high]).all()
-    fewer = sample_quantile(np.arange(runs - 1), probability, confidence=confidence)
-    assert not np.isfinite([fewer.low, fewer.high]).all()
-
-
 def test_margin_by_hand():
-    found = mean_and_margin([1.0, 2.0, 3.0, np.nan], 2.0)
-    assert (found.mean, found.deviation, found.value) == (2.0, 1.0, 4.0)
-    assert found.mean_error == pytest.approx(np.sqrt(1 / 3))
-    assert found.deviation_error == pytest.approx(np.sqrt(2 / 3 / 12))  # m4 = 2/3, (n - 3) = 0
-    assert (found.runs, found.failed) == (3, 1)
-    same = mean_and_margin([5.0, 5.0], 3.0)
-    assert (same.value, same.value_error) == (5.0, 0.0)
-
-
-@pytest.mark.parametrize("draw", ["standard_normal", "standard_exponential", "random"])
-def test_errors_of_a_margin_are_those_of_repeated_samples(draw):
-    rng = np.random.default_rng(3)
-    found = [mean_and_margin(getattr(rng, draw)(400), 3.0) for _ in range(1500)]
-    for number in ("mean", "deviation", "value"):
-        scatter = np.std([getattr(f, number) for f in found], ddof=1)
-        stated = np.sqrt(np.mean([getattr(f, f"{number}_error") ** 2 for f in found]))
-        assert stated == pytest.approx(scatter, rel=0.07)
-
-
-def test_errors_of_normal_samples_are_the_closed_form():
-    sample = np.random.default_rng(0).standard_normal(400_000)
-    found = mean_and_margin(sample * 1e-90 - 3e-90, 2.0)
-    assert found.mean == pytest.approx(-3e-90, rel=2e-3)
-    expected = found.deviation * np.sqrt((1.0 + 2.0**2 / 2.0) / 400_000)
-    assert found.value_error == pytest.approx(expected, rel=0.01)
+    assert mean_and_margin([1.0, 2.0, 3.0], 2.0) == 4.0
+    assert mean_and_margin([5.0, 5.0], 3.0) == 5.0
+    tiny = np.array([-4.0, -3.0, -2.0]) * 1e-200  # whose squares are zero
+    assert mean_and_margin(tiny, 2.0) == pytest.approx(-1e-200, rel=1e-12)
 
 
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: count_exceedance(3, 2), "from 0 to 2"),
-        (lambda: count_exceedance(0, 0), "runs with a value: got 0"),
-        (lambda: count_exceedance(0, 5, failed=-1), "failed runs"),
-        (lambda: count_exceedance(0.5, 5), "whole number"),
-        (lambda: count_exceedance(0, 5, confidence=95), "percent are divided"),
         (lambda: exceedance_of([np.nan], 1.0), "runs with a value: got 0"),
-        (lambda: exceedance_of([[1.0]], 1.0), "one number per run"),
-        (lambda: exceedance_of(["a"], 1.0), "one number per run"),
         (lambda: exceedance_of([1.0], np.nan), "limit of a measure"),
-        (lambda: sample_quantile([1.0], 1.0), "above 0, below 1"),
-        (lambda: sample_quantile([1.0], np.nan), "above 0, below 1"),
-        (lambda: sample_quantile([np.nan, np.nan], 0.5), "2 runs without a value"),
-        (lambda: sample_quantile([1.0], 0.5, confidence=1.0), "0.5 to below 1"),
-        (lambda: runs_for_quantile(0.0), "above 0, below 1"),
-        (lambda: mean_and_margin([1.0, np.nan], 3.0), "two runs"),
-        (lambda: mean_and_margin([1.0, 2.0], np.inf), "finite"),
     ],
 )
 def test_one_error_says_what_does_not_fit(call, words):
@@ -312,23 +251,6 @@ def test_compromise_does_not_depend_on_units():
     assert compromise(front * [1e-6, 1e9] + [5e-6, -3e9]) == 1
     assert compromise([[0.0, 2.0, 7.0], [1.0, 1.0, 7.0], [2.0, 0.0, 7.0]]) == 1
     assert compromise([[4.0, 4.0]]) == 0
-
-
-@pytest.mark.parametrize(
-    ("call", "words"),
-    [
-        (lambda: find_front([1.0, 2.0]), "one row per point"),
-        (lambda: find_front([[1.0], [2.0, 3.0]]), "rows of numbers"),
-        (lambda: find_front([["a"]]), "rows of numbers"),
-        (lambda: find_front(np.empty((3, 0))), "one column or more"),
-        (lambda: find_front([[1.0]], [[1.0], [2.0]]), "1 rows, as many"),
-        (lambda: compromise(np.empty((0, 2))), "one point or more"),
-        (lambda: compromise([[1.0, np.nan]]), "row 0, column 1"),
-    ],
-)
-def test_one_error_says_what_does_not_fit_fronts(call, words):
-    with pytest.raises(InputError, match=words):
-        call()
 
 
 def row(*notes):

@@ -56,7 +56,7 @@ def test_intervals_hold_the_exact_indices(case):
     """As often as claimed, over seeds; errors fall faster than those of random points."""
     function, parameters, exact = CASES[case]
     found = [
-        sobol_indices(function(saltelli_design(parameters, 1024, seed)), parameters, seed=seed)
+        sobol_indices(function(saltelli_design(parameters, 1024, seed)), parameters)
         for seed in range(20)
     ]
     errors = [(f.first.value - exact[0], f.total.value - exact[1]) for f in found]
@@ -68,17 +68,16 @@ def test_intervals_hold_the_exact_indices(case):
 
 @pytest.mark.slow
 def test_few_rows_are_doubted_where_intervals_hold_less_than_they_claim():
-    """The worst index of the G-function at 64 rows: what few_rows warns of."""
+    """The worst index of the G-function at 64 rows."""
     function, parameters, exact = CASES["g-function"]
     found = [
-        sobol_indices(function(saltelli_design(parameters, 64, seed)), parameters, seed=seed)
+        sobol_indices(function(saltelli_design(parameters, 64, seed)), parameters)
         for seed in range(60)
     ]
     share = np.mean([held(f, exact) for f in found], axis=0)
 
     assert share.mean() > 0.92
     assert share.min() < 0.8
-    assert all(f.few_rows for f in found)
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -86,7 +85,6 @@ def test_many_rows_give_the_exact_indices(case):
     function, parameters, exact = CASES[case]
     found = sobol_indices(function(saltelli_design(parameters, 2**14, 3)), parameters)
 
-    assert not found.few_rows
     assert np.all(held(found, exact))
     assert np.abs(found.first.value - exact[0]).max() < 3e-3
     assert np.abs(found.total.value - exact[1]).max() < 3e-3
@@ -102,11 +100,11 @@ def test_intervals_of_independent_rows_are_missed_as_often_as_claimed():
     for _ in range(200):
         a, b = random.random((2, 300, 1, 3))
         points = np.concatenate((a, np.where(np.eye(3, dtype=bool), b, a), b), axis=1)
-        found = sobol_indices((points @ weights).ravel(), 3, confidence=0.9, resamples=400)
+        found = sobol_indices((points @ weights).ravel(), 3)
         hits.append(held(found, (exact, exact)))
 
     # 1200 intervals, correlated: the standard deviation of the share is about 0.01
-    assert np.mean(hits) == pytest.approx(0.9, abs=0.035)
+    assert np.mean(hits) == pytest.approx(0.95, abs=0.035)
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -220,7 +218,6 @@ def test_too_few_rows_say_so():
     found = sobol_indices(values, 3)
 
     assert "only 15 of 16 base rows" in found.reason
-    assert found.few_rows
     assert np.all(np.isnan(found.first.value))
     assert "only 0 of 16" in sobol_indices(np.full(80, np.nan), 3).reason
 
@@ -235,38 +232,6 @@ def test_a_measure_that_differs_at_one_point_has_no_intervals():
     assert np.all(np.isnan([found.total.low, found.first.high]))
 
 
-def test_the_seed_of_the_intervals_decides():
-    values = ishigami(saltelli_design(3, 64, seed=1))
-    first, same, other = (sobol_indices(values, 3, seed=seed) for seed in (1, 1, 2))
-
-    assert np.array_equal(first.first.low, same.first.low)
-    assert not np.any(first.first.low == other.first.low)
-
-
-def test_less_confidence_is_a_narrower_interval():
-    values = ishigami(saltelli_design(3, 64, seed=1))
-    wide, narrow = (sobol_indices(values, 3, confidence=c) for c in (0.99, 0.5))
-
-    assert np.all(wide.total.low < narrow.total.low)
-    assert np.all(wide.total.high > narrow.total.high)
-
-
-@pytest.mark.parametrize(
-    ("call", "said"),
-    [
-        (lambda: saltelli_design(0, 8, 1), "0 parameters"),
-        (lambda: saltelli_design(-1, 8, 1), "-1 parameters"),
-        (lambda: saltelli_design(3, 0, 1), "0 points"),
-        (lambda: saltelli_design(300, 10**5, 1), "points of 300 parameters"),
-        (lambda: saltelli_design(3, 8, -1), "-1"),
-        (lambda: sobol_indices(np.zeros(11), 3), r"shape \(11,\) for 3 parameters"),
-        (lambda: sobol_indices([], 3), r"shape \(0,\)"),
-        (lambda: sobol_indices(np.zeros((2, 5)), 3), r"shape \(2, 5\)"),
-        (lambda: sobol_indices(np.zeros(10), 0), "for 0 parameters"),
-        (lambda: sobol_indices(np.zeros(10), 3, confidence=95), "95"),
-        (lambda: sobol_indices(np.zeros(10), 3, resamples=10), "10, expected 100"),
-    ],
-)
-def test_bad_input_is_one_error(call, said):
-    with pytest.raises(InputError, match=said):
-        call()
+def test_a_design_that_memory_does_not_hold_is_refused():
+    with pytest.raises(InputError, match="points of 300 parameters"):
+        saltelli_design(300, 10**5, 1)

@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 
-from klack.errors import InputError, MissingExtraError
+from klack.errors import MissingExtraError
 from klack.studies.designs import Listed, Normal, Range, latin_hypercube, sobol_sequence
 from klack.studies.sensitivity import saltelli_design, sobol_indices
 from klack.studies.surrogate import fewest_points, fit_surrogate
@@ -314,10 +314,3 @@ def test_without_the_library_there_is_one_clear_error(monkeypatch, kind):
         monkeypatch.setitem(sys.modules, name, None)
     with pytest.raises(MissingExtraError, match=r"whl\[surrogate\]"):
         fitted(kind, smooth, 3, 32)
-
-
-def test_points_and_values_have_to_match():
-    with pytest.raises(InputError, match="for 2 parameters"):
-        fit_surrogate("polynomial-chaos", [UNIT] * 2, np.zeros((5, 3)), np.zeros(5))
-    with pytest.raises(InputError, match="finite coordinates"):
-        fit_surrogate("polynomial-chaos", [UNIT], np.full((5, 1), np.nan), np.zeros(5))

@@ -51,7 +51,6 @@ def even_levels(count: int, *, bounded: bool = True) -> Floats:
     >>> even_levels(3).tolist(), even_levels(2, bounded=False).tolist()
     ([0.0, 0.5, 1.0], [0.25, 0.75])
     """
-    _require(count, "levels")
     k = np.arange(count)
     return k / (count - 1) if bounded and count > 1 else (k + 0.5) / count
 
@@ -105,14 +104,7 @@ def balanced(count: int) -> bool:
 
 def random_of(seed: int, *stream: int) -> np.random.Generator:
     """Random numbers of a seed (0 or more), or of one of its independent streams."""
-    refuse_if(
-        isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0,
-        "seed",
-        got=f"{seed!r}",
-        expected="a whole number of 0 or more",
-        hint="any will do, e.g. 1; the same seed gives the same points.",
-    )
-    return np.random.default_rng([int(seed), *stream] if stream else int(seed))
+    return np.random.default_rng([seed, *stream] if stream else seed)
 
 
 def _random(seed: int) -> dict[str, Any]:
@@ -129,20 +121,8 @@ def _random_keyword() -> str:
     return "rng" if "rng" in signature(scipy.stats.qmc.Sobol).parameters else "seed"
 
 
-def _require(count: int, what: str) -> None:
-    refuse_if(
-        isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1,
-        "design",
-        got=f"{count!r} {what}",
-        expected="a whole number of 1 or more",
-        hint=f"give the number of {what}.",
-    )
-
-
 def require_size(count: int, parameters: int) -> None:
-    """Raise :class:`InputError` for sizes that are no design."""
-    _require(parameters, "parameters")
-    _require(count, "points")
+    """Raise :class:`InputError` for a design that memory does not hold."""
     refuse_if(
         count * parameters > _MOST_NUMBERS,
         "design",

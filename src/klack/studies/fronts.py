@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from klack.errors import InputError, refuse_if
 from klack.studies.batches import values_of_points
 
 __all__ = ["Front", "compromise", "find_front", "spread_over"]
@@ -68,28 +67,13 @@ def compromise(objectives: ArrayLike) -> int:
 
     over the points given, so that each objective counts by its range on the front (points off the
     front would change it): the knee of a convex front.  An objective that is equal in all points
-    does not count; of equally near points the first is taken.  InputError if a value is not finite.
+    does not count; of equally near points the first is taken.  All values are finite.
 
     Notes
     -----
     Yu (1973), Management Science 19, 936-946; Zeleny (1973), compromise programming.
     """
-    values, where = values_of_points(objectives, None).objectives, "objectives of a front"
-    if not np.isfinite(values).all():
-        row, column = np.argwhere(~np.isfinite(values))[0]
-        raise InputError(
-            where,
-            got=f"{values[row, column]} in row {row}, column {column}",
-            expected="finite numbers",
-            hint="leave failed points out.",
-        )
-    refuse_if(
-        not len(values),
-        where,
-        got="no point",
-        expected="one point or more",
-        hint="take the points of a front that is not empty.",
-    )
+    values = np.asarray(objectives, dtype=float)
     low, high = values.min(axis=0), values.max(axis=0)
     largest = np.maximum(np.abs(low), np.abs(high))
     scale = np.where(largest > 0.0, largest, 1.0)  # ranges of huge numbers stay finite

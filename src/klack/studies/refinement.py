@@ -6,14 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from klack.errors import InputError, refuse_if
 from klack.studies.batches import (
     Batches,
     PointValues,
     highest,
-    points_in_cube,
-    require_count,
-    table_of_numbers,
     values_of_points,
 )
 from klack.studies.designs import random_of
@@ -21,8 +17,11 @@ from klack.studies.designs import random_of
 __all__ = ["Refinement", "RefinementSettings", "Secants", "achievement"]
 
 
+_SUM = 1e-3
+
+
 def achievement(
-    objectives: ArrayLike, reference: ArrayLike, scales: ArrayLike, *, sum_weight: float = 1e-3
+    objectives: ArrayLike, reference: ArrayLike, scales: ArrayLike
 ) -> NDArray[np.float64]:
     r"""Augmented achievement function of every point, to be minimised.
 
@@ -30,7 +29,8 @@ def achievement(
 
     Its minimum is on the front for any reference ``z``, reachable or not, also where the front is
     not convex; a weighted sum misses such parts.  With one objective it is that objective, shifted
-    and scaled.
+    and scaled.  :math:`\rho`, 0.001, says which loss in one objective is traded for gains in the
+    others.
 
     Parameters
     ----------
@@ -40,39 +40,14 @@ def achievement(
         Wished-for ``z`` of each objective.
     scales (objectives,)
         ``w``, above zero: ranges of the objectives on the front.
-    sum_weight
-        ``rho``, zero or more: which loss in one objective is traded for gains in the others.
 
     Notes
     -----
     Wierzbicki (1980), in: Multiple Criteria Decision Making, Theory and Application, 468-486.
     """
-    values = values_of_points(objectives, None).objectives
-    goal, unit = np.asarray(reference, dtype=float), np.asarray(scales, dtype=float)
-    if goal.shape not in (values.shape, values.shape[1:]) or not np.all(np.isfinite(goal)):
-        raise InputError(
-            "reference of an achievement function",
-            got=f"{goal}",
-            expected=f"{values.shape[1]} finite numbers, one per objective",
-            hint="take the objectives of the point to improve, or the best value of each.",
-        )
-    if unit.shape != values.shape[1:] or not np.all((unit > 0.0) & np.isfinite(unit)):
-        raise InputError(
-            "scales of an achievement function",
-            got=f"{unit}",
-            expected=f"{values.shape[1]} numbers above zero, one per objective",
-            hint="take the range of each objective on the front, and its size where that is zero.",
-        )
-    if not (sum_weight >= 0.0 and np.isfinite(sum_weight)):
-        raise InputError(
-            "weight of the sum in an achievement function",
-            got=f"{sum_weight:g}",
-            expected="zero or more",
-            hint="0.001 is usual.",
-        )
     with np.errstate(over="ignore", invalid="ignore"):  # huge values give infinity, or nan
-        distances = (values - goal) / unit
-        return np.asarray(distances.max(axis=1) + sum_weight * distances.sum(axis=1))
+        distances = np.subtract(objectives, reference) / scales
+        return np.asarray(distances.max(axis=1) + _SUM * distances.sum(axis=1))
 
 
 _LEAST = 1e-12
@@ -155,22 +130,6 @@ class RefinementSettings:
     seed: int = 0
     edge: float = 0.0
 
-    def __post_init__(self) -> None:
-        require_count("refinement: evaluations", self.evaluations, 1, 10**12)
-        require_count("refinement: seed", self.seed, 0, 2**63 - 1)
-        for name, good, expected in (
-            ("first_step", 0.0 < self.first_step <= 0.5, "above 0, at most 0.5"),
-            ("last_step", 1e-12 <= self.last_step <= self.first_step, "1e-12 to the first step"),
-            ("edge", 0.0 <= self.edge < 0.5, "0 to below 0.5"),
-        ):
-            refuse_if(
-                not good,
-                f"refinement: {name}",
-                got=f"{getattr(self, name):g}",
-                expected=expected,
-                hint=f"change '{name}' of the refinement.",
-            )
-
 
 class Refinement(Batches):
     """Pattern search from several points at once, each towards its own reference.
@@ -192,9 +151,7 @@ class Refinement(Batches):
     points (points, parameters)
         Start points in the unit cube.
     objectives, constraints (points, ...)
-        Their values, known before; none may have failed.
-    reference
-        As of :func:`achievement`; the objectives of the start points if absent.
+        Their values, known before; none may have failed.  The objectives are the references.
     scales (objectives,)
         Ranges of the objectives on the front, above zero.
 
@@ -213,31 +170,19 @@ class Refinement(Batches):
         constraints: ArrayLike | None = None,
         *,
         scales: ArrayLike,
-        reference: ArrayLike | None = None,
     ) -> None:
         values = values_of_points(objectives, constraints)
         super().__init__(values.objectives.shape[1])
-        where = "start points of a refinement"
-        table = table_of_numbers(points, where)
-        table = points_in_cube(table, table.shape[1], where)
-        refuse_if(
-            len(table) != len(values.failed) or values.failed.any() or not table.size,
-            where,
-            got=f"{len(table)} points with {len(values.failed)} values, "
-            f"{values.failed.sum()} of them failed",
-            expected="one point or more, each with finite values",
-            hint="take points of the front.",
-        )
-        wished = values.objectives if reference is None else np.asarray(reference, dtype=float)
-        first = achievement(values.objectives, wished, scales)
+        wished = values.objectives
+        first = achievement(wished, wished, scales)
         self.settings = settings
-        self._wished = np.broadcast_to(wished, values.objectives.shape)
+        self._wished = wished
         self._unit = np.asarray(scales, dtype=float)
         self._left = settings.evaluations
         self._paths = [
-            _Path(x, f, (float(v), float(s)), settings, random_of(settings.seed, i))
-            for i, (x, f, v, s) in enumerate(
-                zip(table, values.objectives, values.violation, first, strict=True)
+            _Path(x, (float(v), float(s)), settings, random_of(settings.seed, i))
+            for i, (x, v, s) in enumerate(
+                zip(np.asarray(points, dtype=float), values.violation, first, strict=True)
             )
         ]
         self._parts: list[int] = []
@@ -246,16 +191,6 @@ class Refinement(Batches):
     def points(self) -> NDArray[np.float64]:
         """Best point (points, parameters) from each start."""
         return np.array([path.best.point for path in self._paths])
-
-    @property
-    def objectives(self) -> NDArray[np.float64]:
-        """Objectives of the best points so far."""
-        return np.array([path.best.objectives for path in self._paths])
-
-    @property
-    def steps(self) -> NDArray[np.float64]:
-        """Step of each path: below ``last_step`` it is done."""
-        return np.array([path.step for path in self._paths])
 
     def _next_points(self) -> NDArray[np.float64] | None:
         polls = [path.poll() for path in self._paths]
@@ -274,7 +209,7 @@ class Refinement(Batches):
             if count:
                 violation = values.violation[rows]
                 goals = np.where(values.failed[rows, None], np.nan, values.objectives[rows])
-                path.take(points[rows], goals, violation, achievement(goals, wished, self._unit))
+                path.take(points[rows], violation, achievement(goals, wished, self._unit))
 
 
 class _Path:
@@ -283,12 +218,11 @@ class _Path:
     def __init__(
         self,
         point: NDArray[np.float64],
-        objectives: NDArray[np.float64],
         rank: tuple[float, float],
         settings: RefinementSettings,
         generator: np.random.Generator,
     ) -> None:
-        self.best = _Best(point, objectives, rank)
+        self.best = _Best(point, rank)
         self.step = settings.first_step
         self._settings = settings
         self._generator = generator
@@ -320,7 +254,6 @@ class _Path:
     def take(
         self,
         points: NDArray[np.float64],
-        objectives: NDArray[np.float64],
         violation: NDArray[np.float64],
         size: NDArray[np.float64],
     ) -> None:
@@ -328,7 +261,7 @@ class _Path:
         lowest = int(np.lexsort((size, violation))[0])
         rank = (float(violation[lowest]), float(size[lowest]))
         if rank < self.best.rank:
-            self.best = _Best(points[lowest], objectives[lowest], rank)
+            self.best = _Best(points[lowest], rank)
         if self._suggested is None:
             self._suggested = self._suggestions(points, violation, size)
         else:
@@ -395,7 +328,6 @@ class _Path:
 @dataclass(frozen=True, slots=True)
 class _Best:
     point: NDArray[np.float64]
-    objectives: NDArray[np.float64]
     rank: tuple[float, float]
 
 

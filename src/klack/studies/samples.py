@@ -1,7 +1,7 @@
 """One measure in many runs: margins, quantiles, how often it exceeds a limit.
 
-Values that are not finite are failed runs; they are counted apart.  ``confidence`` is 0.5 to below
-1.  ``runs`` of a result are those with a value, ``failed`` those without.
+Values that are not finite are failed runs; they are counted apart.  Intervals hold with 95 %.
+``runs`` of a result are those with a value, ``failed`` those without.
 """
 
 import math
@@ -18,169 +18,51 @@ from klack.studies.batches import require_count
 
 __all__ = [
     "Exceedance",
-    "Margin",
     "RobustValue",
     "SampleQuantile",
     "count_exceedance",
     "exceedance_of",
     "mean_and_margin",
-    "runs_for_quantile",
     "sample_quantile",
 ]
 
 
+_TAIL = (1.0 - 0.95) / 2.0
+"""Probability beyond either end of an interval."""
+
+
 def split_failed(values: ArrayLike) -> tuple[NDArray[np.float64], int]:
     """Finite values in their order, and the number of others."""
-    try:
-        table = np.asarray(values, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise _no_list(f"{type(values).__name__} ({error})") from None
-    if table.ndim != 1:
-        raise _no_list(f"an array of {table.ndim} dimensions")
+    table = np.asarray(values, dtype=float)
     good = np.isfinite(table)
     return table[good], int(np.count_nonzero(~good))
 
 
-def _no_list(got: str) -> InputError:
-    return InputError(
-        "values of a measure",
-        got=got,
-        expected="one number per run",
-        hint="give the column of one measure, nan for runs that failed.",
-    )
-
-
-def require_level(where: str, confidence: float) -> None:
-    """Raise :class:`InputError` unless a confidence is in [0.5, 1)."""
-    refuse_if(
-        not 0.5 <= confidence < 1.0,
-        where,
-        got=f"{confidence:g}",
-        expected="0.5 to below 1",
-        hint="0.95 is usual; percent are divided by 100.",
-    )
-
-
-@dataclass(frozen=True, slots=True)
-class Margin:
-    """Mean, scatter and their sum, in the unit of the measure.
-
-    Attributes
-    ----------
-    deviation
-        With ``n - 1``.
-    value
-        ``mean + k deviation``.
-    mean_error, deviation_error, value_error
-        Standard errors: standard deviations of the three over repetitions of all runs.
-    """
-
-    mean: float
-    deviation: float
-    value: float
-    mean_error: float
-    deviation_error: float
-    value_error: float
-    runs: int
-    failed: int
-
-
-def mean_and_margin(values: ArrayLike, multiple: float) -> Margin:
-    r"""Mean plus ``k`` standard deviations of independent runs, for any distribution.
-
-    With the central moments ``m_3`` and ``m_4`` of the sample and ``s`` its standard deviation,
-
-    .. math::
-
-        \sigma^2(\bar x) = \frac{s^2}{n}, \quad
-        \sigma^2(s) = \frac{1}{4 s^2 n} \left(m_4 - s^4 \frac{n - 3}{n - 1}\right), \quad
-        \mathrm{cov}(\bar x, s) = \frac{m_3}{2 s n}
-
-    and ``sigma^2(x + k s) = sigma^2(x) + 2 k cov(x, s) + k^2 sigma^2(s)``: exact for the mean, to
-    first order in ``1 / n`` for the others.  With fewer than about 30 runs, or rare large values
-    that no run has met yet, the errors of ``s`` come out too small; a quantile does not share this.
-
-    Parameters
-    ----------
-    values (runs,)
-        At least two finite ones; ``multiple`` is ``k``, of either sign.
-
-    Notes
-    -----
-    Cramer (1946), Mathematical Methods of Statistics, sections 27.4 to 27.7.
-    """
-    refuse_if(
-        not math.isfinite(multiple),
-        "multiple of the standard deviation",
-        got=f"{multiple}",
-        expected="a finite number",
-        hint="3 is usual.",
-    )
-    found, failed = split_failed(values)
+def mean_and_margin(values: ArrayLike, multiple: float) -> float:
+    """Mean plus ``multiple`` standard deviations, with ``n - 1``, of two finite values or more."""
+    found = np.asarray(values, dtype=float)
     count = len(found)
-    refuse_if(
-        count < 2,
-        "values of a measure",
-        got=f"{count} runs with a value, {failed} without",
-        expected="two runs with a value or more",
-        hint="compute more runs, or look at the reasons of the failed ones.",
-    )
     mean = math.fsum(found / count)
     size = float(np.abs(found - mean).max())
     if size == 0.0:
-        return Margin(mean, 0.0, mean, 0.0, 0.0, 0.0, count, failed)
-    scaled = (found - mean) / size  # so that fourth powers of small numbers keep their digits
-    variance = math.fsum(scaled**2) / (count - 1)
-    third, fourth = math.fsum(scaled**3) / count, math.fsum(scaled**4) / count
-    spread = math.sqrt(variance)
-    of_mean = variance / count
-    of_spread = (fourth - variance**2 * (count - 3) / (count - 1)) / (4.0 * variance * count)
-    of_spread = max(of_spread, 0.0)
-    common = third / (2.0 * spread * count)
-    of_value = max(of_mean + 2.0 * multiple * common + multiple**2 * of_spread, 0.0)
-    return Margin(
-        mean=mean,
-        deviation=size * spread,
-        value=mean + multiple * size * spread,
-        mean_error=size * math.sqrt(of_mean),
-        deviation_error=size * math.sqrt(of_spread),
-        value_error=size * math.sqrt(of_value),
-        runs=count,
-        failed=failed,
-    )
+        return mean
+    scaled = (found - mean) / size  # so that squares of small numbers keep their digits
+    return mean + multiple * size * math.sqrt(math.fsum(scaled**2) / (count - 1))
 
 
 @dataclass(frozen=True, slots=True)
 class SampleQuantile:
     """Value that a measure stays below in a given part of the runs.
 
-    Attributes
-    ----------
-    probability
-        That part.
-    low, high
-        Two values of the sample around the quantile; infinite where it is too small.
-    coverage
-        Exact probability of the interval, at least ``confidence``, which was asked for.
-    low_if_low, high_if_high
-        The ends if all failed runs were below, or above, all others.
+    ``low`` and ``high`` are two values of the sample around it; infinite where it is too small.
     """
 
-    probability: float
     estimate: float
     low: float
     high: float
-    confidence: float
-    coverage: float
-    runs: int
-    failed: int
-    low_if_low: float
-    high_if_high: float
 
 
-def sample_quantile(
-    values: ArrayLike, probability: float, *, confidence: float = 0.95
-) -> SampleQuantile:
+def sample_quantile(values: ArrayLike, probability: float) -> SampleQuantile:
     r"""Quantile from independent runs, with an interval between two values of the sample.
 
     The estimate interpolates between the sorted values at ``(n + 1/3) q + 1/3``, about the median
@@ -190,11 +72,12 @@ def sample_quantile(
     .. math:: \sum_{i=l}^{u-1} \binom{n}{i} q^i (1 - q)^{n-i}
 
     for every continuous distribution, and at least that for others.  ``l`` is the largest and
-    ``u`` the smallest rank that leave at most ``(1 - confidence) / 2`` on either side.
+    ``u`` the smallest rank that leave at most 2.5 % on either side.
 
     Parameters
     ----------
     values (runs,)
+        One finite one or more.
     probability
         ``q``, between 0 and 1: 0.99 for the value that 1 % exceed.
 
@@ -203,78 +86,16 @@ def sample_quantile(
     Hyndman and Fan (1996), The American Statistician 50, 361-365, definition 8; David and Nagaraja
     (2003), Order Statistics, section 7.1.
     """
-    require_level("confidence of a quantile", confidence)
-    _require_probability(probability)
-    found, failed = split_failed(values)
-    refuse_if(
-        not len(found),
-        "values of a measure",
-        got=f"{failed} runs without a value",
-        expected="one run with a value or more",
-        hint="look at the reasons of the failed runs.",
-    )
-    ranked = np.sort(found)
-    tail = (1.0 - confidence) / 2.0
-    lower, upper = _ranks(len(ranked), probability, tail)
-    low_all, high_all = _ranks(len(ranked) + failed, probability, tail)
-    reached = _at_least(np.array([lower, upper]), len(ranked), probability)
+    found, _ = split_failed(values)
+    ranks = np.arange(1, len(found) + 1)
+    # that so many values or more are below the quantile; falls with the rank
+    below = scipy.special.betainc(ranks, len(found) - ranks + 1, probability)
+    ranked = np.concatenate(([-np.inf], np.sort(found), [np.inf]))
     return SampleQuantile(
-        probability=probability,
-        estimate=float(np.quantile(ranked, probability, method="median_unbiased")),
-        low=_value(ranked, lower),
-        high=_value(ranked, upper),
-        confidence=confidence,
-        coverage=float(reached[0] - reached[1]),
-        runs=len(ranked),
-        failed=failed,
-        low_if_low=_value(ranked, max(low_all - failed, 0)),
-        high_if_high=_value(ranked, high_all),
+        estimate=float(np.quantile(found, probability, method="median_unbiased")),
+        low=float(ranked[np.count_nonzero(1.0 - below <= _TAIL)]),
+        high=float(ranked[np.count_nonzero(below > _TAIL) + 1]),
     )
-
-
-def runs_for_quantile(probability: float, *, confidence: float = 0.95) -> int:
-    """Fewest runs with which :func:`sample_quantile` bounds a quantile on both sides.
-
-    The smallest ``n`` with ``q^n`` and ``(1 - q)^n`` at most ``(1 - confidence) / 2`` (Wilks 1941,
-    Annals of Mathematical Statistics 12, 91-96).
-    """
-    require_level("confidence of a quantile", confidence)
-    _require_probability(probability)
-    tail = (1.0 - confidence) / 2.0
-    return int(np.ceil(np.log(tail) / np.log(max(probability, 1.0 - probability))))
-
-
-def _require_probability(probability: float) -> None:
-    refuse_if(
-        not 0.0 < probability < 1.0,
-        "probability of a quantile",
-        got=f"{probability:g}",
-        expected="above 0, below 1",
-        hint="0.99 is the value that 1 % exceed.",
-    )
-
-
-def _ranks(runs: int, probability: float, tail: float) -> tuple[int, int]:
-    """Ranks of the ends, from 1; 0 and ``runs + 1`` beyond the sample."""
-    ranks = np.arange(1, runs + 1)
-    at_least = _at_least(ranks, runs, probability)  # falls with the rank
-    lower = int(np.count_nonzero(1.0 - at_least <= tail))
-    beyond = np.flatnonzero(at_least <= tail)
-    return lower, int(ranks[beyond[0]]) if beyond.size else runs + 1
-
-
-def _at_least(counts: NDArray[np.int64], runs: int, probability: float) -> NDArray[np.float64]:
-    """Probability of as many values or more below the quantile, by count."""
-    inside = np.clip(counts, 1, runs)
-    found = scipy.special.betainc(inside, runs - inside + 1, probability)
-    return np.asarray(np.where(counts < 1, 1.0, np.where(counts > runs, 0.0, found)))
-
-
-def _value(ranked: NDArray[np.float64], rank: int) -> float:
-    """Value of a rank from 1; infinite outside."""
-    if rank < 1:
-        return -np.inf
-    return float(ranked[rank - 1]) if rank <= len(ranked) else np.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -301,7 +122,6 @@ class Exceedance:
     exceeded: int
     runs: int
     failed: int
-    confidence: float
     estimate: float
     low: float
     high: float
@@ -310,7 +130,7 @@ class Exceedance:
     high_if_all: float
 
 
-def exceedance_of(values: ArrayLike, limit: float, *, confidence: float = 0.95) -> Exceedance:
+def exceedance_of(values: ArrayLike, limit: float) -> Exceedance:
     """Probability that a measure is above a limit, from its values (runs,) in independent runs.
 
     A value equal to the limit does not exceed it.
@@ -324,15 +144,13 @@ def exceedance_of(values: ArrayLike, limit: float, *, confidence: float = 0.95) 
     )
     found, failed = split_failed(values)
     exceeded = int(np.count_nonzero(found > limit))
-    return count_exceedance(exceeded, len(found), failed=failed, confidence=confidence)
+    return count_exceedance(exceeded, len(found), failed=failed)
 
 
-def count_exceedance(
-    exceeded: int, runs: int, *, failed: int = 0, confidence: float = 0.95
-) -> Exceedance:
+def count_exceedance(exceeded: int, runs: int, *, failed: int = 0) -> Exceedance:
     r"""Probability of an event seen ``exceeded`` times in ``runs`` independent runs.
 
-    The ends of the interval solve, with ``alpha = 1 - confidence``,
+    The ends of the interval solve, with ``alpha = 0.05``,
 
     .. math::
 
@@ -348,30 +166,25 @@ def count_exceedance(
     (1983), JAMA 249, 1743-1745.
     """
     runs = require_count("runs with a value", runs, 1, 10**15)
-    failed = require_count("failed runs", failed, 0, 10**15)
-    exceeded = require_count("runs above the limit", exceeded, 0, runs)
-    require_level("confidence of an exceedance", confidence)
-    tail = (1.0 - confidence) / 2.0
     return Exceedance(
         exceeded=exceeded,
         runs=runs,
         failed=failed,
-        confidence=confidence,
         estimate=exceeded / runs,
-        low=_lower(exceeded, runs, tail),
-        high=_upper(exceeded, runs, tail),
-        at_most=_upper(exceeded, runs, 2.0 * tail),
-        low_if_none=_lower(exceeded, runs + failed, tail),
-        high_if_all=_upper(exceeded + failed, runs + failed, tail),
+        low=_lower(exceeded, runs),
+        high=_upper(exceeded, runs),
+        at_most=_upper(exceeded, runs, 2.0 * _TAIL),
+        low_if_none=_lower(exceeded, runs + failed),
+        high_if_all=_upper(exceeded + failed, runs + failed),
     )
 
 
-def _lower(count: int, runs: int, tail: float) -> float:
+def _lower(count: int, runs: int, tail: float = _TAIL) -> float:
     """Probability at which ``count`` or more events have the probability ``tail``."""
     return 0.0 if count == 0 else float(scipy.special.betaincinv(count, runs - count + 1, tail))
 
 
-def _upper(count: int, runs: int, tail: float) -> float:
+def _upper(count: int, runs: int, tail: float = _TAIL) -> float:
     """Probability at which ``count`` or fewer events have the probability ``tail``."""
     return (
         1.0
@@ -432,7 +245,7 @@ class RobustValue:
         if not np.isfinite(found).all():
             return float("nan")
         if self.kind == "margin":
-            return mean_and_margin(found, self.number if high else -self.number).value
+            return mean_and_margin(found, self.number if high else -self.number)
         return sample_quantile(found, self.number if high else 1.0 - self.number).estimate
 
     def words(self, *, high: bool) -> str:

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from klack.errors import MissingExtraError, refuse_if
-from klack.studies.batches import Batches, PointValues, highest, points_in_cube, require_count
+from klack.errors import MissingExtraError
+from klack.studies.batches import Batches, PointValues, highest, require_count
 
 __all__ = ["Search", "SearchSettings", "require_pymoo"]
 
@@ -51,13 +51,6 @@ class SearchSettings:
         require_count("search: population", self.population, least, 10_000)
         require_count("search: generations", self.generations, 1, 10**9)
         require_count("search: seed", self.seed, 0, 2**63 - 1)
-        refuse_if(
-            not 0.0 <= self.edge < 0.5,
-            "search: edge",
-            got=f"{self.edge:g}",
-            expected="0 to below 0.5",
-            hint="0.001 leaves out a thousandth at each end of every parameter.",
-        )
 
     @property
     def algorithm(self) -> str:
@@ -80,8 +73,8 @@ class Search(Batches):
     Parameters
     ----------
     start (points, parameters)
-        Points that enter the first batch, before drawn ones: the design of today.  At most a
-        population; equal ones count once, and those nearer to a face than ``edge`` are moved.
+        Points that enter the first batch, before drawn ones: the design of today.  Those nearer to
+        a face than ``edge`` are moved.
 
     Notes
     -----
@@ -90,10 +83,11 @@ class Search(Batches):
     577-601.  All as in pymoo: Blank and Deb (2020), IEEE Access 8, 89497-89509.
     """
 
-    def __init__(self, settings: SearchSettings, start: ArrayLike | None = None) -> None:
+    def __init__(self, settings: SearchSettings, start: ArrayLike = ()) -> None:
         super().__init__(settings.objectives)
         self.settings = settings
-        self._start = _start_points(settings, start)
+        first = np.reshape(np.asarray(start, dtype=float), (-1, settings.parameters))
+        self._start = np.clip(first, settings.edge, highest(settings.edge))
         self._scale: NDArray[np.float64] | None = None
         self._population: Any = None
         with _own_warnings():
@@ -143,22 +137,6 @@ def _spread(objectives: NDArray[np.float64]) -> NDArray[np.float64]:
     for wider in (np.ptp(near, axis=0), np.abs(near).max(axis=0)):
         spread = np.where(spread > 0.0, spread, wider)
     return np.where(spread > 0.0, spread, 1.0)
-
-
-def _start_points(settings: SearchSettings, start: ArrayLike | None) -> NDArray[np.float64]:
-    if start is None:
-        return np.empty((0, settings.parameters))
-    points = points_in_cube(start, settings.parameters, "start points of a search")
-    points = np.clip(points, settings.edge, highest(settings.edge))
-    points = points[np.sort(np.unique(points, axis=0, return_index=True)[1])]
-    refuse_if(
-        len(points) > settings.population,
-        "start points of a search",
-        got=f"{len(points)} points",
-        expected=f"at most {settings.population}, the population",
-        hint="choose the best of them, or a larger population.",
-    )
-    return points
 
 
 @contextmanager

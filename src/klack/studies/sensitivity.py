@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from klack.errors import refuse_if
 from klack.studies.designs import even_levels, random_of, require_size, sobol_sequence
 
 __all__ = [
+    "CONFIDENCE",
     "Estimates",
     "Screening",
     "SobolIndices",
@@ -22,7 +22,9 @@ __all__ = [
 Floats = NDArray[np.float64]
 
 _FEWEST_ROWS = 16
-_MANY_ROWS = 1024
+CONFIDENCE = 0.95
+"""Of the intervals of indices."""
+_RESAMPLES = 1000
 _ROUND_OFF = 64 * np.finfo(np.float64).eps
 _BLOCK = 2**22
 """Numbers in memory while rows are drawn again: 32 MB."""
@@ -52,8 +54,6 @@ class SobolIndices:
     discarded
         Base rows with a failed point.  If this is not 0, the indices are those of the region where
         points succeed, and are biased where failures follow a parameter.
-    confidence
-        Claimed by the intervals.
     reason
         Why estimates or intervals are nan.
     """
@@ -62,13 +62,7 @@ class SobolIndices:
     total: Estimates
     rows: int
     discarded: int
-    confidence: float
     reason: str = ""
-
-    @property
-    def few_rows(self) -> bool:
-        """Whether intervals may be much too narrow: fewer than 1024 rows."""
-        return self.rows < _MANY_ROWS
 
 
 def saltelli_design(parameters: int, base: int, seed: int) -> Floats:
@@ -92,15 +86,8 @@ def saltelli_design(parameters: int, base: int, seed: int) -> Floats:
     return np.concatenate((a, mixed, b), axis=1).reshape(-1, parameters)
 
 
-def sobol_indices(
-    values: ArrayLike,
-    parameters: int,
-    *,
-    confidence: float = 0.95,
-    resamples: int = 1000,
-    seed: int = 0,
-) -> SobolIndices:
-    """First and total order index of each parameter, with bootstrap intervals.
+def sobol_indices(values: ArrayLike, parameters: int) -> SobolIndices:
+    """First and total order index of each parameter, with bootstrap intervals of 95 %.
 
     With the values y at the points a, b and a_i (a with coordinate i from b) of n base rows::
 
@@ -117,41 +104,15 @@ def sobol_indices(
     random rows from some hundred rows on, and intervals then hold the index more often than
     claimed; with few rows single parameters are worse.  Of the 95 % intervals of the G-function
     with 8 parameters, over 60 seeds, 94 % held the index at 64 rows, 96 % at 256, 97 % at 1024,
-    but those of the worst index 67, 80 and 87 %: see :attr:`SobolIndices.few_rows`.
+    but those of the worst index 67, 80 and 87 %.
 
     Parameters
     ----------
     values (base * (parameters + 2),)
         At the points of :func:`saltelli_design`; not finite where one failed, which discards its
         base row.
-    resamples
-        At least 100.
-    seed
-        For the drawing of rows.
     """
-    y = np.asarray(values, dtype=np.float64)
-    refuse_if(
-        parameters < 1 or y.ndim != 1 or y.size == 0 or y.size % (parameters + 2),
-        "values",
-        got=f"values of shape {y.shape} for {parameters} parameters",
-        expected=f"one value for each point: a multiple of {parameters + 2}",
-        hint="give the values in the order of the design, not a number where a point failed.",
-    )
-    refuse_if(
-        not 0.0 < confidence < 1.0,
-        "confidence",
-        got=f"{confidence:g}",
-        expected="a probability above 0 and below 1",
-        hint="the usual one is 0.95.",
-    )
-    refuse_if(
-        resamples < 100,
-        "resamples",
-        got=f"{resamples}",
-        expected="100 or more",
-        hint="the usual number is 1000.",
-    )
-    rows = y.reshape(-1, parameters + 2)
+    rows = np.asarray(values, dtype=np.float64).reshape(-1, parameters + 2)
     whole = rows[np.all(np.isfinite(rows), axis=1)]
     used, discarded = len(whole), len(rows) - len(whole)
     none = np.full(parameters, np.nan)
@@ -160,28 +121,28 @@ def sobol_indices(
     if used < _FEWEST_ROWS:
         reason = f"only {used} of {len(rows)} base rows are without a failed point, "
         reason += f"at least {_FEWEST_ROWS} are needed"
-        return SobolIndices(nothing, nothing, used, discarded, confidence, reason)
+        return SobolIndices(nothing, nothing, used, discarded, reason)
     scaled = _scaled(whole)
     if scaled is None:
         reason = f"the measure has the same value, {whole[0, 0]:.6g}, at all independent points"
-        return SobolIndices(nothing, nothing, used, discarded, confidence, reason)
+        return SobolIndices(nothing, nothing, used, discarded, reason)
 
     terms = _terms(scaled)
     value = _indices(np.mean(terms, axis=0)[None, :])[0]
-    again = _indices(_means_again(terms, resamples, seed))
+    again = _indices(_means_again(terms))
     reason = ""
     if bad := int(np.sum(~np.isfinite(again[:, 0]))):
         low, high = np.full_like(value, np.nan), np.full_like(value, np.nan)
-        reason = f"in {bad} of {resamples} resamples all values are equal: the measure differs at "
+        reason = f"in {bad} of {_RESAMPLES} resamples all values are equal: the measure differs at "
         reason += "few points, and its intervals are unknown"
     else:
-        tail = 50.0 * (1.0 - confidence)
+        tail = 50.0 * (1.0 - CONFIDENCE)
         low, high = np.percentile(again, (tail, 100.0 - tail), axis=0)
     first, total = (
         Estimates(value[part], low[part], high[part])
         for part in (slice(None, parameters), slice(parameters, None))
     )
-    return SobolIndices(first, total, used, discarded, confidence, reason)
+    return SobolIndices(first, total, used, discarded, reason)
 
 
 def _scaled(rows: Floats) -> Floats | None:
@@ -210,23 +171,21 @@ def _indices(means: Floats) -> Floats:
     return means[:, 2:] / variance
 
 
-def _means_again(terms: Floats, resamples: int, seed: int) -> Floats:
+def _means_again(terms: Floats) -> Floats:
     """Means (resamples, terms) over rows drawn with replacement."""
     count = len(terms)
-    random = random_of(seed)
-    means = np.empty((resamples, terms.shape[1]))
+    random = random_of(0)
+    means = np.empty((_RESAMPLES, terms.shape[1]))
     block = max(1, _BLOCK // count)
-    for start in range(0, resamples, block):
-        stop = min(start + block, resamples)
+    for start in range(0, _RESAMPLES, block):
+        stop = min(start + block, _RESAMPLES)
         drawn = random.integers(count, size=(stop - start, count))
         times = np.stack([np.bincount(rows, minlength=count) for rows in drawn])
         means[start:stop] = times @ terms / count
     return means
 
 
-_MOST_LEVELS = 1000
-_MOST_WORK = 2e10
-"""Products for distances of all candidates: some ten seconds."""
+_LEVELS = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -245,87 +204,40 @@ class Screening:
     scatter
         sigma: standard deviation of the effects; not 0 where the parameter interacts with others or
         acts nonlinearly.
-    mean_error, mean_size_error, scatter_error
-        Their standard errors.
-    discarded
-        Effects lost with failed points. If not 0, the numbers are those of the region where points
-        succeed.
-    reasons
-        Why the numbers of a parameter are nan.
+    mean_size_error
+        Standard error of the mean size.
+    effects
+        Their number, without those lost with failed points; below two, the numbers are nan.
     """
 
     mean: Floats
     mean_size: Floats
     scatter: Floats
-    mean_error: Floats
     mean_size_error: Floats
-    scatter_error: Floats
     effects: NDArray[np.int64]
-    discarded: NDArray[np.int64]
-    reasons: tuple[str, ...]
 
 
 def morris_design(
-    parameters: int,
-    trajectories: int,
-    seed: int,
-    *,
-    levels: int = 4,
-    candidates: int | None = None,
-    bounded: ArrayLike = True,
+    parameters: int, trajectories: int, seed: int, *, bounded: ArrayLike = True
 ) -> Floats:
     """Trajectories through a grid: each changes every parameter once, one at a time.
 
-    A bounded parameter takes the levels ``0, 1 / (p - 1), ..., 1`` (p even) and jumps by
-    ``p / (2 (p - 1))`` up or down, so that all levels are equally likely.  A distribution without
-    ends takes the middles of p classes, ``(k + 1/2) / p``, and jumps by one half.  A trajectory is
-    ``parameters + 1`` rows.
+    A bounded parameter takes the levels ``0, 1/3, 2/3, 1`` and jumps by ``2/3`` up or down, so that
+    all levels are equally likely.  A distribution without ends takes the middles of four classes,
+    ``(k + 1/2) / 4``, and jumps by one half; ``bounded`` says which a parameter is, for one or all.
+    A trajectory is ``parameters + 1`` rows.  The design is extensible: the first trajectories of
+    more are those of fewer.
 
-    Without ``candidates`` the design is extensible: the first trajectories of more are those of
-    fewer.  With them, of so many drawn trajectories (ten times as many are usual) those are kept
-    that lie far from each other: the most distant pair, then in turn the trajectory with the
-    largest sum of squared distances to those kept.
-
-    Sources: M. D. Morris (1991), Technometrics 33, 161-174; distance of trajectories: F.
-    Campolongo, J. Cariboni and A. Saltelli (2007), Environmental Modelling & Software 22,
-    1509-1518; choice in turn: M. V. Ruano et al. (2012), Environmental Modelling & Software 37,
-    103-109.
+    Source: M. D. Morris (1991), Technometrics 33, 161-174.
 
     >>> morris_design(5, 10, seed=1).shape
     (60, 5)
     """
     require_size(trajectories * (parameters + 1), parameters)
-    refuse_if(
-        not 2 <= levels <= _MOST_LEVELS or levels % 2,
-        "levels",
-        got=f"{levels}",
-        expected=f"an even number from 2 to {_MOST_LEVELS}",
-        hint="4 is usual; the jump over half of an even number reaches all levels alike.",
-    )
-    most = int(np.sqrt(_MOST_WORK / (parameters * (parameters + 1) ** 2)))
-    refuse_if(
-        candidates is not None and not trajectories < candidates <= most,
-        "candidates",
-        got=f"{candidates} for {trajectories} trajectories of {parameters} parameters",
-        expected=f"more than {trajectories}, at most {most}",
-        hint="ten times the number of trajectories is usual; none takes them as drawn.",
-    )
-    ends = np.asarray(bounded, dtype=bool)
-    refuse_if(
-        ends.shape not in ((), (parameters,)),
-        "bounded",
-        got=f"an array of shape {ends.shape}",
-        expected=f"True, False, or one of them for each of {parameters} parameters",
-        hint="say for each parameter whether its range has ends.",
-    )
-    every = np.broadcast_to(ends, (parameters,))
-    positions = np.stack([even_levels(levels, bounded=bool(end)) for end in every])
-    drawn = trajectories if candidates is None else candidates
-    require_size(drawn * (parameters + 1), parameters)
-    paths = np.stack([_trajectory(positions, seed, index) for index in range(drawn)])
-    if candidates is not None:
-        paths = paths[_spread(_squared_distances(paths), trajectories)]
-    return paths.reshape(-1, parameters)
+    every = np.broadcast_to(np.asarray(bounded, dtype=bool), (parameters,))
+    positions = np.stack([even_levels(_LEVELS, bounded=bool(end)) for end in every])
+    paths = [_trajectory(positions, seed, index) for index in range(trajectories)]
+    return np.concatenate(paths)
 
 
 def elementary_effects(points: ArrayLike, values: ArrayLike) -> Screening:
@@ -338,8 +250,7 @@ def elementary_effects(points: ArrayLike, values: ArrayLike) -> Screening:
         mu*   = mean(|e|)                        F. Campolongo et al. (2007)
         sigma = sqrt(sum((e - mu)^2) / (r - 1))  M. D. Morris (1991)
 
-    Standard errors of the means are standard deviations over sqrt(r); that of sigma is the
-    jackknife's (B. Efron and C. Stein, 1981).
+    The standard error of mu* is the standard deviation of the ``|e|`` over sqrt(r).
 
     Parameters
     ----------
@@ -349,47 +260,17 @@ def elementary_effects(points: ArrayLike, values: ArrayLike) -> Screening:
         At these points; not finite where one failed, which discards the effects next to it.
     """
     x, y = np.asarray(points, dtype=np.float64), np.asarray(values, dtype=np.float64)
-    fits = x.ndim == 2 and x.shape[1] and x.shape[0] and x.shape[0] % (x.shape[1] + 1) == 0
-    refuse_if(
-        not fits or y.shape != x.shape[:1],
-        "points",
-        got=f"points of shape {x.shape} and values of shape {y.shape}",
-        expected="trajectories of parameters + 1 points, and one value for each point",
-        hint="give points and values in the order of the design.",
-    )
     parameters = x.shape[1]
-    paths = x.reshape(-1, parameters + 1, parameters)
-    steps = np.diff(paths, axis=1)
-    changed = steps != 0
-    refuse_if(
-        not (np.all(changed.sum(axis=2) == 1) and np.all(changed.sum(axis=1) == 1)),
-        "points",
-        got="points that are no trajectories",
-        expected="trajectories in which each parameter changes once, one at a time",
-        hint="give the points of the design unchanged and in its order.",
-    )
-    moved = np.argmax(changed, axis=2)
+    steps = np.diff(x.reshape(-1, parameters + 1, parameters), axis=1)
+    moved = np.argmax(steps != 0, axis=2)
     jump = np.take_along_axis(steps, moved[..., None], axis=2)[..., 0]
     with np.errstate(invalid="ignore", over="ignore"):
         effect = np.diff(y.reshape(-1, parameters + 1), axis=1) / jump
     of_parameter = np.empty_like(effect)
     np.put_along_axis(of_parameter, moved, effect, axis=1)
-    found = [_moments(own[np.isfinite(own)]) for own in of_parameter.T]
-    used = np.sum(np.isfinite(of_parameter), axis=0)
-    mean, mean_size, scatter, mean_error, mean_size_error, scatter_error = np.array(
-        [numbers for numbers, _ in found]
-    ).T
-    return Screening(
-        mean=mean,
-        mean_size=mean_size,
-        scatter=scatter,
-        mean_error=mean_error,
-        mean_size_error=mean_size_error,
-        scatter_error=scatter_error,
-        effects=used,
-        discarded=len(paths) - used,
-        reasons=tuple(reason for _, reason in found),
-    )
+    moments = np.array([_moments(own[np.isfinite(own)]) for own in of_parameter.T])
+    mean, mean_size, scatter, error = moments.T
+    return Screening(mean, mean_size, scatter, error, np.sum(np.isfinite(of_parameter), axis=0))
 
 
 def _trajectory(positions: Floats, seed: int, index: int) -> Floats:
@@ -408,52 +289,12 @@ def _trajectory(positions: Floats, seed: int, index: int) -> Floats:
     return positions[np.arange(parameters), taken]
 
 
-def _squared_distances(paths: Floats) -> Floats:
-    """Squared distances of trajectories (n, n): the sums over all pairs of their points, squared.
-
-    Campolongo et al. (2007): d = sum over points i of one and j of the other of their distance.
-    """
-    count = len(paths)
-    distances = np.zeros((count, count))
-    sizes = np.sum(paths**2, axis=2)
-    for first in range(count - 1):
-        others = paths[first + 1 :]
-        products = np.einsum("ik,njk->nij", paths[first], others)
-        squares = sizes[first][None, :, None] + sizes[first + 1 :, None, :] - 2.0 * products
-        sums = np.sum(np.sqrt(np.maximum(squares, 0.0)), axis=(1, 2))
-        distances[first, first + 1 :] = distances[first + 1 :, first] = sums**2
-    return distances
-
-
-def _spread(squared: Floats, count: int) -> NDArray[np.int64]:
-    """Trajectories far from each other, in order of drawing."""
-    if count == 1:
-        return np.array([0])
-    chosen = list(np.unravel_index(np.argmax(squared), squared.shape))
-    while len(chosen) < count:
-        gain = np.sum(squared[:, chosen], axis=1)
-        gain[chosen] = -1.0
-        chosen.append(np.argmax(gain))
-    return np.sort(np.array(chosen, dtype=np.int64))
-
-
-def _moments(effects: Floats) -> tuple[Floats, str]:
-    """mu, mu*, sigma and their errors; nan with a reason below two effects."""
-    count = effects.size
-    if count < 2:
-        return np.full(6, np.nan), f"effects without a failed point: {count}, at least 2 are needed"
+def _moments(effects: Floats) -> Floats:
+    """mu, mu*, sigma and the error of mu*; nan below two effects."""
+    if effects.size < 2:
+        return np.full(4, np.nan)
     size = np.max(np.abs(effects))
     unit = effects / (size or 1.0)  # no square of it overflows
-    mean, mean_size, scatter = np.mean(unit), np.mean(np.abs(unit)), np.std(unit, ddof=1)
-    root = np.sqrt(count)
-    errors = (scatter / root, np.std(np.abs(unit), ddof=1) / root, _scatter_error(unit))
-    return size * np.array((mean, mean_size, scatter, *errors)), ""
-
-
-def _scatter_error(effects: Floats) -> float:
-    """Jackknife error of the standard deviation."""
-    count = effects.size
-    if count < 3:
-        return np.nan
-    without = np.array([np.std(np.delete(effects, i), ddof=1) for i in range(count)])
-    return float(np.sqrt((count - 1) / count * np.sum((without - np.mean(without)) ** 2)))
+    sizes = np.abs(unit)
+    error = np.std(sizes, ddof=1) / np.sqrt(effects.size)
+    return size * np.array((np.mean(unit), np.mean(sizes), np.std(unit, ddof=1), error))

@@ -12,7 +12,6 @@ from typing import Any, Literal, Protocol, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from klack.errors import refuse_if
 from klack.studies.designs import random_of
 from klack.studies.sensitivity import Estimates
 from klack.studies.surrogate_chaos import ChaosFit
@@ -109,13 +108,6 @@ def fit_surrogate(
         One measure; not finite where the point failed.
     """
     t, y = np.asarray(points, dtype=float), np.asarray(values, dtype=float)
-    refuse_if(
-        t.shape != (len(y), len(axes)) or y.ndim != 1 or not axes or not np.all(np.isfinite(t)),
-        "points",
-        got=f"points of shape {t.shape}, values of shape {y.shape} for {len(axes)} parameters",
-        expected="finite coordinates, a row for each point and a column for each parameter",
-        hint="give one value for each point, not a number where it failed.",
-    )
     known = np.flatnonzero(np.isfinite(y))
     _, first = np.unique(t[known], axis=0, return_index=True)
     used = known[np.sort(first)]

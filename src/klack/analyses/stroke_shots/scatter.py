@@ -91,7 +91,7 @@ def median_interval(values: Values) -> tuple[float, float]:
 
     Its ends are values of the sample, whatever the distribution; infinite for fewer than six.
     """
-    found = sample_quantile(values, 0.5, confidence=_CERTAIN)
+    found = sample_quantile(values, 0.5)
     return found.low, found.high
 
 

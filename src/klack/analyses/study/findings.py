@@ -21,7 +21,7 @@ from klack.input.problem import one_of
 from klack.machine.progress import Progress
 from klack.studies.designs import Listed, unevenness
 from klack.studies.samples import exceedance_of
-from klack.studies.sensitivity import elementary_effects, sobol_indices
+from klack.studies.sensitivity import CONFIDENCE, elementary_effects, sobol_indices
 from klack.studies.surrogate import Surrogate, SurrogateKind, fit_surrogate
 from klack.studies.surrogate_model import SurrogateAxis, require_scikit_learn
 
@@ -49,7 +49,7 @@ def sensitivity_of(item: StudyColumn, parameters: tuple[str, ...]) -> Sensitivit
         total_high=found.total.high,
         rows=found.rows,
         discarded=found.discarded,
-        confidence=found.confidence,
+        confidence=CONFIDENCE,
         reason=found.reason,
     )
 
