@@ -381,7 +381,7 @@ def test_missing_file_folder_binary_and_giant_are_refused(tmp_path):
     giant.write_bytes(b"#" * 1_000_001)
 
     for path, words in [
-        (tmp_path / "none.yaml", "does not exist"),
+        (tmp_path / "none.yaml", "neither a file"),
         (tmp_path, "a folder"),
         (binary, "not UTF-8"),
         (giant, "1 MB"),

@@ -23,7 +23,7 @@ from klack.case.parameters import PARAMETERS, Written
 from klack.case.plausible import GO_ON, Number
 from klack.contact.friction import MOST_FRICTION
 from klack.errors import InputError
-from klack.input.problem import CaseProblem, Key, key_text, nearest, one_of
+from klack.input.problem import CaseProblem, Key, key_text, nearest, one_of, reject_if
 from klack.input.section import Count, Name, NamedSection, PlainName, Section, Text
 from klack.materials.hardening import (
     HARDNESS_SPREAD,
@@ -368,22 +368,22 @@ class CaseBody(Section):
             if not self.geometry.is_absent:
                 self._refuse_with(("geometry",), "a reduced model", "it has no shape")
             return self
-        if self.geometry.is_absent:
-            raise CaseProblem(
-                (),
-                got="no key 'geometry'",
-                expected="geometry: Shape: profile, step, mesh or nodes",
-                hint="add 'geometry' here, or 'reduced' for a reduced model.",
-            )
+        reject_if(
+            self.geometry.is_absent,
+            (),
+            got="no key 'geometry'",
+            expected="geometry: Shape: profile, step, mesh or nodes",
+            hint="add 'geometry' here, or 'reduced' for a reduced model.",
+        )
         if self.matrices is not None:
             self._refuse_with(("material",), "matrices", "they already include the material")
-            if self.geometry.mesh is None and self.geometry.nodes is None:
-                raise CaseProblem(
-                    ("matrices",),
-                    got="matrices with a shape that klack meshes",
-                    expected="geometry.mesh or geometry.nodes of the program that wrote them",
-                    hint="give the mesh file of these matrices.",
-                )
+            reject_if(
+                self.geometry.mesh is None and self.geometry.nodes is None,
+                ("matrices",),
+                got="matrices with a shape that klack meshes",
+                expected="geometry.mesh or geometry.nodes of the program that wrote them",
+                hint="give the mesh file of these matrices.",
+            )
         elif self.geometry.nodes is not None:
             hint = "add matrices: {stiffness: ..., mass: ..., units: ...}."
             raise CaseProblem((), got="nodes without matrices", expected="matrices", hint=hint)
@@ -402,14 +402,14 @@ class CaseBody(Section):
             raise CaseProblem((), got="no key 'mesh'", expected="mesh: {size: ...}", hint=hint)
         if self.geometry.dimension == 2:
             for i, support in enumerate(self.fixed or ()):
-                if support.sectors is not None:
-                    raise CaseProblem(
-                        ("fixed", i, "sectors"),
-                        got="sectors on an axisymmetric body",
-                        expected="a support all round",
-                        hint="remove 'sectors', or use 'model: swept' with 'layers: 18'.",
-                        on_key=True,
-                    )
+                reject_if(
+                    support.sectors is not None,
+                    ("fixed", i, "sectors"),
+                    got="sectors on an axisymmetric body",
+                    expected="a support all round",
+                    hint="remove 'sectors', or use 'model: swept' with 'layers: 18'.",
+                    on_key=True,
+                )
         return self
 
     def _check_joints(self) -> None:
@@ -452,18 +452,18 @@ class CaseBody(Section):
             return
         geometry = self.geometry
         no_parts = geometry.is_absent or geometry.nodes is not None or self.matrices is not None
-        if no_parts or self.fits:
-            raise CaseProblem(
-                ("layers",),
-                got="a layer beside a press fit"
-                if self.fits
-                else "a layer in a body given by its matrices or as a reduced model",
-                expected="a body whose parts klack assembles, without 'fits'",
-                hint="remove 'fits': compute the press fit of the body without its layers."
-                if self.fits
-                else "include the layer in that model, and remove 'layers'.",
-                on_key=True,
-            )
+        reject_if(
+            no_parts or self.fits,
+            ("layers",),
+            got="a layer beside a press fit"
+            if self.fits
+            else "a layer in a body given by its matrices or as a reduced model",
+            expected="a body whose parts klack assembles, without 'fits'",
+            hint="remove 'fits': compute the press fit of the body without its layers."
+            if self.fits
+            else "include the layer in that model, and remove 'layers'.",
+            on_key=True,
+        )
         if geometry.profile is None:
             return
         for name in self.layers:
@@ -506,13 +506,13 @@ class ModeChoice(Section):
     @classmethod
     def _some_modes(cls, value: Any) -> Any:
         for key in ("count", "participation", "pool"):
-            if isinstance(value, Mapping) and value.get(key) == 0:
-                raise CaseProblem(
-                    (key,),
-                    got="0 modes",
-                    expected="1 or more",
-                    hint="a rigid body is the level 'lumped'; 20 modes are a good start here.",
-                )
+            reject_if(
+                isinstance(value, Mapping) and value.get(key) == 0,
+                (key,),
+                got="0 modes",
+                expected="1 or more",
+                hint="a rigid body is the level 'lumped'; 20 modes are a good start here.",
+            )
         return value
 
     @model_validator(mode="after")
@@ -520,13 +520,13 @@ class ModeChoice(Section):
         kind = self._exactly_one(("count", "frequency", "participation"), "which modes to keep")
         if kind != "participation":
             return self._refuse_with(("pool",), kind, "only participation chooses from a pool")
-        if self.pool is None or self.participation is None or self.pool < self.participation:
-            raise CaseProblem(
-                ("pool",) if self.pool is not None else (),
-                got=f"a pool of {self.pool or 'no'} modes for {self.participation}",
-                expected=f"pool: {self.participation} or more",
-                hint="pool: 100 is enough for most bodies.",
-            )
+        reject_if(
+            self.pool is None or self.participation is None or self.pool < self.participation,
+            ("pool",) if self.pool is not None else (),
+            got=f"a pool of {self.pool or 'no'} modes for {self.participation}",
+            expected=f"pool: {self.participation} or more",
+            hint="pool: 100 is enough for most bodies.",
+        )
         return self
 
 
@@ -555,20 +555,20 @@ class Reduction(Section):
         cls, shifts: Mapping[str, tuple[float, ...]]
     ) -> Mapping[str, tuple[float, ...]]:
         for body, frequencies in shifts.items():
-            if not 1 <= len(frequencies) <= _MOST_SHIFTS:
-                raise CaseProblem(
-                    (body,),
-                    got=f"{len(frequencies)} shifts",
-                    expected=f"1 to {_MOST_SHIFTS} frequencies",
-                    hint="two are usual for a free body; leave the body out for its residual mode.",
-                )
-            if len(set(frequencies)) < len(frequencies):
-                raise CaseProblem(
-                    (body,),
-                    got="the same shift twice",
-                    expected="different frequencies",
-                    hint="each adds one mode per contact; a second one at its place adds nothing.",
-                )
+            reject_if(
+                not 1 <= len(frequencies) <= _MOST_SHIFTS,
+                (body,),
+                got=f"{len(frequencies)} shifts",
+                expected=f"1 to {_MOST_SHIFTS} frequencies",
+                hint="two are usual for a free body; leave the body out for its residual mode.",
+            )
+            reject_if(
+                len(set(frequencies)) < len(frequencies),
+                (body,),
+                got="the same shift twice",
+                expected="different frequencies",
+                hint="each adds one mode per contact; a second one at its place adds nothing.",
+            )
         return shifts
 
     def choice(self, body: str) -> ModeChoice:
@@ -609,13 +609,13 @@ class WrittenCase(Section):
     @field_validator("klack", mode="before")
     @classmethod
     def _known_version(cls, version: Any) -> Any:
-        if isinstance(version, bool) or version != 1:
-            raise CaseProblem(
-                (),
-                got=f"the format version {version}",
-                expected="1",
-                hint="this version of klack reads version 1; a later one may read others.",
-            )
+        reject_if(
+            isinstance(version, bool) or version != 1,
+            (),
+            got=f"the format version {version}",
+            expected="1",
+            hint="this version of klack reads version 1; a later one may read others.",
+        )
         return version
 
     @property

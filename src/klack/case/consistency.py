@@ -12,7 +12,7 @@ from klack.case.outputs import check_outputs
 from klack.case.valve_roles import find_roles
 from klack.case.valve_sections import ValveSections
 from klack.contact.friction import MOST_FRICTION
-from klack.input.problem import CaseProblem, Key, nearest, one_of
+from klack.input.problem import CaseProblem, Key, nearest, one_of, reject_if
 from klack.units import format_si
 
 __all__ = [
@@ -20,6 +20,7 @@ __all__ = [
     "GIVEN_LEVELS",
     "check_body",
     "check_consistency",
+    "check_drawn_place",
     "check_noise",
     "check_shifts",
     "check_surface",
@@ -75,85 +76,85 @@ def check_given(case: ImpactSections) -> None:
     name = next(name for name, body in case.bodies.items() if not body.has_surfaces)
     what = "a reduced model" if case.bodies[name].reduced is not None else "nodes alone"
     for section in _ON_SURFACES:
-        if getattr(case, section) is not None:
-            raise CaseProblem(
-                (section,),
-                got=f"'{section}' with '{name}', {what}",
-                expected="bodies with surfaces",
-                hint=f"remove '{section}', or give '{name}' a mesh.",
-                on_key=True,
-            )
-    if not case.motion.is_straight:
-        raise CaseProblem(
-            ("motion",),
-            got=f"a motion sideways or a spin with '{name}', {what}",
-            expected="a motion along the axis: a port moves along it alone",
-            hint="remove 'sideways_speed' and 'spin'.",
-        )
-    if not case.motion.placement.is_centred:
-        raise CaseProblem(
-            ("motion", "placement"),
-            got=f"an off-axis placement with '{name}', {what}",
-            expected="a centred body: a port moves along the axis alone",
-            hint="remove 'placement'.",
+        reject_if(
+            getattr(case, section) is not None,
+            (section,),
+            got=f"'{section}' with '{name}', {what}",
+            expected="bodies with surfaces",
+            hint=f"remove '{section}', or give '{name}' a mesh.",
             on_key=True,
         )
-    if case.run.transfer is not None:
-        raise CaseProblem(
-            ("run", "transfer"),
-            got=f"transfer functions of the full order with '{name}', {what}",
-            expected="bodies that klack reduces itself",
-            hint="remove 'transfer'.",
-            on_key=True,
-        )
-    if case.reduction.shifts:
-        raise CaseProblem(
-            ("reduction", "shifts"),
-            got=f"shifts of attachment modes with '{name}', {what}",
-            expected="two meshed bodies: there are no attachment modes without",
-            hint="remove 'shifts'.",
-            on_key=True,
-        )
+    reject_if(
+        not case.motion.is_straight,
+        ("motion",),
+        got=f"a motion sideways or a spin with '{name}', {what}",
+        expected="a motion along the axis: a port moves along it alone",
+        hint="remove 'sideways_speed' and 'spin'.",
+    )
+    reject_if(
+        not case.motion.placement.is_centred,
+        ("motion", "placement"),
+        got=f"an off-axis placement with '{name}', {what}",
+        expected="a centred body: a port moves along the axis alone",
+        hint="remove 'placement'.",
+        on_key=True,
+    )
+    reject_if(
+        case.run.transfer is not None,
+        ("run", "transfer"),
+        got=f"transfer functions of the full order with '{name}', {what}",
+        expected="bodies that klack reduces itself",
+        hint="remove 'transfer'.",
+        on_key=True,
+    )
+    reject_if(
+        case.reduction.shifts,
+        ("reduction", "shifts"),
+        got=f"shifts of attachment modes with '{name}', {what}",
+        expected="two meshed bodies: there are no attachment modes without",
+        hint="remove 'shifts'.",
+        on_key=True,
+    )
     _check_law(case, name, what)
     forms = ("crown", "waviness", "tilt", "roughness")
     form = next((key for key in forms if getattr(case.contact, key)), None)
-    if not case.contact.faces.is_none:
-        raise CaseProblem(
-            ("contact", "friction" if case.contact.friction else "static_friction"),
-            got=f"friction with '{name}', {what}",
-            expected="no friction: without a surface nothing is known of its slip",
-            hint="leave it out, or give the body a mesh.",
-        )
-    if form is not None:
-        raise CaseProblem(
-            ("contact", str(form)),
-            got=f"the key '{form}' of faces with '{name}', {what}",
-            expected="bodies with surfaces",
-            hint=f"remove '{form}', or give '{name}' a mesh.",
-            on_key=True,
-        )
+    reject_if(
+        not case.contact.faces.is_none,
+        ("contact", "friction" if case.contact.friction else "static_friction"),
+        got=f"friction with '{name}', {what}",
+        expected="no friction: without a surface nothing is known of its slip",
+        hint="leave it out, or give the body a mesh.",
+    )
+    reject_if(
+        form is not None,
+        ("contact", str(form)),
+        got=f"the key '{form}' of faces with '{name}', {what}",
+        expected="bodies with surfaces",
+        hint=f"remove '{form}', or give '{name}' a mesh.",
+        on_key=True,
+    )
     for i, level in enumerate(case.run.levels):
-        if level not in GIVEN_LEVELS:
-            raise CaseProblem(
-                ("run", "levels", i) if "levels" in case.run.model_fields_set else ("run",),
-                got=f"the level '{level}' with '{name}', {what}",
-                expected=f"levels among: {one_of(GIVEN_LEVELS)}",
-                hint="write 'levels: [reduced]'.",
-            )
+        reject_if(
+            level not in GIVEN_LEVELS,
+            ("run", "levels", i) if "levels" in case.run.model_fields_set else ("run",),
+            got=f"the level '{level}' with '{name}', {what}",
+            expected=f"levels among: {one_of(GIVEN_LEVELS)}",
+            hint="write 'levels: [reduced]'.",
+        )
 
 
 def _check_law(case: ImpactSections, name: str, what: str) -> None:
     law = case.contact.local_law
-    if law.kind not in ("linear", "hertz"):
-        raise CaseProblem(
-            ("contact", "local_law", "kind")
-            if "local_law" in case.contact.model_fields_set
-            else ("contact",),
-            got=f"the local law '{law.kind}' with '{name}', {what}",
-            expected="a given law: linear or hertz",
-            hint="add 'local_law: {kind: linear, stiffness: 1e9 N/m}': the contact zone alone; "
-            "the static compliance of the bodies is added.",
-        )
+    reject_if(
+        law.kind not in ("linear", "hertz"),
+        ("contact", "local_law", "kind")
+        if "local_law" in case.contact.model_fields_set
+        else ("contact",),
+        got=f"the local law '{law.kind}' with '{name}', {what}",
+        expected="a given law: linear or hertz",
+        hint="add 'local_law: {kind: linear, stiffness: 1e9 N/m}': the contact zone alone; "
+        "the static compliance of the bodies is added.",
+    )
     if law.kind == "hertz" and law.modulus is None:
         for body, given in case.bodies.items():
             if given.material is None:
@@ -163,13 +164,13 @@ def _check_law(case: ImpactSections, name: str, what: str) -> None:
                     expected="modulus: the effective modulus E*",
                     hint="115 GPa for steel on steel.",
                 )
-    if case.reduction.correction == "attachment":
-        raise CaseProblem(
-            ("reduction", "correction"),
-            got=f"attachment modes with '{name}', {what}",
-            expected="consistent (the residual compliance in series with the law), or none",
-            hint="remove 'correction'.",
-        )
+    reject_if(
+        case.reduction.correction == "attachment",
+        ("reduction", "correction"),
+        got=f"attachment modes with '{name}', {what}",
+        expected="consistent (the residual compliance in series with the law), or none",
+        hint="remove 'correction'.",
+    )
 
 
 def check_consistency(case: ImpactSections) -> None:
@@ -204,21 +205,21 @@ def check_consistency(case: ImpactSections) -> None:
     centred = motion.placement.is_centred and motion.is_straight
     centred = centred and case.guide is None and case.shots is None
     # worn faces are those of a centred impact
-    if case.contact.worn is not None and not (centred and case.has_surfaces):
-        raise CaseProblem(
-            ("contact", "worn"),
-            got="worn faces of bodies that meet off-axis, or of given models",
-            expected="a centred impact of bodies with meshes",
-            hint="remove 'worn', or the placement, guide or shots.",
-            on_key=True,
-        )
-    if "lumped" in case.run.levels and case.lumped is None:
-        raise CaseProblem(
-            ("run", "levels"),
-            got="the level 'lumped' without a section 'lumped'",
-            expected="its stiffness",
-            hint="add 'lumped: {stiffness: 1e9 N/m}', or remove the level.",
-        )
+    reject_if(
+        case.contact.worn is not None and not (centred and case.has_surfaces),
+        ("contact", "worn"),
+        got="worn faces of bodies that meet off-axis, or of given models",
+        expected="a centred impact of bodies with meshes",
+        hint="remove 'worn', or the placement, guide or shots.",
+        on_key=True,
+    )
+    reject_if(
+        "lumped" in case.run.levels and case.lumped is None,
+        ("run", "levels"),
+        got="the level 'lumped' without a section 'lumped'",
+        expected="its stiffness",
+        hint="add 'lumped: {stiffness: 1e9 N/m}', or remove the level.",
+    )
 
 
 def require_known(
@@ -241,25 +242,25 @@ def check_shifts(case: CaseFile, reduction: Reduction) -> None:
     for name in reduction.shifts:
         key: Key = ("reduction", "shifts", name)
         require_known(key, name, case.bodies, "body", on_key=True)
-        if case.bodies[name].reduced is not None:
-            raise CaseProblem(
-                key,
-                got=f"shifts of '{name}', which is a reduced model already",
-                expected="shifts of a body that klack reduces",
-                hint="remove them.",
-                on_key=True,
-            )
+        reject_if(
+            case.bodies[name].reduced is not None,
+            key,
+            got=f"shifts of '{name}', which is a reduced model already",
+            expected="shifts of a body that klack reduces",
+            hint="remove them.",
+            on_key=True,
+        )
 
 
 def _check_bodies(case: ImpactSections) -> None:
-    if case.opposite is not None and case.backing is not None:
-        raise CaseProblem(
-            ("backing",),
-            got="a body behind the struck one together with an upper stop",
-            expected="one of them: no level has both",
-            hint="remove 'backing' or 'opposite'; a stroke has both (klack stroke).",
-            on_key=True,
-        )
+    reject_if(
+        case.opposite is not None and case.backing is not None,
+        ("backing",),
+        got="a body behind the struck one together with an upper stop",
+        expected="one of them: no level has both",
+        hint="remove 'backing' or 'opposite'; a stroke has both (klack stroke).",
+        on_key=True,
+    )
     has_third = case.opposite is not None or case.backing is not None
     count, words = (3, "three") if has_third else (2, "two")
     if len(case.bodies) != count:
@@ -295,14 +296,14 @@ def _check_roles(case: ImpactSections) -> None:
             expected="surfaces of two bodies",
             hint=f"name a surface of {one_of(n for n in case.bodies if n != moving.body)}.",
         )
-    if case.moving_body.fixed:
-        raise CaseProblem(
-            ("bodies", moving.body, "fixed"),
-            got=f"supports of '{moving.body}', the body that moves",
-            expected="no supports there",
-            hint="remove 'fixed', or swap the two surfaces in contact.between.",
-            on_key=True,
-        )
+    reject_if(
+        case.moving_body.fixed,
+        ("bodies", moving.body, "fixed"),
+        got=f"supports of '{moving.body}', the body that moves",
+        expected="no supports there",
+        hint="remove 'fixed', or swap the two surfaces in contact.between.",
+        on_key=True,
+    )
     models = [case.bodies[s.body].geometry.dimension for s in case.contact.between]
     if models[0] != models[1] and case.has_surfaces:
         flat, solid = (moving, stop) if models[0] == 2 else (stop, moving)
@@ -361,21 +362,21 @@ def _check_local_law(case: ImpactSections) -> None:
     correction, law = case.reduction.correction, case.contact.local_law.kind
     if not case.has_surfaces:
         return  # in given_consistency
-    if correction == "consistent" and law != "consistent":
-        raise CaseProblem(
-            ("contact", "local_law", "kind"),
-            got=f"a {law} law with the correction 'consistent'",
-            expected="the law 'consistent', which carries the residual compliance",
-            hint="remove local_law, or set 'reduction: {correction: attachment}' for it.",
-        )
-    if correction != "consistent" and law == "consistent":
-        raise CaseProblem(
-            ("reduction", "correction"),
-            got=f"the correction '{correction}' with a consistent local law",
-            expected="a local law of the kind linear, hertz or submodel",
-            hint="add 'contact: {local_law: {kind: submodel, size: 1 mm}}', or use the "
-            "correction 'consistent'.",
-        )
+    reject_if(
+        correction == "consistent" and law != "consistent",
+        ("contact", "local_law", "kind"),
+        got=f"a {law} law with the correction 'consistent'",
+        expected="the law 'consistent', which carries the residual compliance",
+        hint="remove local_law, or set 'reduction: {correction: attachment}' for it.",
+    )
+    reject_if(
+        correction != "consistent" and law == "consistent",
+        ("reduction", "correction"),
+        got=f"the correction '{correction}' with a consistent local law",
+        expected="a local law of the kind linear, hertz or submodel",
+        hint="add 'contact: {local_law: {kind: submodel, size: 1 mm}}', or use the "
+        "correction 'consistent'.",
+    )
 
 
 def _check_opposite(case: ImpactSections) -> None:
@@ -392,13 +393,13 @@ def _check_opposite(case: ImpactSections) -> None:
             expected=f"a surface of the third body, then one of '{between[0]}', which moves",
             hint="the upper stop is a separate body.",
         )
-    if case.bodies[stop.body].geometry.dimension != case.dimension:
-        raise CaseProblem(
-            ("bodies", stop.body, "geometry", "model"),
-            got=f"'{stop.body}' of another dimension than the moving body",
-            expected="all bodies axisymmetric or all three-dimensional",
-            hint="take 'model: swept' with 'layers: 18'.",
-        )
+    reject_if(
+        case.bodies[stop.body].geometry.dimension != case.dimension,
+        ("bodies", stop.body, "geometry", "model"),
+        got=f"'{stop.body}' of another dimension than the moving body",
+        expected="all bodies axisymmetric or all three-dimensional",
+        hint="take 'model: swept' with 'layers: 18'.",
+    )
 
 
 BACKING_LEVELS = ("reduced",)
@@ -414,13 +415,13 @@ def _check_backing(case: ImpactSections) -> None:
         check_surface(case, ("backing", "between", i), surface)
     lower, third = backing.between
     moving, struck = case.contact.between
-    if lower.body != struck.body or third.body in (moving.body, struck.body) or lower == struck:
-        raise CaseProblem(
-            ("backing", "between"),
-            got=f"{lower} and {third}",
-            expected=f"another surface of '{struck.body}', then one of the third body",
-            hint="the order is needle, insert, housing.",
-        )
+    reject_if(
+        lower.body != struck.body or third.body in (moving.body, struck.body) or lower == struck,
+        ("backing", "between"),
+        got=f"{lower} and {third}",
+        expected=f"another surface of '{struck.body}', then one of the third body",
+        hint="the order is needle, insert, housing.",
+    )
     if case.contact.gap is None:
         raise CaseProblem(
             ("contact",),
@@ -430,39 +431,39 @@ def _check_backing(case: ImpactSections) -> None:
             on_key=True,
         )
     middle, last = case.bodies[struck.body], case.bodies[third.body]
-    if middle.fixed:
-        raise CaseProblem(
-            ("bodies", struck.body, "fixed"),
-            got=f"supports of '{struck.body}', and a body behind it",
-            expected="no supports there: its contact with the body behind carries it",
-            hint="remove 'fixed', or 'backing' and the third body.",
-            on_key=True,
-        )
-    if last.geometry.dimension != case.dimension and case.has_surfaces:
-        raise CaseProblem(
-            ("bodies", third.body, "geometry", "model"),
-            got=f"'{third.body}' of another dimension than the moving body",
-            expected="all bodies axisymmetric or all three-dimensional",
-            hint="take 'model: swept' with 'layers: 18'.",
-        )
+    reject_if(
+        middle.fixed,
+        ("bodies", struck.body, "fixed"),
+        got=f"supports of '{struck.body}', and a body behind it",
+        expected="no supports there: its contact with the body behind carries it",
+        hint="remove 'fixed', or 'backing' and the third body.",
+        on_key=True,
+    )
+    reject_if(
+        last.geometry.dimension != case.dimension and case.has_surfaces,
+        ("bodies", third.body, "geometry", "model"),
+        got=f"'{third.body}' of another dimension than the moving body",
+        expected="all bodies axisymmetric or all three-dimensional",
+        hint="take 'model: swept' with 'layers: 18'.",
+    )
     if backing.clamp is not None:
         key: Key = ("backing", "clamp", "surface")
         check_surface(case, key, SurfaceName(body=struck.body, surface=backing.clamp.surface))
-        if backing.clamp.surface in (lower.surface, struck.surface):
-            raise CaseProblem(
-                key,
-                got=f"'{backing.clamp.surface}', where '{struck.body}' meets another body",
-                expected="a surface of its own, such as a shoulder",
-                hint="split the edge in the drawing.",
-            )
-        if not last.fixed:
-            raise CaseProblem(
-                ("backing", "clamp"),
-                got=f"a clamp, but nothing holds '{third.body}'",
-                expected=f"bodies.{third.body}.fixed: a surface that takes the preload",
-                hint="add 'fixed: [{surface: NAME}]' to it, or remove 'clamp'.",
-                on_key=True,
-            )
+        reject_if(
+            backing.clamp.surface in (lower.surface, struck.surface),
+            key,
+            got=f"'{backing.clamp.surface}', where '{struck.body}' meets another body",
+            expected="a surface of its own, such as a shoulder",
+            hint="split the edge in the drawing.",
+        )
+        reject_if(
+            not last.fixed,
+            ("backing", "clamp"),
+            got=f"a clamp, but nothing holds '{third.body}'",
+            expected=f"bodies.{third.body}.fixed: a surface that takes the preload",
+            hint="add 'fixed: [{surface: NAME}]' to it, or remove 'clamp'.",
+            on_key=True,
+        )
     _check_beside_backing(case)
 
 
@@ -548,26 +549,26 @@ def _check_solid_only(case: ImpactSections) -> None:
         (("contact", "waviness", "direction"), straight, "straight waves on the faces"),
     ]
     for key, is_there, what in asked:
-        if is_there:
-            raise CaseProblem(
-                key,
-                got=f"{what} of axisymmetric bodies",
-                expected="three-dimensional bodies",
-                hint="take 'model: swept' with 'layers: 18' for both of them.",
-                on_key=True,
-            )
+        reject_if(
+            is_there,
+            key,
+            got=f"{what} of axisymmetric bodies",
+            expected="three-dimensional bodies",
+            hint="take 'model: swept' with 'layers: 18' for both of them.",
+            on_key=True,
+        )
 
 
 def _check_off_axis(case: ImpactSections) -> None:
     """Reject what axisymmetric bodies cannot have off-axis."""
-    if case.contact.angles is not None and case.dimension == 3:
-        raise CaseProblem(
-            ("contact", "angles"),
-            got="angles of bodies of three dimensions",
-            expected="axisymmetric bodies: the mesh of a solid has its own points round the ring",
-            hint="remove 'angles'; more 'layers' make a swept mesh finer round the ring.",
-            on_key=True,
-        )
+    reject_if(
+        case.contact.angles is not None and case.dimension == 3,
+        ("contact", "angles"),
+        got="angles of bodies of three dimensions",
+        expected="axisymmetric bodies: the mesh of a solid has its own points round the ring",
+        hint="remove 'angles'; more 'layers' make a swept mesh finer round the ring.",
+        on_key=True,
+    )
     if not case.leaves_axis:
         return
     asked: list[tuple[Key, bool, str]] = [
@@ -591,21 +592,21 @@ def _check_oblique(case: ImpactSections) -> None:
     if motion.is_straight:
         return
     key = "sideways_speed" if motion.sideways_speed else "spin"
-    asked = {"shots": "shots", "noise": "noise", "run_in": "impacts one after another"}
-    wanted = {
-        "shots": case.shots is not None,
-        "noise": case.noise is not None,
-        "run_in": case.run.run_in or case.run.impacts > 1,
-    }
-    for name, what in asked.items():
-        if wanted[name]:
-            raise CaseProblem(
-                ("motion", key),
-                got=f"a motion sideways or a spin, and {what}",
-                expected="one of them: those start along the axis",
-                hint=f"remove '{key}', or '{name}'.",
-                on_key=True,
-            )
+    several = case.run.run_in or case.run.impacts > 1
+    asked: list[tuple[str, object, str]] = [
+        ("shots", case.shots is not None, "shots"),
+        ("noise", case.noise is not None, "noise"),
+        ("run_in", several, "impacts one after another"),
+    ]
+    for name, is_there, what in asked:
+        reject_if(
+            is_there,
+            ("motion", key),
+            got=f"a motion sideways or a spin, and {what}",
+            expected="one of them: those start along the axis",
+            hint=f"remove '{key}', or '{name}'.",
+            on_key=True,
+        )
 
 
 def _check_ends(case: ImpactSections) -> None:
@@ -615,31 +616,31 @@ def _check_ends(case: ImpactSections) -> None:
             continue
         key: Key = ("bodies", name, "non_reflecting")
         stop = case.contact.stop
-        if case.shots is not None or case.opposite is not None:
-            raise CaseProblem(
-                key,
-                got="a non-reflecting end together with 'shots' or 'opposite'",
-                expected="neither of them: both are for the interface level",
-                hint="remove non_reflecting.",
-                on_key=True,
-            )
-        if name != stop.body or not body.has_surfaces or not isinstance(body.material, str):
-            raise CaseProblem(
-                key,
-                got=f"a non-reflecting end of '{name}'",
-                expected=f"one of '{stop.body}', the body that is hit, meshed and of one material",
-                hint="the body that moves would be braked by it from the start.",
-                on_key=True,
-            )
+        reject_if(
+            case.shots is not None or case.opposite is not None,
+            key,
+            got="a non-reflecting end together with 'shots' or 'opposite'",
+            expected="neither of them: both are for the interface level",
+            hint="remove non_reflecting.",
+            on_key=True,
+        )
+        reject_if(
+            name != stop.body or not body.has_surfaces or not isinstance(body.material, str),
+            key,
+            got=f"a non-reflecting end of '{name}'",
+            expected=f"one of '{stop.body}', the body that is hit, meshed and of one material",
+            hint="the body that moves would be braked by it from the start.",
+            on_key=True,
+        )
         check_surface(case, key, SurfaceName(body=name, surface=body.non_reflecting))
         held = [support.surface for support in body.fixed or ()]
-        if body.non_reflecting in (stop.surface, *held):
-            raise CaseProblem(
-                key,
-                got=f"'{body.non_reflecting}', a surface that is hit or held",
-                expected="another surface, the far end of a bar",
-                hint="waves leave where nothing holds the body.",
-            )
+        reject_if(
+            body.non_reflecting in (stop.surface, *held),
+            key,
+            got=f"'{body.non_reflecting}', a surface that is hit or held",
+            expected="another surface, the far end of a bar",
+            hint="waves leave where nothing holds the body.",
+        )
         others = [level for level in case.run.levels if level != "full"]
         if others:
             raise CaseProblem(
@@ -703,35 +704,41 @@ def _check_shots(case: ImpactSections) -> None:
     shots = case.shots
     if shots is None:
         return
-    if case.guide is None and shots.friction is not None:
-        raise CaseProblem(
-            ("shots", "friction"),
-            got="friction without a guide",
-            expected="a section 'guide', in which the moving body rubs",
-            hint="add 'guide', or remove 'friction'.",
-            on_key=True,
-        )
-    if case.guide is not None and (shots.eccentricity is None) != (shots.tilt is None):
-        given, other = ("tilt", "eccentricity")
-        if shots.tilt is None:
-            given, other = other, given
-        raise CaseProblem(
-            ("shots", given),
-            got=f"{given} without {other}, and a guide",
-            expected="both of them, or none: the guide then limits the placement",
-            hint=f"add '{other}' (0 is possible), or remove '{given}'.",
-            on_key=True,
-        )
+    reject_if(
+        case.guide is None and shots.friction is not None,
+        ("shots", "friction"),
+        got="friction without a guide",
+        expected="a section 'guide', in which the moving body rubs",
+        hint="add 'guide', or remove 'friction'.",
+        on_key=True,
+    )
+    if case.guide is not None:
+        check_drawn_place(shots.eccentricity, shots.tilt)
     _check_drawn_friction(case)
     drawn = ("eccentricity", "tilt", "force", "contact_friction", "waviness")
-    if case.guide is None and all(getattr(shots, name) is None for name in drawn):
-        raise CaseProblem(
-            ("shots",),
-            got="identical shots",
-            expected=f"a section 'guide', or at least one of: {one_of(drawn)}",
-            hint="'guide' draws placements within its clearance.",
-            on_key=True,
-        )
+    reject_if(
+        case.guide is None and all(getattr(shots, name) is None for name in drawn),
+        ("shots",),
+        got="identical shots",
+        expected=f"a section 'guide', or at least one of: {one_of(drawn)}",
+        hint="'guide' draws placements within its clearance.",
+        on_key=True,
+    )
+
+
+def check_drawn_place(eccentricity: object, tilt: object) -> None:
+    """In a guide both are drawn, or none."""
+    given, other = "tilt", "eccentricity"
+    if tilt is None:
+        given, other = other, given
+    reject_if(
+        (eccentricity is None) != (tilt is None),
+        ("shots", given),
+        got=f"{given} without {other}, and a guide",
+        expected="both of them, or none: the guide then limits the placement",
+        hint=f"add '{other}' (0 is possible), or remove '{given}'.",
+        on_key=True,
+    )
 
 
 def _check_drawn_friction(case: ImpactSections) -> None:
@@ -779,13 +786,13 @@ def check_noise(case: ImpactSections | ValveSections) -> None:
         check_surface(case, key, surface)
         if surface.body in held:
             continue
-        if surface.body == _moving(case):
-            raise CaseProblem(
-                key,
-                got=f"'{surface}', but nothing holds '{surface.body}'",
-                expected=f"surfaces of held bodies ({one_of(held)})",
-                hint="a free body, such as a needle, radiates into the fluid.",
-            )
+        reject_if(
+            surface.body == _moving(case),
+            key,
+            got=f"'{surface}', but nothing holds '{surface.body}'",
+            expected=f"surfaces of held bodies ({one_of(held)})",
+            hint="a free body, such as a needle, radiates into the fluid.",
+        )
         raise CaseProblem(
             ("bodies", surface.body),
             got=f"no key 'fixed', but '{surface}' shall radiate sound (noise.surfaces)",
@@ -807,13 +814,13 @@ def _check_mounts(case: ImpactSections | ValveSections, noise: CaseNoise) -> Non
         supports = [support.surface for support in case.bodies[place.body].fixed or ()]
         held = [f"{place.body}.{surface}" for surface in supports]
         on_mount = key[1] == "mounts"
-        if (on_mount and place.surface not in supports) or not supports:
-            raise CaseProblem(
-                key,
-                got=f"'{place}', which nothing holds",
-                expected=f"a held surface: {one_of(held)}" if held else "a held body",
-                hint=f"add it to bodies.{place.body}.fixed, or name another surface.",
-            )
+        reject_if(
+            (on_mount and place.surface not in supports) or not supports,
+            key,
+            got=f"'{place}', which nothing holds",
+            expected=f"a held surface: {one_of(held)}" if held else "a held body",
+            hint=f"add it to bodies.{place.body}.fixed, or name another surface.",
+        )
         if on_mount and place in taken:
             raise CaseProblem(
                 key,
@@ -825,13 +832,13 @@ def _check_mounts(case: ImpactSections | ValveSections, noise: CaseNoise) -> Non
             taken[place] = str(key[2])
     for body in {place.body for place in taken}:
         for support in case.bodies[body].fixed or ():
-            if SurfaceName(body, support.surface) not in taken:
-                raise CaseProblem(
-                    ("noise", "mounts"),
-                    got=f"no mount at '{body}.{support.surface}', which is held",
-                    expected=f"all held surfaces of '{body}'",
-                    hint="add a mount, or list the surface beside those that it moves with.",
-                )
+            reject_if(
+                SurfaceName(body, support.surface) not in taken,
+                ("noise", "mounts"),
+                got=f"no mount at '{body}.{support.surface}', which is held",
+                expected=f"all held surfaces of '{body}'",
+                hint="add a mount, or list the surface beside those that it moves with.",
+            )
     components = case.network.components if isinstance(case, ValveSections) else {}
     for name in noise.reactions or {}:
         key = ("noise", "reactions", name)
@@ -840,14 +847,14 @@ def _check_mounts(case: ImpactSections | ValveSections, noise: CaseNoise) -> Non
         key = ("noise", "passages", name)
         require_known(key, name, components, "component of the network")
     for word in ("reactions", "passages"):
-        if getattr(noise, word) and not noise.mounts:
-            raise CaseProblem(
-                ("noise", word),
-                got=f"{word} without mounts",
-                expected="noise.mounts",
-                hint=f"add a mount, or remove the {word}.",
-                on_key=True,
-            )
+        reject_if(
+            getattr(noise, word) and not noise.mounts,
+            ("noise", word),
+            got=f"{word} without mounts",
+            expected="noise.mounts",
+            hint=f"add a mount, or remove the {word}.",
+            on_key=True,
+        )
 
 
 def _check_machine(case: ImpactSections | ValveSections, noise: CaseNoise) -> None:
@@ -859,40 +866,40 @@ def _check_machine(case: ImpactSections | ValveSections, noise: CaseNoise) -> No
         "indicators": (noise.indicators, "receiver", noise.receiver),
     }
     for name, (given, needed, there) in without.items():
-        if given and not there:
-            raise CaseProblem(
-                ("noise", name),
-                got=f"{name} without {needed}",
-                expected=f"noise.{needed}",
-                hint=f"add '{needed}', or remove '{name}'.",
-                on_key=True,
-            )
+        reject_if(
+            given and not there,
+            ("noise", name),
+            got=f"{name} without {needed}",
+            expected=f"noise.{needed}",
+            hint=f"add '{needed}', or remove '{name}'.",
+            on_key=True,
+        )
     for key, mount in machine_mounts(noise.elements or {}, noise.receiver):
         require_known(key, mount, noise.mounts or {}, "mount", on_key=True)
     receiver = noise.receiver
     if receiver is None:
         return
     for name in ("mount", "plate"):
-        if getattr(noise, name) is not None:
-            raise CaseProblem(
-                ("noise", name),
-                got=f"{name} beside a receiver",
-                expected="one machine below the valve",
-                hint=f"remove '{name}'; a spring below a mount is one of 'elements'.",
-                on_key=True,
-            )
+        reject_if(
+            getattr(noise, name) is not None,
+            ("noise", name),
+            got=f"{name} beside a receiver",
+            expected="one machine below the valve",
+            hint=f"remove '{name}'; a spring below a mount is one of 'elements'.",
+            on_key=True,
+        )
     if receiver.is_plate is not None:
         kind = "plate" if receiver.plate is not None else "infinite_plate"
         key = ("noise", "receiver", kind, "material")
         require_known(key, receiver.is_plate.material, case.materials, "material")
     body = receiver.body
-    if body is not None and body.inertia is None and len(noise.mounts or {}) > 1:
-        raise CaseProblem(
-            ("noise", "receiver", "body"),
-            got="no inertia of a body below several mounts",
-            expected="inertia: three moments about its centre of mass",
-            hint="add 'inertia: [Ixx, Iyy, Izz]' in kg m^2.",
-        )
+    reject_if(
+        body is not None and body.inertia is None and len(noise.mounts or {}) > 1,
+        ("noise", "receiver", "body"),
+        got="no inertia of a body below several mounts",
+        expected="inertia: three moments about its centre of mass",
+        hint="add 'inertia: [Ixx, Iyy, Izz]' in kg m^2.",
+    )
     for name, place in (noise.indicators or {}).items():
         if isinstance(place, tuple) == (receiver.file is not None) or name in (noise.mounts or {}):
             raise CaseProblem(

@@ -8,7 +8,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from klack.errors import InputError
-from klack.input.problem import CaseProblem, Key
+from klack.input.problem import CaseProblem, Key, reject_if
 from klack.input.section import Count, InputPath, Name, Number, Section
 from klack.mesh.profile import Arc, Line, Profile
 from klack.units import LENGTH, Angle, Length, LengthUnit, format_si
@@ -71,13 +71,13 @@ class Outline(Section):
     @model_validator(mode="after")
     def _close_is_last(self) -> Self:
         for i, edge in enumerate(self.edges[:-1]):
-            if edge.close:
-                raise CaseProblem(
-                    ("edges", i, "close"),
-                    got=f"close at edge {i + 1} of {len(self.edges)}",
-                    expected="close at the last edge only",
-                    hint="move it to the end, or remove the edges after it.",
-                )
+            reject_if(
+                edge.close,
+                ("edges", i, "close"),
+                got=f"close at edge {i + 1} of {len(self.edges)}",
+                expected="close at the last edge only",
+                hint="move it to the end, or remove the edges after it.",
+            )
         return self
 
     def points(self) -> Iterator[tuple[Key, Point]]:
@@ -238,13 +238,13 @@ class Geometry(Section):
             "mesh": ("solid", "axisymmetric"),
             "nodes": ("solid", "axisymmetric"),
         }[kind]
-        if kind == "profile" and self.model is None:
-            raise CaseProblem(
-                (),
-                got="a profile without model",
-                expected="model: axisymmetric, swept or solid",
-                hint="start with axisymmetric; swept for bodies held in sectors.",
-            )
+        reject_if(
+            kind == "profile" and self.model is None,
+            (),
+            got="a profile without model",
+            expected="model: axisymmetric, swept or solid",
+            hint="start with axisymmetric; swept for bodies held in sectors.",
+        )
         if self.model is not None and self.model not in allowed:
             raise CaseProblem(
                 ("model",),

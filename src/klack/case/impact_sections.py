@@ -25,7 +25,7 @@ from klack.case.study import CaseStudy
 from klack.contact.face_form import STEEPEST, Waves
 from klack.contact.friction import MOST_FRICTION, Friction
 from klack.contact.worn_faces import WornFaces
-from klack.input.problem import CaseProblem
+from klack.input.problem import CaseProblem, reject_if
 from klack.input.section import Count, Name, Section
 from klack.units import (
     Angle,
@@ -225,13 +225,13 @@ class FaceRoughness(Section):
             )
         points = ((0.0, 0.0), *self.curve) if self.curve[:1] != ((0.0, 0.0),) else self.curve
         rises = all(b[0] > a[0] and b[1] > a[1] for a, b in pairwise(points))
-        if len(points) < 2 or not rises:
-            raise CaseProblem(
-                ("curve",),
-                got=f"{len(self.curve)} pairs that do not rise from 0",
-                expected="closures and pressures that both rise",
-                hint="write [[0 um, 0 MPa], [0.3 um, 2 MPa], [0.6 um, 20 MPa]].",
-            )
+        reject_if(
+            len(points) < 2 or not rises,
+            ("curve",),
+            got=f"{len(self.curve)} pairs that do not rise from 0",
+            expected="closures and pressures that both rise",
+            hint="write [[0 um, 0 MPa], [0.3 um, 2 MPa], [0.6 um, 20 MPa]].",
+        )
         return self
 
     @property
@@ -322,13 +322,13 @@ class CaseWorn(Section):
 
     @model_validator(mode="after")
     def _a_profile(self) -> Self:
-        if len(self.opening) != len(self.radius):
-            raise CaseProblem(
-                ("opening",),
-                got=f"{len(self.opening)} values for {len(self.radius)} radii",
-                expected="one value for each radius",
-                hint="klack impact with run.run_in writes both into worn.yaml.",
-            )
+        reject_if(
+            len(self.opening) != len(self.radius),
+            ("opening",),
+            got=f"{len(self.opening)} values for {len(self.radius)} radii",
+            expected="one value for each radius",
+            hint="klack impact with run.run_in writes both into worn.yaml.",
+        )
         for i, (below, above) in enumerate(zip(self.radius, self.radius[1:], strict=False)):
             if not 0.0 <= below < above:
                 raise CaseProblem(

@@ -11,7 +11,7 @@ from klack.case.distribution import Distribution
 from klack.case.origin import ExpandedCase
 from klack.case.parameters import ParameterValue
 from klack.errors import InputError
-from klack.input.problem import CaseProblem, Key, nearest, one_of
+from klack.input.problem import CaseProblem, Key, nearest, one_of, reject_if
 from klack.input.section import Section
 from klack.units import RATIO, Kind, parse_quantity
 
@@ -60,13 +60,13 @@ class Quantity:
 def split_path(text: str) -> Key:
     """``a.b.0.c`` as ``("a", "b", 0, "c")``; list entries count from 0."""
     parts = text.split(".")
-    if not all(part.strip() == part and part for part in parts):
-        raise CaseProblem(
-            (),
-            got=f"'{text}'",
-            expected="keys joined with points, e.g. network.components.spring.preload",
-            hint="write the path of the key from the top of the case.",
-        )
+    reject_if(
+        not all(part.strip() == part and part for part in parts),
+        (),
+        got=f"'{text}'",
+        expected="keys joined with points, e.g. network.components.spring.preload",
+        hint="write the path of the key from the top of the case.",
+    )
     return tuple(int(part) if part.isdigit() else part for part in parts)
 
 
@@ -132,20 +132,20 @@ def _require_of_case(case: Section, key: Key) -> None:
         return
     place = ".".join(map(str, key))
     copy = found.origin(key).copy
-    if copy:
-        raise CaseProblem(
-            (),
-            got=f"'{place}', which stands in the part '{copy}'",
-            expected="a key of the case itself",
-            hint="make it a parameter of the part, and name include.N.with.PARAMETER (N from 0).",
-        )
-    if not found.behind(key):
-        raise CaseProblem(
-            (),
-            got=f"'{place}', which no value of the case follows from",
-            expected="a parameter that the case uses",
-            hint="use it in an expression: '= ...'.",
-        )
+    reject_if(
+        copy,
+        (),
+        got=f"'{place}', which stands in the part '{copy}'",
+        expected="a key of the case itself",
+        hint="make it a parameter of the part, and name include.N.with.PARAMETER (N from 0).",
+    )
+    reject_if(
+        not found.behind(key),
+        (),
+        got=f"'{place}', which no value of the case follows from",
+        expected="a parameter that the case uses",
+        hint="use it in an expression: '= ...'.",
+    )
 
 
 def _advice(key: Key, node: Any) -> str:

@@ -5,7 +5,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
-from klack.input.problem import CaseProblem, Key
+from klack.input.problem import CaseProblem, Key, reject_if
 from klack.input.section import Count, InputPath, Name, Number, Section, Text
 from klack.input.unit_systems import UnitSystemName
 from klack.units import DampingCoefficient, Inertia, Length, Mass, Ratio, Stiffness
@@ -63,13 +63,13 @@ class NoiseElement(Section):
         if self._exactly_one(("stiffness", "file"), "how stiff it is") == "file":
             self._refuse_with(("damping",), "a file", "the file holds the losses")
         for direction in self.damping or {}:
-            if direction not in (self.stiffness or {}):
-                raise CaseProblem(
-                    ("damping", direction),
-                    got=f"damping along {direction}, in which the element is rigid",
-                    expected="directions of the stiffness",
-                    hint=f"add stiffness: {{{direction}: ...}}, or remove it.",
-                )
+            reject_if(
+                direction not in (self.stiffness or {}),
+                ("damping", direction),
+                got=f"damping along {direction}, in which the element is rigid",
+                expected="directions of the stiffness",
+                hint=f"add stiffness: {{{direction}: ...}}, or remove it.",
+            )
         return self
 
 
@@ -141,14 +141,14 @@ class NoiseMatrices(Section):
     @model_validator(mode="after")
     def _freedoms(self) -> Self:
         for name in self.rows:
-            if "." not in name:
-                raise CaseProblem(
-                    ("rows", name),
-                    got=f"'{name}'",
-                    expected="a direction of a mount",
-                    hint=f"write {name}.z, {name}.rx, ...",
-                    on_key=True,
-                )
+            reject_if(
+                "." not in name,
+                ("rows", name),
+                got=f"'{name}'",
+                expected="a direction of a mount",
+                hint=f"write {name}.z, {name}.rx, ...",
+                on_key=True,
+            )
         return self
 
 
@@ -219,22 +219,22 @@ class NoiseReceiver(Section):
         kind = self._exactly_one(kinds, "what the machine is")
         if kind != "file":
             for name in ("points", "quantity", "offset"):
-                if name in self.model_fields_set and (name != "points" or self.pressures is None):
-                    raise CaseProblem(
-                        (name,),
-                        got=f"{name} together with {kind}",
-                        expected=f"no {name}: it belongs to a file of responses",
-                        hint=f"remove {name}.",
-                        on_key=True,
-                    )
-            if isinstance(self.axes, dict):
-                raise CaseProblem(
-                    ("axes",),
-                    got=f"axes by mount together with {kind}",
-                    expected="one pair of directions: the frame of a model is one",
-                    hint="write axes: [[1, 0, 0], [0, 1, 0]].",
+                reject_if(
+                    name in self.model_fields_set and (name != "points" or self.pressures is None),
+                    (name,),
+                    got=f"{name} together with {kind}",
+                    expected=f"no {name}: it belongs to a file of responses",
+                    hint=f"remove {name}.",
                     on_key=True,
                 )
+            reject_if(
+                isinstance(self.axes, dict),
+                ("axes",),
+                got=f"axes by mount together with {kind}",
+                expected="one pair of directions: the frame of a model is one",
+                hint="write axes: [[1, 0, 0], [0, 1, 0]].",
+                on_key=True,
+            )
         return self
 
     @property

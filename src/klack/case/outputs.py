@@ -6,7 +6,7 @@ from typing import Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from klack.bodies.gauges.gauge import GaugeKind
-from klack.input.problem import CaseProblem
+from klack.input.problem import CaseProblem, reject_if
 from klack.input.section import Count, Name, Number, Section
 from klack.signals.low_pass import LowPass
 from klack.units import Frequency, Length
@@ -75,13 +75,13 @@ class CaseOutput(Section):
 
     @model_validator(mode="after")
     def _has_kind(self) -> Self:
-        if self.direction == "around" and self.kind in ("displacement", "velocity"):
-            raise CaseProblem(
-                ("direction",),
-                got=f"'around' for a {self.kind}",
-                expected="r or z: a body of revolution does not move around its axis",
-                hint="strain and stress have that direction.",
-            )
+        reject_if(
+            self.direction == "around" and self.kind in ("displacement", "velocity"),
+            ("direction",),
+            got=f"'around' for a {self.kind}",
+            expected="r or z: a body of revolution does not move around its axis",
+            hint="strain and stress have that direction.",
+        )
         return self
 
     def vector(self, dimension: int) -> tuple[float, ...] | None:
@@ -107,13 +107,13 @@ def check_outputs(
     """
     names: set[str] = set()
     for i, output in enumerate(outputs):
-        if output.name in names:
-            raise CaseProblem(
-                ("outputs", i, "name"),
-                got=f"'{output.name}' twice",
-                expected="a name of its own for each output",
-                hint="use names of channels in the results.",
-            )
+        reject_if(
+            output.name in names,
+            ("outputs", i, "name"),
+            got=f"'{output.name}' twice",
+            expected="a name of its own for each output",
+            hint="use names of channels in the results.",
+        )
         names.add(output.name)
         dimension = dimensions[output.body]
         axes = _AXES[dimension]
@@ -123,14 +123,14 @@ def check_outputs(
             if isinstance(output.direction, str)
             else len(output.direction) == dimension
         )
-        if other:
-            raise CaseProblem(
-                ("outputs",),
-                got=f"outputs together with '{other}'",
-                expected="bodies that the contact alone acts on, with their meshes",
-                hint=f"remove outputs, or '{other}'.",
-                on_key=True,
-            )
+        reject_if(
+            other,
+            ("outputs",),
+            got=f"outputs together with '{other}'",
+            expected="bodies that the contact alone acts on, with their meshes",
+            hint=f"remove outputs, or '{other}'.",
+            on_key=True,
+        )
         if len(output.at) != dimension:
             raise CaseProblem(
                 ("outputs", i, "at"),

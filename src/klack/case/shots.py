@@ -12,7 +12,7 @@ from klack.case.distribution import (
     RatioDistribution,
 )
 from klack.contact.friction import MOST_FRICTION
-from klack.input.problem import CaseProblem
+from klack.input.problem import CaseProblem, reject_if
 from klack.input.section import Count, Section
 from klack.units import Time, format_si
 
@@ -39,13 +39,13 @@ class Waviness(Section):
     @model_validator(mode="after")
     def _ordered(self) -> Self:
         low, high = self.harmonics
-        if not 2 <= low <= high <= _HIGHEST_HARMONIC:
-            raise CaseProblem(
-                ("harmonics",),
-                got=f"[{low}, {high}]",
-                expected=f"two rising whole numbers from 2 to {_HIGHEST_HARMONIC}",
-                hint="0 waves is another diameter, 1 wave an eccentricity; 2 is an oval.",
-            )
+        reject_if(
+            not 2 <= low <= high <= _HIGHEST_HARMONIC,
+            ("harmonics",),
+            got=f"[{low}, {high}]",
+            expected=f"two rising whole numbers from 2 to {_HIGHEST_HARMONIC}",
+            hint="0 waves is another diameter, 1 wave an eccentricity; 2 is an oval.",
+        )
         return self
 
 

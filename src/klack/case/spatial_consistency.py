@@ -8,7 +8,7 @@ from klack.case.consistency import check_surface
 from klack.case.valve_roles import END_STOP, FLEXIBLE_BODY, Meeting, ValveRoles
 from klack.case.valve_sections import ValveSections
 from klack.errors import InputError
-from klack.input.problem import CaseProblem, Key, one_of
+from klack.input.problem import CaseProblem, Key, one_of, reject_if
 from klack.network.across import OffAxisPart
 from klack.network.component import Component
 from klack.units import format_si
@@ -34,14 +34,14 @@ def check_off_axis(case: ValveSections, needle: str) -> None:
         points = getattr(case.network.components[needle], "points", ())
         at = {f"{needle}.{point}" for point in points}
         own = f"{name}.{part.port}"
-        if not any(own in link and at & set(link) for link in case.network.connections):
-            raise CaseProblem(
-                key,
-                got=f"'{own}', which is not connected to '{needle}'",
-                expected="a force across the axis of the needle that moves",
-                hint=f"connect it to a point of '{needle}', or remove this key.",
-                on_key=True,
-            )
+        reject_if(
+            not any(own in link and at & set(link) for link in case.network.connections),
+            key,
+            got=f"'{own}', which is not connected to '{needle}'",
+            expected="a force across the axis of the needle that moves",
+            hint=f"connect it to a point of '{needle}', or remove this key.",
+            on_key=True,
+        )
         if case.guide is None or not isfinite(part.room):
             continue
         reach = max(case.guide.largest_eccentricity(z) for z in part.heights)
@@ -71,15 +71,15 @@ def check_motion(case: ValveSections, meetings: Mapping[str, Meeting], roles: Va
     """Reject the first thing that a motion in space cannot have."""
     if case.motion == "axial":
         for key in ("guide", "guides", "placement"):
-            if getattr(case, key):
-                raise CaseProblem(
-                    (key,),
-                    got=f"'{key}' of a needle that moves along its axis",
-                    expected="motion: three-dimensional",
-                    hint="add it, or remove this section; friction along the axis is "
-                    "{type: guide-friction}.",
-                    on_key=True,
-                )
+            reject_if(
+                getattr(case, key),
+                (key,),
+                got=f"'{key}' of a needle that moves along its axis",
+                expected="motion: three-dimensional",
+                hint="add it, or remove this section; friction along the axis is "
+                "{type: guide-friction}.",
+                on_key=True,
+            )
         refuse_off_axis(case)
         _refuse_angles(case, "angles of rings that are touched all round at once")
         return
@@ -87,42 +87,42 @@ def check_motion(case: ValveSections, meetings: Mapping[str, Meeting], roles: Va
     parts = case.network.components
     for name, part in parts.items():
         at: Key = ("network", "components", name)
-        if part.type in _MOVES:
-            raise CaseProblem(
-                at,
-                got=f"a {part.type} in a motion in three dimensions",
-                expected=f"bodies with all their freedoms: {{type: {FLEXIBLE_BODY}}}",
-                hint="draw it as a body, or use motion: axial.",
-            )
-        if part.type in _FRICTION:
-            raise CaseProblem(
-                at,
-                got="friction along the axis beside a motion in three dimensions",
-                expected="a section 'guide' with friction: side forces make it there",
-                hint="remove this component; guide: {surface: ..., heights: ..., clearance: "
-                "..., "
-                "friction: 0.1}.",
-            )
+        reject_if(
+            part.type in _MOVES,
+            at,
+            got=f"a {part.type} in a motion in three dimensions",
+            expected=f"bodies with all their freedoms: {{type: {FLEXIBLE_BODY}}}",
+            hint="draw it as a body, or use motion: axial.",
+        )
+        reject_if(
+            part.type in _FRICTION,
+            at,
+            got="friction along the axis beside a motion in three dimensions",
+            expected="a section 'guide' with friction: side forces make it there",
+            hint="remove this component; guide: {surface: ..., heights: ..., clearance: "
+            "..., "
+            "friction: 0.1}.",
+        )
         if part.type == END_STOP:
             _check_stop(case, name, part)
     _check_ends(case, meetings, roles)
     _check_placement(case)
     check_off_axis(case, roles.needle)
-    if case.reduction.correction != "consistent":
-        raise CaseProblem(
-            ("reduction", "correction"),
-            got=f"'{case.reduction.correction}' with motion: three-dimensional",
-            expected="the correction 'consistent'",
-            hint="leave it out: contact points carry what the modes miss.",
-        )
+    reject_if(
+        case.reduction.correction != "consistent",
+        ("reduction", "correction"),
+        got=f"'{case.reduction.correction}' with motion: three-dimensional",
+        expected="the correction 'consistent'",
+        hint="leave it out: contact points carry what the modes miss.",
+    )
     for variant in case.run.variants:
-        if variant.endswith("lumped"):
-            raise CaseProblem(
-                ("run", "variants"),
-                got=f"the variant '{variant}' with motion: three-dimensional",
-                expected="wet or dry",
-                hint="rigid bodies on a spring move along the axis: use motion: axial for them.",
-            )
+        reject_if(
+            variant.endswith("lumped"),
+            ("run", "variants"),
+            got=f"the variant '{variant}' with motion: three-dimensional",
+            expected="wet or dry",
+            hint="rigid bodies on a spring move along the axis: use motion: axial for them.",
+        )
 
 
 def _check_bodies(case: ValveSections) -> None:
@@ -138,45 +138,45 @@ def _check_bodies(case: ValveSections) -> None:
             f"for '{solid[0]}' if it is a turned part.",
         )
     for name in flat:
-        if case.bodies[name].matrices is not None:
-            raise CaseProblem(
-                ("bodies", name, "matrices"),
-                got=f"the axial motion of '{name}' with motion: three-dimensional",
-                expected="a body that klack assembles, which then moves in every way",
-                hint="remove 'matrices', or give those of a solid.",
-                on_key=True,
-            )
+        reject_if(
+            case.bodies[name].matrices is not None,
+            ("bodies", name, "matrices"),
+            got=f"the axial motion of '{name}' with motion: three-dimensional",
+            expected="a body that klack assembles, which then moves in every way",
+            hint="remove 'matrices', or give those of a solid.",
+            on_key=True,
+        )
     if solid:
         _refuse_angles(case, "angles of bodies of three dimensions")
 
 
 def _refuse_angles(case: ValveSections, what: str) -> None:
-    if case.angles is not None:
-        raise CaseProblem(
-            ("angles",),
-            got=what,
-            expected="axisymmetric bodies with motion: three-dimensional",
-            hint="remove it; more 'layers' make a swept mesh finer round the ring.",
-            on_key=True,
-        )
+    reject_if(
+        case.angles is not None,
+        ("angles",),
+        got=what,
+        expected="axisymmetric bodies with motion: three-dimensional",
+        hint="remove it; more 'layers' make a swept mesh finer round the ring.",
+        on_key=True,
+    )
 
 
 def _check_stop(case: ValveSections, name: str, part: Component) -> None:
     key: Key = ("network", "components", name)
-    if name not in case.stops:
-        raise CaseProblem(
-            key,
-            got=f"the end stop '{name}' without surfaces",
-            expected=f"its two surfaces: stops: {{{name}: {{between: ...}}}}",
-            hint="in three dimensions every stop is touched point by point.",
-        )
-    if getattr(getattr(part, "law", None), "kind", "") != "consistent":
-        raise CaseProblem(
-            (*key, "law"),
-            got="a law of its own, which contact point by point would replace",
-            expected="law: {kind: consistent}",
-            hint="write it, or use motion: axial.",
-        )
+    reject_if(
+        name not in case.stops,
+        key,
+        got=f"the end stop '{name}' without surfaces",
+        expected=f"its two surfaces: stops: {{{name}: {{between: ...}}}}",
+        hint="in three dimensions every stop is touched point by point.",
+    )
+    reject_if(
+        getattr(getattr(part, "law", None), "kind", "") != "consistent",
+        (*key, "law"),
+        got="a law of its own, which contact point by point would replace",
+        expected="law: {kind: consistent}",
+        hint="write it, or use motion: axial.",
+    )
     restitution = getattr(part, "restitution", None)
     if restitution is not None:
         raise CaseProblem(
@@ -186,14 +186,14 @@ def _check_stop(case: ValveSections, name: str, part: Component) -> None:
             hint="leave it out, or use motion: axial.",
         )
     stop = case.stops[name]
-    if stop.worn is not None:
-        raise CaseProblem(
-            ("stops", name, "worn"),
-            got="'worn' with motion: three-dimensional",
-            expected="faces as made",
-            hint="leave it out, or use motion: axial.",
-            on_key=True,
-        )
+    reject_if(
+        stop.worn is not None,
+        ("stops", name, "worn"),
+        got="'worn' with motion: three-dimensional",
+        expected="faces as made",
+        hint="leave it out, or use motion: axial.",
+        on_key=True,
+    )
 
 
 def _check_ends(case: ValveSections, meetings: Mapping[str, Meeting], roles: ValveRoles) -> None:
@@ -211,22 +211,21 @@ def _check_ends(case: ValveSections, meetings: Mapping[str, Meeting], roles: Val
                 hint="remove it, or draw what it hits as a body with 'fixed'.",
             )
     for name in _drawn(case):
-        if name not in used:
-            raise CaseProblem(
-                ("network", "components", name),
-                got=f"the body '{name}', which touches nothing",
-                expected="the needle and what it hits with motion: three-dimensional",
-                hint="remove it, or give it an end stop.",
-            )
-    if case.shots is not None and case.shots.carry and len(free) > 1:
-        raise CaseProblem(
-            ("shots", "carry"),
-            got=f"strokes that begin where the one before has ended, and {len(free)} bodies that "
-            "move",
-            expected="one body that moves: the positions of others are not carried on",
-            hint="remove it: every stroke then starts from positions of its own.",
-            on_key=True,
+        reject_if(
+            name not in used,
+            ("network", "components", name),
+            got=f"the body '{name}', which touches nothing",
+            expected="the needle and what it hits with motion: three-dimensional",
+            hint="remove it, or give it an end stop.",
         )
+    reject_if(
+        case.shots is not None and case.shots.carry and len(free) > 1,
+        ("shots", "carry"),
+        got=f"strokes that begin where the one before has ended, and {len(free)} bodies that move",
+        expected="one body that moves: the positions of others are not carried on",
+        hint="remove it: every stroke then starts from positions of its own.",
+        on_key=True,
+    )
     _check_guides(case, _drawn(case)[roles.needle], [_drawn(case)[name] for name in free])
 
 
@@ -248,28 +247,28 @@ def _check_guides(case: ValveSections, needle: str, free: list[str]) -> None:
     if case.guide is not None:
         check_surface(case, ("guide", "surface"), _surface(needle, case.guide.surface))
     for name, guide in case.guides.items():
-        if name not in others:
-            raise CaseProblem(
-                ("guides", name),
-                got=f"a guide of '{name}'",
-                expected=f"a body that moves beside the needle: {one_of(others)}"
-                if others
-                else "no section 'guides': only the needle moves",
-                hint="that of the needle is the section 'guide'; a body with 'fixed' has none.",
-                on_key=True,
-            )
+        reject_if(
+            name not in others,
+            ("guides", name),
+            got=f"a guide of '{name}'",
+            expected=f"a body that moves beside the needle: {one_of(others)}"
+            if others
+            else "no section 'guides': only the needle moves",
+            hint="that of the needle is the section 'guide'; a body with 'fixed' has none.",
+            on_key=True,
+        )
         check_surface(case, ("guides", name, "surface"), _surface(name, guide.surface))
         if guide.on is None:
             continue
         below = case.guides.get(guide.on.body)
-        if guide.on.body not in free or guide.on.body == name or (below and below.on):
-            raise CaseProblem(
-                ("guides", name, "on"),
-                got=f"'{guide.on}', a body that is held, slides itself on another, or is '{name}'",
-                expected="a surface of a body that moves in a fixed bore, such as the needle",
-                hint="leave 'on' out for a bore of a body that is held.",
-                on_key=True,
-            )
+        reject_if(
+            guide.on.body not in free or guide.on.body == name or (below and below.on),
+            ("guides", name, "on"),
+            got=f"'{guide.on}', a body that is held, slides itself on another, or is '{name}'",
+            expected="a surface of a body that moves in a fixed bore, such as the needle",
+            hint="leave 'on' out for a bore of a body that is held.",
+            on_key=True,
+        )
         check_surface(case, ("guides", name, "on"), guide.on)
 
 
@@ -277,14 +276,14 @@ def _check_placement(case: ValveSections) -> None:
     at = case.placement
     if at is None or at.seed is None:
         return
-    if not at.is_centred:
-        raise CaseProblem(
-            ("placement", "seed"),
-            got="a seed beside a given position",
-            expected="one of them",
-            hint="remove the seed, or eccentricity and tilt.",
-            on_key=True,
-        )
+    reject_if(
+        not at.is_centred,
+        ("placement", "seed"),
+        got="a seed beside a given position",
+        expected="one of them",
+        hint="remove the seed, or eccentricity and tilt.",
+        on_key=True,
+    )
     if case.guide is None:
         raise CaseProblem(
             ("placement", "seed"),

@@ -7,7 +7,7 @@ from pydantic import BeforeValidator, Field, Strict, model_validator
 
 from klack.case.levels import Level, Variant
 from klack.case.parameters import as_written
-from klack.input.problem import CaseProblem, one_of
+from klack.input.problem import one_of, reject_if
 from klack.input.section import Count, InputPath, Number, Section, Text
 
 __all__ = [
@@ -67,23 +67,21 @@ class StudyParameter(Section):
             "fixed": self.fixed,
         }
         found = [name for name, value in given.items() if value is not None]
-        if found not in (["from", "to"], ["normal"], ["values"], ["fixed"]):
-            raise CaseProblem(
-                (),
-                got=f"the keys {one_of(found)}" if found else "no values",
-                expected="one of: {from: 8 N, to: 20 N}, {normal: {mean: 12 N, sd: 1 N}}, "
-                "{values: [8 N, 12 N]}, {fixed: 12 N}",
-                hint="a range has both ends."
-                if len(found) < 2
-                else f"keep one of {one_of(found)}.",
-            )
-        if self.scale == "log" and found != ["from", "to"]:
-            raise CaseProblem(
-                ("scale",),
-                got="log without a range",
-                expected="{from: 0.1 um, to: 10 um, scale: log}",
-                hint="remove it, or give 'from' and 'to'.",
-            )
+        reject_if(
+            found not in (["from", "to"], ["normal"], ["values"], ["fixed"]),
+            (),
+            got=f"the keys {one_of(found)}" if found else "no values",
+            expected="one of: {from: 8 N, to: 20 N}, {normal: {mean: 12 N, sd: 1 N}}, "
+            "{values: [8 N, 12 N]}, {fixed: 12 N}",
+            hint="a range has both ends." if len(found) < 2 else f"keep one of {one_of(found)}.",
+        )
+        reject_if(
+            self.scale == "log" and found != ["from", "to"],
+            ("scale",),
+            got="log without a range",
+            expected="{from: 0.1 um, to: 10 um, scale: log}",
+            hint="remove it, or give 'from' and 'to'.",
+        )
         return self
 
 
@@ -119,13 +117,13 @@ class StudyDesign(Section):
 
     @model_validator(mode="after")
     def _file(self) -> Self:
-        if (self.kind == "file") != (self.file is not None):
-            raise CaseProblem(
-                ("kind",),
-                got=f"kind: {self.kind}" + (" with a file" if self.file else " without a file"),
-                expected="{kind: file, file: points.csv}",
-                hint="give both, or neither.",
-            )
+        reject_if(
+            (self.kind == "file") != (self.file is not None),
+            ("kind",),
+            got=f"kind: {self.kind}" + (" with a file" if self.file else " without a file"),
+            expected="{kind: file, file: points.csv}",
+            hint="give both, or neither.",
+        )
         return self
 
 
@@ -140,13 +138,13 @@ class StudyLimit(Section):
 
     @model_validator(mode="after")
     def _some(self) -> Self:
-        if self.most is None and self.least is None:
-            raise CaseProblem(
-                (),
-                got="no bound",
-                expected="{most: 400 N}, {least: 95 um}, or both",
-                hint="write the bound with its unit.",
-            )
+        reject_if(
+            self.most is None and self.least is None,
+            (),
+            got="no bound",
+            expected="{most: 400 N}, {least: 95 um}, or both",
+            hint="write the bound with its unit.",
+        )
         return self
 
 

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 
 from klack.case.consistency import (
     check_body,
+    check_drawn_place,
     check_shifts,
     check_surface,
     require_known,
@@ -13,7 +14,7 @@ from klack.case.spatial_consistency import check_motion
 from klack.case.thermal import CaseThermal
 from klack.case.valve_roles import END_STOP, FLEXIBLE_BODY, Meeting, find_meetings, find_roles
 from klack.case.valve_sections import ValveSections
-from klack.input.problem import CaseProblem, Key, nearest, one_of
+from klack.input.problem import CaseProblem, Key, nearest, one_of, reject_if
 from klack.network.component import Component
 from klack.network.described import kind_of_field
 from klack.network.port import Role
@@ -27,18 +28,15 @@ def check_shots_of_valve(case: ValveSections) -> None:
     shots = case.shots
     if shots is None:
         return
-    given, other = "eccentricity", "tilt"
-    if shots.eccentricity is None:
-        given, other = other, given
     placed = case.placement is not None
-    if case.motion == "axial":
-        raise CaseProblem(
-            ("shots",),
-            got="shots of a needle that moves along its axis",
-            expected="motion: three-dimensional, and a guide: along the axis all strokes are alike",
-            hint="add 'motion: three-dimensional' and 'guide', or remove this section.",
-            on_key=True,
-        )
+    reject_if(
+        case.motion == "axial",
+        ("shots",),
+        got="shots of a needle that moves along its axis",
+        expected="motion: three-dimensional, and a guide: along the axis all strokes are alike",
+        hint="add 'motion: three-dimensional' and 'guide', or remove this section.",
+        on_key=True,
+    )
     if case.guide is None:
         raise CaseProblem(
             ("shots",),
@@ -47,31 +45,24 @@ def check_shots_of_valve(case: ValveSections) -> None:
             hint="add 'guide: {surface: ..., heights: [..., ...], clearance: ...}'.",
             on_key=True,
         )
-    if (shots.eccentricity is None) != (shots.tilt is None):
-        raise CaseProblem(
-            ("shots", given),
-            got=f"{given} without {other}, and a guide",
-            expected="both of them, or none: the guide then limits the placement",
-            hint=f"add '{other}' (0 is possible), or remove '{given}'.",
-            on_key=True,
-        )
-    if placed and not shots.carry:
-        raise CaseProblem(
-            ("placement",),
-            got="a placement beside shots, each of which has one of its own",
-            expected="one of them",
-            hint="remove 'placement': shots draw it from shots.seed. With shots.carry: true "
-            "the first stroke starts from it.",
-            on_key=True,
-        )
-    if placed and shots.draws_position:
-        raise CaseProblem(
-            ("shots", "eccentricity"),
-            got="a drawn position beside a placement",
-            expected="one of them: the first stroke starts from it",
-            hint="remove 'placement', or shots.eccentricity and shots.tilt.",
-            on_key=True,
-        )
+    check_drawn_place(shots.eccentricity, shots.tilt)
+    reject_if(
+        placed and not shots.carry,
+        ("placement",),
+        got="a placement beside shots, each of which has one of its own",
+        expected="one of them",
+        hint="remove 'placement': shots draw it from shots.seed. With shots.carry: true "
+        "the first stroke starts from it.",
+        on_key=True,
+    )
+    reject_if(
+        placed and shots.draws_position,
+        ("shots", "eccentricity"),
+        got="a drawn position beside a placement",
+        expected="one of them: the first stroke starts from it",
+        hint="remove 'placement', or shots.eccentricity and shots.tilt.",
+        on_key=True,
+    )
 
 
 def check_valve(case: ValveSections) -> None:
@@ -80,25 +71,25 @@ def check_valve(case: ValveSections) -> None:
         require_surfaces(case, name)
         check_body(case, name)
         _check_ports(case, name)
-        if case.bodies[name].non_reflecting is not None:
-            raise CaseProblem(
-                ("bodies", name, "non_reflecting"),
-                got="a non-reflecting end of a body of a valve",
-                expected="none: strokes have modes alone",
-                hint="use it in an impact, at level full.",
-                on_key=True,
-            )
+        reject_if(
+            case.bodies[name].non_reflecting is not None,
+            ("bodies", name, "non_reflecting"),
+            got="a non-reflecting end of a body of a valve",
+            expected="none: strokes have modes alone",
+            hint="use it in an impact, at level full.",
+            on_key=True,
+        )
     for name in case.reduction.modes:
         require_known(("reduction", "modes", name), name, case.bodies, "body", on_key=True)
     check_shifts(case, case.reduction)
-    if case.reduction.shifts and case.reduction.correction != "attachment":
-        raise CaseProblem(
-            ("reduction", "shifts"),
-            got=f"shifts of attachment modes with the correction '{case.reduction.correction}'",
-            expected="the correction 'attachment'",
-            hint="remove 'shifts', or write 'correction: attachment' and give the end stops a law.",
-            on_key=True,
-        )
+    reject_if(
+        case.reduction.shifts and case.reduction.correction != "attachment",
+        ("reduction", "shifts"),
+        got=f"shifts of attachment modes with the correction '{case.reduction.correction}'",
+        expected="the correction 'attachment'",
+        hint="remove 'shifts', or write 'correction: attachment' and give the end stops a law.",
+        on_key=True,
+    )
     _check_flexible_bodies(case)
     network = case.network.network()
     meetings = find_meetings(network)
@@ -109,13 +100,13 @@ def check_valve(case: ValveSections) -> None:
     _check_worn(case)
     if case.lumped is None:
         for variant in case.run.variants:
-            if variant.endswith("lumped"):
-                raise CaseProblem(
-                    ("run", "variants"),
-                    got=f"the variant '{variant}' without a section 'lumped'",
-                    expected="its stiffness",
-                    hint="add 'lumped: {stiffness: 1e9 N/m}', or remove the variant.",
-                )
+            reject_if(
+                variant.endswith("lumped"),
+                ("run", "variants"),
+                got=f"the variant '{variant}' without a section 'lumped'",
+                expected="its stiffness",
+                hint="add 'lumped: {stiffness: 1e9 N/m}', or remove the variant.",
+            )
     check_motion(case, meetings, find_roles(case, network))
     check_shots_of_valve(case)
 
@@ -128,14 +119,14 @@ def _check_ports(case: ValveSections, name: str) -> None:
         if profile is None:
             continue
         require_known((*key, "surface"), place.surface, profile.surfaces, f"surface of {name}")
-        if port in profile.surfaces and port != place.surface:
-            raise CaseProblem(
-                key,
-                got=f"the name of the surface '{port}' for a port on '{place.surface}'",
-                expected="a name of its own",
-                hint="rename the port here and in the network.",
-                on_key=True,
-            )
+        reject_if(
+            port in profile.surfaces and port != place.surface,
+            key,
+            got=f"the name of the surface '{port}' for a port on '{place.surface}'",
+            expected="a name of its own",
+            hint="rename the port here and in the network.",
+            on_key=True,
+        )
 
 
 def _check_flexible_bodies(case: ValveSections) -> None:
@@ -160,14 +151,14 @@ def _check_flexible_bodies(case: ValveSections) -> None:
             if known is not None:
                 require_known((*key, "points", i), point, known, f"surface or port of {body}")
     for body in case.bodies:
-        if body not in used:
-            raise CaseProblem(
-                ("bodies", body),
-                got=f"a body '{body}' that the network does not use",
-                expected=f"a component {{type: {FLEXIBLE_BODY}, body: {body}, points: [...]}}",
-                hint="add it to network.components, or remove the body.",
-                on_key=True,
-            )
+        reject_if(
+            body not in used,
+            ("bodies", body),
+            got=f"a body '{body}' that the network does not use",
+            expected=f"a component {{type: {FLEXIBLE_BODY}, body: {body}, points: [...]}}",
+            hint="add it to network.components, or remove the body.",
+            on_key=True,
+        )
 
 
 def _points(case: ValveSections, body: str) -> tuple[str, ...] | None:
@@ -182,20 +173,20 @@ def _check_stop(case: ValveSections, name: str, meetings: dict[str, Meeting]) ->
     for i, surface in enumerate(stop.between):
         check_surface(case, (*key, "between", i), surface)
         for other, rival in case.stops.items():
-            if other != name and surface in rival.between:
-                raise CaseProblem(
-                    (*key, "between", i),
-                    got=f"{surface}, which the stop '{other}' uses as well",
-                    expected="a surface for each stop",
-                    hint="split the edge in the drawing.",
-                )
-    if stop.upper.body == stop.lower.body:
-        raise CaseProblem(
-            (*key, "between"),
-            got=f"{stop.upper} and {stop.lower}, two surfaces of one body",
-            expected="surfaces of two bodies",
-            hint="draw the stop as a separate body.",
-        )
+            reject_if(
+                other != name and surface in rival.between,
+                (*key, "between", i),
+                got=f"{surface}, which the stop '{other}' uses as well",
+                expected="a surface for each stop",
+                hint="split the edge in the drawing.",
+            )
+    reject_if(
+        stop.upper.body == stop.lower.body,
+        (*key, "between"),
+        got=f"{stop.upper} and {stop.lower}, two surfaces of one body",
+        expected="surfaces of two bodies",
+        hint="draw the stop as a separate body.",
+    )
     flat = [side.body for side in stop.between if case.bodies[side.body].geometry.dimension == 2]
     if len(flat) == 1:
         (solid,) = {stop.upper.body, stop.lower.body} - set(flat)
@@ -225,13 +216,13 @@ def _check_laws(case: ValveSections) -> None:
     for name, part in case.network.components.items():
         if part.type != END_STOP or not is_consistent(part):
             continue
-        if name not in case.stops:
-            raise CaseProblem(
-                ("network", "components", name, "law"),
-                got="a consistent law, but no surfaces to compute it from",
-                expected=f"the surfaces of the stop: stops: {{{name}: {{between: ...}}}}",
-                hint=f"add them (bodies of this case: {one_of(case.bodies)}), or give a law.",
-            )
+        reject_if(
+            name not in case.stops,
+            ("network", "components", name, "law"),
+            got="a consistent law, but no surfaces to compute it from",
+            expected=f"the surfaces of the stop: stops: {{{name}: {{between: ...}}}}",
+            hint=f"add them (bodies of this case: {one_of(case.bodies)}), or give a law.",
+        )
         series = getattr(part, "series_compliance", 0.0)
         if series > 0.0:
             raise CaseProblem(
@@ -240,13 +231,13 @@ def _check_laws(case: ValveSections) -> None:
                 expected="no series compliance: that law comes with its own",
                 hint="leave it out, or give the end stop a linear law.",
             )
-        if case.reduction.correction != "consistent":
-            raise CaseProblem(
-                ("reduction", "correction"),
-                got=f"'{case.reduction.correction}' with the consistent law of '{name}'",
-                expected="the correction 'consistent'",
-                hint="or give the end stop a linear law.",
-            )
+        reject_if(
+            case.reduction.correction != "consistent",
+            ("reduction", "correction"),
+            got=f"'{case.reduction.correction}' with the consistent law of '{name}'",
+            expected="the correction 'consistent'",
+            hint="or give the end stop a linear law.",
+        )
 
 
 def _check_friction(case: ValveSections) -> None:
@@ -276,15 +267,15 @@ def _check_friction(case: ValveSections) -> None:
 def _check_worn(case: ValveSections) -> None:
     """Worn faces are those of a computed law."""
     for name, stop in case.stops.items():
-        if stop.worn is not None and not is_consistent(case.network.components[name]):
-            raise CaseProblem(
-                ("stops", name, "worn"),
-                got="worn faces at an end stop whose law is not computed",
-                expected="the consistent law at this stop: the only one with faces",
-                hint=f"write law: {{kind: consistent}} in network.components.{name}, or leave "
-                "'worn' out.",
-                on_key=True,
-            )
+        reject_if(
+            stop.worn is not None and not is_consistent(case.network.components[name]),
+            ("stops", name, "worn"),
+            got="worn faces at an end stop whose law is not computed",
+            expected="the consistent law at this stop: the only one with faces",
+            hint=f"write law: {{kind: consistent}} in network.components.{name}, or leave "
+            "'worn' out.",
+            on_key=True,
+        )
 
 
 def is_consistent(part: Component) -> bool:
@@ -302,14 +293,14 @@ def check_thermal(case: ValveSections) -> None:
         return
     parts = case.network.components
     nodes = [name for name, part in parts.items() if _role(part) in _NODES]
-    if not nodes:
-        raise CaseProblem(
-            ("thermal",),
-            got="no thermal node in the network",
-            expected="a component of the type heat-capacity for each part that warms up",
-            hint="add e.g. 'copper: {type: heat-capacity, capacity: 9 J/K}'.",
-            on_key=True,
-        )
+    reject_if(
+        not nodes,
+        ("thermal",),
+        got="no thermal node in the network",
+        expected="a component of the type heat-capacity for each part that warms up",
+        hint="add e.g. 'copper: {type: heat-capacity, capacity: 9 J/K}'.",
+        on_key=True,
+    )
     for key, node in _named_nodes(thermal):
         require_known(("thermal", *key), node, nodes, "heat-capacity or fixed-temperature")
     if thermal.period < case.run.duration * (1.0 - 1e-12):
@@ -320,13 +311,13 @@ def check_thermal(case: ValveSections) -> None:
             hint="a stroke has to end before the next one begins; shorten run.duration.",
         )
     _check_heat(thermal, parts)
-    if thermal.fluid is not None and case.network.fluid is None:
-        raise CaseProblem(
-            ("thermal", "fluid"),
-            got="a node for the fluid of a dry valve",
-            expected="a fluid: network.fluid",
-            hint="leave thermal.fluid out, or add the fluid.",
-        )
+    reject_if(
+        thermal.fluid is not None and case.network.fluid is None,
+        ("thermal", "fluid"),
+        got="a node for the fluid of a dry valve",
+        expected="a fluid: network.fluid",
+        hint="leave thermal.fluid out, or add the fluid.",
+    )
     for coil in thermal.windings:
         key = ("thermal", "windings", coil)
         require_known(key, coil, _wound(parts), "coil", on_key=True)
@@ -383,13 +374,13 @@ def _check_heat(thermal: CaseThermal, parts: Mapping[str, Component]) -> None:
         require_known(key, component, list(parts.keys()), "component")
         for other in shares:
             same = other.split(" ")[0] == component and other != sent.loss
-            if same and component in (other, sent.loss):
-                raise CaseProblem(
-                    key,
-                    got=f"'{sent.loss}' beside '{other}', which counts some heat twice",
-                    expected="all losses of a component together, or each of them by its name",
-                    hint=f"name the losses of '{component}' one by one.",
-                )
+            reject_if(
+                same and component in (other, sent.loss),
+                key,
+                got=f"'{sent.loss}' beside '{other}', which counts some heat twice",
+                expected="all losses of a component together, or each of them by its name",
+                hint=f"name the losses of '{component}' one by one.",
+            )
         shares[sent.loss] = shares.get(sent.loss, 0.0) + sent.share
         if shares[sent.loss] > 1.0 + 1e-9:
             raise CaseProblem(

@@ -5,7 +5,7 @@ from difflib import get_close_matches
 
 from klack.errors import InputError
 
-__all__ = ["CaseProblem", "Key", "nearest", "one_of"]
+__all__ = ["CaseProblem", "Key", "nearest", "one_of", "reject_if"]
 
 Key = tuple[str | int, ...]
 
@@ -26,6 +26,14 @@ class CaseProblem(InputError):
     ) -> None:
         self.key, self.on_key = key, on_key
         super().__init__(key_text(key) or "case", got=got, expected=expected, hint=hint)
+
+
+def reject_if(
+    wrong: object, key: Key, *, got: str, expected: str, hint: str, on_key: bool = False
+) -> None:
+    """Raise :class:`CaseProblem` where something in a case cannot be used."""
+    if wrong:
+        raise CaseProblem(key, got=got, expected=expected, hint=hint, on_key=on_key)
 
 
 def key_text(key: Key) -> str:
