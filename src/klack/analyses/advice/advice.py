@@ -1,7 +1,7 @@
 """What ``klack advise`` finds: settings, their cost in accuracy, and advice."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -138,7 +138,6 @@ class Advice:
     check_words: str = ""
     wall_time: float = 0.0
     runs: int = 0
-    extra: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def now(self) -> NDArray[np.float64]:
