@@ -18,6 +18,7 @@ from klack.hydraulics.fluid_library import library_fluid
 from klack.hydraulics.fluid_table import fluid_at, fluid_table
 from klack.hydraulics.land_face import land_areas
 from klack.hydraulics.orifice import Orifice, orifice_flow
+from klack.hydraulics.pressure_viscosity import CONSTANT
 from klack.hydraulics.seat import Seat, seat_step
 from klack.network.step_function import evaluate
 
@@ -189,7 +190,7 @@ def test_a_seat_opens_with_its_lift(part, viscosity, p_a, p_b, share, less):
 def test_an_annulus_turns_into_heat_what_it_takes(part, viscosity, p_a, p_b, h, needle, body):
     rho_a, rho_b = (fluid_at(TABLE, p, 0)[0] for p in (p_a, p_b))
     par = (part.conductance(viscosity), 0.5 * pi * part.diameter * part.clearance)
-    par = (*par, part.drag(viscosity))
+    par = (*par, part.drag(viscosity), *CONSTANT.numbers)
     moved = [0.0, h * needle, 0.0, h * body]
     status, out = evaluate(annulus_step, par, [], [0.0, h, p_a, p_b, rho_a, rho_b, *moved], 5)
 

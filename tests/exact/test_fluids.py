@@ -12,6 +12,7 @@ Truth: closed formulas of one liquid, of bubbles (Wood 1930) and of boiling at e
 Truth: closed integrals of Barus' law, quadrature of that of Roelands, differences of flows.
 """
 
+from dataclasses import replace
 from itertools import pairwise
 from math import exp, pi
 
@@ -584,10 +585,13 @@ def test_leakage_at_2000_bar_is_that_of_the_integral():
 
 
 @pytest.mark.parametrize("name", PARTS)
-def test_a_fluid_without_a_law_is_the_one_before(name):
-    rows = Rows(ambient=Ambient(), fluid=OIL_PRESSURE["ambient"], component="part", handles=HANDLES)
-    PARTS[name].add_rows(rows)
-    assert "under_pressure" not in rows.branches[0].step.__name__
+def test_a_fluid_without_a_law_is_the_limit_of_a_weak_one(name):
+    """The outputs change in proportion to the exponent, by 2000 bar over 1962 bar of it."""
+    plain = OIL_PRESSURE["ambient"]
+    weak = replace(plain, viscosity_law=PressureViscosity(exponent=1e-9))
+    outs = [step(PARTS[name], fluid, 2000e5, 3e5, moved=(1e-8, 0.0)) for fluid in (plain, weak)]
+    np.testing.assert_allclose(outs[1], outs[0], rtol=2e-9, atol=0.0)
+    assert mean_viscosity_ratio(2000e5, 3e5, 0.0, 1.0) == (1.0, 0.0, 0.0)
 
 
 def test_laws_that_cannot_be_used_are_told():

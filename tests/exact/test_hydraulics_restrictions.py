@@ -250,7 +250,7 @@ def test_wide_open_seat_is_limited_by_the_bore(shape):
 @pytest.mark.parametrize("shape", SHAPES, ids=lambda s: s["shape"])
 def test_barely_open_seat_is_the_viscous_gap_of_its_land(shape):
     lift, width, drop = 0.3e-6, 0.2e-3, 100.0
-    h = lift * Seat(diameter=2 * RADIUS, **shape).normal_factor
+    h = lift * sin(Seat(diameter=2 * RADIUS, **shape).surface_angle)
 
     out = seat(BAR + drop, BAR, lift=lift, land_width=width, **shape)
 

@@ -30,27 +30,7 @@ def eccentricity_factor(eccentricity: float) -> float:
 
 @step_function
 def annulus_step(par: Any, state: Any, inp: Any, out: Any) -> int:
-    """``par``: flow per pressure [m^3/(s Pa)], half area [m^2], drag [N s/m]."""
-    h, p_a, p_b = inp[1], inp[2], inp[3]
-    rho_a, rho_b = inp[4], inp[5]
-    needle = body = 0.0
-    if h > 0.0:
-        needle = (inp[7] - inp[6]) / h
-        body = (inp[9] - inp[8]) / h
-    density = rho_a if p_a >= p_b else rho_b
-    carried = par[1] * (needle + body)
-    slope = density * par[0]
-    out[0] = slope * (p_a - p_b) + (rho_a if carried >= 0.0 else rho_b) * carried
-    out[1], out[2] = slope, -slope
-    drag = par[2] * (needle - body)
-    push = par[1] * (p_a - p_b)
-    out[3], out[4] = push - drag, push + drag
-    return 0
-
-
-@step_function
-def annulus_under_pressure_step(par: Any, state: Any, inp: Any, out: Any) -> int:
-    """Step of :func:`annulus_step` with the two numbers of the viscosity law behind ``par``."""
+    """``par``: flow per pressure [m^3/(s Pa)], half area [m^2], drag [N s/m], viscosity law (2)."""
     h, p_a, p_b = inp[1], inp[2], inp[3]
     rho_a, rho_b = inp[4], inp[5]
     needle = body = 0.0
@@ -121,11 +101,10 @@ class Annulus(Component):
     def add_rows(self, rows: Rows) -> None:
         """Add one branch that pushes needle and body."""
         fluid, viscosity = ambient_viscosity(rows)
-        law = viscosity_law(rows)
         half = 0.5 * pi * self.diameter * self.clearance
         density = float(fluid.density(rows.ambient.pressure))
         rows.branch(
-            annulus_step if law is None else annulus_under_pressure_step,
+            annulus_step,
             a=rows.port("a"),
             b=rows.port("b"),
             ports=(rows.port("needle"), rows.port("body")),
@@ -133,7 +112,7 @@ class Annulus(Component):
                 self.conductance(viscosity),
                 half,
                 self.drag(viscosity),
-                *(law.numbers if law is not None else ()),
+                *viscosity_law(rows).numbers,
             ),
             liquid=Liquid(
                 inertance=0.5 * density * self.length / half,

@@ -27,9 +27,7 @@ from klack.units import Angle, Area, Length
 __all__ = [
     "ConicalSeat",
     "acting_seat_step",
-    "acting_seat_under_pressure_step",
     "conical_seat_step",
-    "conical_seat_under_pressure_step",
 ]
 
 _FAR = 100.0  # length of the shank over the diameter of the seat
@@ -38,11 +36,12 @@ _MET = 2e-3  # a diameter with four digits is that of the seat [-]
 
 
 @inner(error_model="numpy")
-def _pass(par: Any, state: Any, inp: Any, out: Any, law: int, base: int) -> None:
+def _pass(par: Any, state: Any, inp: Any, out: Any, base: int) -> None:
+    """Pass of the seat; ``base``: place of the contours in ``par``."""
     x = max(par[4] + 0.5 * (inp[6] + inp[7] - inp[8] - inp[9]), 0.0)
     area, radius = narrowest_mantle(par, base, x)
     gap = area / par[1]
-    gap_pass(par, state, inp, out, x, area, gap, gap * gap * gap, law)
+    gap_pass(par, state, inp, out, x, area, gap, gap * gap * gap)
     out[10] = 2.0 * radius if area <= par[5] else 0.0
 
 
@@ -50,29 +49,26 @@ def _pass(par: Any, state: Any, inp: Any, out: Any, law: int, base: int) -> None
 def conical_seat_step(par: Any, state: Any, inp: Any, out: Any) -> int:
     """Flow at the mean lift of the step, and the forces of the flow.
 
-    ``par``: 1 circumference of the seal, 4-15 those of :func:`~klack.hydraulics.seat.seat_step`,
-    from 16 on the contours for :func:`~klack.hydraulics.narrowest_mantle.narrowest_mantle`.
+    ``par``: 1 circumference of the seal, 4-17 those of :func:`~klack.hydraulics.seat.seat_step`,
+    from 18 on the contours for :func:`~klack.hydraulics.narrowest_mantle.narrowest_mantle`.
     ``state``: those of the seat, and the acting diameter.
     """
-    _pass(par, state, inp, out, 0, 16)
+    _pass(par, state, inp, out, 18)
     return 0
 
 
 @step_function
-def conical_seat_under_pressure_step(par: Any, state: Any, inp: Any, out: Any) -> int:
-    """Step of :func:`conical_seat_step` with ``par``: 16-17 the law, 18 on the contours."""
-    _pass(par, state, inp, out, 16, 18)
-    return 0
+def acting_seat_step(par: Any, state: Any, inp: Any, out: Any) -> int:
+    """Step of :func:`conical_seat_step` that corrects the faces by the acting area.
 
-
-@inner(error_model="numpy")
-def _acting_pass(par: Any, state: Any, inp: Any, out: Any, law: int, base: int) -> None:
-    """Pass of the seat with the correction of the faces."""
-    _pass(par, state, inp, out, law, base)
+    ``par``: 18 side of the tip, 19 acting area when closed, 20 point of the edge, 21 on the
+    contours.  ``state``: one more, the force of the shift.
+    """
+    _pass(par, state, inp, out, 21)
     p_a, p_b, rho_a, rho_b = inp[2], inp[3], inp[4], inp[5]
-    side, edge = par[base - 3], int(par[base - 1])  # 1: the tip is at b, -1: at a
-    area = acting_area(par, base, edge, out[5], par[5])
-    more = area - par[base - 2]
+    side, edge = par[18], int(par[20])  # 1: the tip is at b, -1: at a
+    area = acting_area(par, 21, edge, out[5], par[5])
+    more = area - par[19]
     shift = more * side * (p_b - p_a)
     out[3] += shift
     out[4] -= shift
@@ -81,33 +77,7 @@ def _acting_pass(par: Any, state: Any, inp: Any, out: Any, law: int, base: int) 
         displaced = -side * more * moved / inp[1]  # from a to b
         out[0] += displaced * (rho_a if displaced >= 0.0 else rho_b)
     out[10], out[11] = sqrt(4.0 * area / pi), shift
-
-
-@step_function
-def acting_seat_step(par: Any, state: Any, inp: Any, out: Any) -> int:
-    """Step of :func:`conical_seat_step` that corrects the faces by the acting area.
-
-    ``par``: 16 side of the tip, 17 acting area when closed, 18 point of the edge, 19 on the
-    contours.  ``state``: one more, the force of the shift.
-    """
-    _acting_pass(par, state, inp, out, 0, 19)
     return 0
-
-
-@step_function
-def acting_seat_under_pressure_step(par: Any, state: Any, inp: Any, out: Any) -> int:
-    """Step of :func:`acting_seat_step` with ``par``: 16-17 the law, 18-20 what were 16-18."""
-    _acting_pass(par, state, inp, out, 16, 21)
-    return 0
-
-
-_STEPS = {
-    (False, False): conical_seat_step,
-    (False, True): conical_seat_under_pressure_step,
-    (True, False): acting_seat_step,
-    (True, True): acting_seat_under_pressure_step,
-}
-"""By whether the faces follow the acting area, and whether viscosity rises with pressure."""
 
 
 class ConicalSeat(OpeningComponent):
@@ -340,17 +310,17 @@ class ConicalSeat(OpeningComponent):
     def add_rows(self, rows: Rows) -> None:
         """Add one branch that pushes needle and body."""
         fluid, viscosity = ambient_viscosity(rows)
-        law, follows = viscosity_law(rows), self.tip_side is not None
+        follows = self.tip_side is not None
         if follows:
             self._check_faces(rows)
         rows.branch(
-            _STEPS[follows, law is not None],
+            acting_seat_step if follows else conical_seat_step,
             a=rows.port("a"),
             b=rows.port("b"),
             ports=(rows.port("needle"), rows.port("body")),
             parameters=(
                 *self.parameters(viscosity, fluid.vapour_pressure),
-                *(law.numbers if law else ()),
+                *viscosity_law(rows).numbers,
                 *(self._acting_parameters() if follows else ()),
                 *self.contours,
             ),

@@ -104,7 +104,7 @@ def fluid_store_step(par: Any, state: Any, inp: Any, out: Any) -> int:
             for _ in range(_MOST):
                 m1, by1, energy, rho, hint = _held(par, table, p, hint)
                 through, up, down = orifice_flow(
-                    p_a, p, inp[4], rho, par[7], par[8], par[9], par[10]
+                    p_a, p, inp[4], rho, par[7], par[8], par[9], par[10], 0.0, 1.0
                 )
                 missing = h * through - (m1 - m0)
                 if missing > 0.0:

@@ -9,7 +9,6 @@ from pydantic import Field, model_validator
 from klack.hydraulics.fluid_table import fluid_at
 from klack.hydraulics.network_fluid import ambient_viscosity, energy_table, viscosity_law
 from klack.hydraulics.pressure_viscosity import mean_viscosity_ratio
-from klack.machine.compiling.jit import inner
 from klack.network.component import Component
 from klack.network.port import FLOW, Port
 from klack.network.rows import Book, Channel, Liquid, Rows
@@ -19,12 +18,18 @@ from klack.units import Area, Length
 __all__ = ["Inertance"]
 
 
-@inner(error_model="numpy")
-def _pass(par: Any, state: Any, inp: Any, out: Any, friction: float, table: int) -> None:
-    """Mean flow of the step under a friction; ``table``: place of the fluid table."""
+@step_function
+def inertance_step(par: Any, state: Any, inp: Any, out: Any) -> int:
+    """Mean flow of the step.
+
+    ``par``: size of all, ``l/(rho A)``, friction, viscosity law (2), fluid table.
+    ``state``: mass flow, and the places in the fluid table of both ends.
+    """
     size, inertia = int(par[0]), par[1]
+    ratio, _, _ = mean_viscosity_ratio(inp[2], inp[3], par[3], par[4])
+    friction = par[2] * ratio
     h, before = inp[1], state[0]
-    fluid = carray(par, (size,))[table:]
+    fluid = carray(par, (size,))[5:]
     _, _, g_a, hint_a = fluid_at(fluid, inp[2], int(state[1]))
     _, _, g_b, hint_b = fluid_at(fluid, inp[3], int(state[2]))
     gain = 0.5 * h / (inertia + 0.5 * h * friction)
@@ -34,23 +39,6 @@ def _pass(par: Any, state: Any, inp: Any, out: Any, friction: float, table: int)
     out[0], out[1], out[2] = mean, gain / inp[4], -gain / inp[5]
     out[3], out[4], out[5] = after, hint_a, hint_b
     out[6] = 0.5 * inertia * after * after
-
-
-@step_function
-def inertance_step(par: Any, state: Any, inp: Any, out: Any) -> int:
-    """Mean flow of the step; ``par``: size of all, ``l/(rho A)``, friction, fluid table.
-
-    ``state``: mass flow, and the places in the fluid table of both ends.
-    """
-    _pass(par, state, inp, out, par[2], 3)
-    return 0
-
-
-@step_function
-def inertance_under_pressure_step(par: Any, state: Any, inp: Any, out: Any) -> int:
-    """Step of :func:`inertance_step` with the viscosity law before the table."""
-    ratio, _, _ = mean_viscosity_ratio(inp[2], inp[3], par[3], par[4])
-    _pass(par, state, inp, out, par[2] * ratio, 5)
     return 0
 
 
@@ -108,10 +96,9 @@ class Inertance(Component):
         density = float(fluid.density(rows.ambient.pressure))
         table = energy_table(rows)
         friction = self.resistance(viscosity) / density**2
-        law = viscosity_law(rows)
-        numbers = [self.inertia(density), friction, *(law.numbers if law is not None else ())]
+        numbers = [self.inertia(density), friction, *viscosity_law(rows).numbers]
         rows.branch(
-            inertance_step if law is None else inertance_under_pressure_step,
+            inertance_step,
             a=rows.port("a"),
             b=rows.port("b"),
             parameters=[len(table) + len(numbers) + 1, *numbers, *table],

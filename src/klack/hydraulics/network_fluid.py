@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from klack.errors import AccuracyWarning, InputError
 from klack.hydraulics.fluid import Fluid
 from klack.hydraulics.fluid_table import fluid_table
-from klack.hydraulics.pressure_viscosity import PressureViscosity
+from klack.hydraulics.pressure_viscosity import CONSTANT, PressureViscosity
 from klack.network.protocols import NetworkFluid
 from klack.network.rows import Rows
 
@@ -66,7 +66,7 @@ def ambient_viscosity(rows: Rows) -> tuple[NetworkFluid, float]:
 
 def fixed_viscosity(rows: Rows) -> tuple[NetworkFluid, float]:
     """As :func:`ambient_viscosity`, with a note that the restriction follows no viscosity law."""
-    if viscosity_law(rows) is not None:
+    if viscosity_law(rows) is not CONSTANT:
         warnings.warn(
             f"{rows.component}: its laminar flow has the viscosity at one atmosphere. The law of "
             "the fluid for viscosity acts in orifices, seats, annuli, inertances, lines and films.",
@@ -76,7 +76,7 @@ def fixed_viscosity(rows: Rows) -> tuple[NetworkFluid, float]:
     return ambient_viscosity(rows)
 
 
-def viscosity_law(rows: Rows) -> PressureViscosity | None:
-    """Law of the viscosity over pressure in restrictions, if any."""
+def viscosity_law(rows: Rows) -> PressureViscosity:
+    """Law of the viscosity over pressure in restrictions, constant by default."""
     fluid = network_fluid(rows)
-    return fluid.viscosity_law if isinstance(fluid, Fluid) else None
+    return (isinstance(fluid, Fluid) and fluid.viscosity_law) or CONSTANT

@@ -61,7 +61,7 @@ def opening_flow(
         return 0.0, 0.0, 0.0, 0.0
     size = _ROUND * sqrt(area)
     flow, slope, _ = orifice_flow(
-        p_a, p_b, rho_a, rho_b, discharge * area, number * size, NOT_CHOKED, vapour
+        p_a, p_b, rho_a, rho_b, discharge * area, number * size, NOT_CHOKED, vapour, 0.0, 1.0
     )
     forward = p_a >= p_b
     free = flow if forward else -flow

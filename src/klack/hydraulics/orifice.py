@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Self
 from pydantic import Field, model_validator
 
 from klack.hydraulics.network_fluid import ambient_viscosity, viscosity_law
-from klack.hydraulics.pressure_viscosity import mean_viscosity_ratio
+from klack.hydraulics.pressure_viscosity import CONSTANT, PressureViscosity, mean_viscosity_ratio
 from klack.input.problem import CaseProblem
 from klack.input.section import Count
 from klack.machine.compiling.constant import with_slope_of
@@ -23,7 +23,6 @@ __all__ = [
     "Orifice",
     "choked_flow",
     "orifice_flow",
-    "orifice_flow_under_pressure",
     "orifice_step",
 ]
 
@@ -102,6 +101,8 @@ def orifice_flow(
     number: float,
     throat: float,
     vapour: float,
+    exponent: float,
+    power: float,
 ) -> tuple[float, float, float]:
     """Mass flow [kg/s] of an orifice and its slopes with both pressures [kg/(s Pa)].
 
@@ -113,22 +114,35 @@ def orifice_flow(
     conductance [m^2]
         ``C_q A``.
     number [m s/kg]
-        ``2 D_h / (mu lambda_c)``.
+        ``2 D_h / (mu lambda_c)``, at one atmosphere.
     throat, vapour [m^2], [Pa]
         See :func:`choked_flow`.
+    exponent, power [-]
+        Of the viscosity that acts between both pressures:
+        :class:`~klack.hydraulics.pressure_viscosity.PressureViscosity`.
     """
     forward = p_a >= p_b
     density = rho_a if forward else rho_b
+    ratio, by_a, by_b = mean_viscosity_ratio(p_a, p_b, exponent, power)
+    by_up, by_down = (by_a, by_b) if forward else (by_b, by_a)
+    acting = number / ratio
     drop = abs(p_a - p_b)
     root = sqrt(2.0 * density * drop)
-    t, ratio = _tanh(number * root)
+    t, series = _tanh(acting * root)
     # without a drop the root has no slope, but the flow has
     flow = with_slope_of(
-        conductance * root * t, 2.0 * conductance * number * density * drop * ratio
+        conductance * root * t, 2.0 * conductance * acting * density * drop * series
     )
-    slope = conductance * number * density * (ratio + 1.0 - t * t)
+    slope = conductance * acting * density * (series + 1.0 - t * t)
+    lost = conductance * root * (1.0 - t * t) * acting * root / ratio  # by a rise of the viscosity
     flow, up, down = choked_flow(
-        flow, slope, -slope, p_a if forward else p_b, density, throat, vapour
+        flow,
+        slope - lost * by_up,
+        -slope - lost * by_down,
+        p_a if forward else p_b,
+        density,
+        throat,
+        vapour,
     )
     if forward:
         return flow, up, down
@@ -137,51 +151,8 @@ def orifice_flow(
 
 @step_function
 def orifice_step(par: Any, state: Any, inp: Any, out: Any) -> int:
-    """``par = conductance, number, throat, vapour pressure``; no state."""
+    """``par``: conductance, number, throat, vapour pressure, viscosity law (2); no state."""
     out[0], out[1], out[2] = orifice_flow(
-        inp[2], inp[3], inp[4], inp[5], par[0], par[1], par[2], par[3]
-    )
-    return 0
-
-
-@njit(error_model="numpy")
-def orifice_flow_under_pressure(
-    p_a: float,
-    p_b: float,
-    rho_a: float,
-    rho_b: float,
-    conductance: float,
-    number: float,
-    throat: float,
-    vapour: float,
-    exponent: float,
-    power: float,
-) -> tuple[float, float, float]:
-    """:func:`orifice_flow` with the viscosity that acts between both pressures.
-
-    ``number`` is that at one atmosphere; ``exponent`` and ``power`` are those of
-    :class:`~klack.hydraulics.pressure_viscosity.PressureViscosity`.
-    """
-    ratio, by_a, by_b = mean_viscosity_ratio(p_a, p_b, exponent, power)
-    acting = number / ratio
-    flow, up, down = orifice_flow(p_a, p_b, rho_a, rho_b, conductance, acting, throat, vapour)
-    forward = p_a >= p_b
-    density = rho_a if forward else rho_b
-    root = sqrt(2.0 * density * abs(p_a - p_b))
-    t, _ = _tanh(acting * root)
-    if throat <= 0.0 or abs(flow) >= conductance * root * t:  # not choked
-        lost = conductance * root * (1.0 - t * t) * acting * root / ratio
-        if not forward:
-            lost = -lost
-        up -= lost * by_a
-        down -= lost * by_b
-    return flow, up, down
-
-
-@step_function
-def orifice_under_pressure_step(par: Any, state: Any, inp: Any, out: Any) -> int:
-    """:func:`orifice_step` with the two numbers of the viscosity law behind ``par``."""
-    out[0], out[1], out[2] = orifice_flow_under_pressure(
         inp[2], inp[3], inp[4], inp[5], par[0], par[1], par[2], par[3], par[4], par[5]
     )
     return 0
@@ -258,13 +229,15 @@ class Orifice(Component):
         """Area of one hole [m^2]."""
         return pi / 4.0 * self.diameter**2 if self.diameter else self.area or 0.0
 
-    def parameters(self, viscosity: float, vapour_pressure: float) -> tuple[float, ...]:
+    def parameters(
+        self, viscosity: float, vapour_pressure: float, law: PressureViscosity = CONSTANT
+    ) -> tuple[float, ...]:
         """Parameters of :func:`orifice_step` from viscosity [Pa s] and vapour pressure [Pa]."""
         size = self.hydraulic_diameter or sqrt(4.0 * self.hole_area / pi)
         area = self.count * self.hole_area
         number = 2.0 * size / (viscosity * self.critical_flow_number)
         throat = NOT_CHOKED if self.cavitation is None else self.cavitation * area
-        return self.discharge * area, number, throat, vapour_pressure
+        return self.discharge * area, number, throat, vapour_pressure, *law.numbers
 
     def liquid(self, density: float) -> Liquid:
         """Liquid in and about the holes, of a thin plate ``rho/d`` each.
@@ -284,12 +257,10 @@ class Orifice(Component):
     def add_rows(self, rows: Rows) -> None:
         """Add one branch."""
         fluid, viscosity = ambient_viscosity(rows)
-        law = viscosity_law(rows)
-        parameters = self.parameters(viscosity, fluid.vapour_pressure)
         rows.branch(
-            orifice_step if law is None else orifice_under_pressure_step,
+            orifice_step,
             a=rows.port("a"),
             b=rows.port("b"),
-            parameters=parameters if law is None else (*parameters, *law.numbers),
+            parameters=self.parameters(viscosity, fluid.vapour_pressure, viscosity_law(rows)),
             liquid=self.liquid(float(fluid.density(rows.ambient.pressure))),
         )

@@ -30,7 +30,7 @@ from klack.errors import InputError
 from klack.hydraulics.liquid import ATMOSPHERE, HIGHEST_PRESSURE
 from klack.machine.compiling.jit import njit
 
-__all__ = ["PressureViscosity", "mean_viscosity_ratio"]
+__all__ = ["CONSTANT", "PressureViscosity", "mean_viscosity_ratio"]
 
 _SCALE = 1.962e8  # [Pa] of Roelands' law
 _UNIT = 9.67  # [-] -ln(6.31e-5 Pa s), where all his lines meet
@@ -106,6 +106,10 @@ class PressureViscosity:
         return np.asarray(np.exp(self.exponent * rise))
 
 
+CONSTANT = PressureViscosity(exponent=0.0)
+"""Viscosity that no pressure changes."""
+
+
 @njit(error_model="numpy")
 def mean_viscosity_ratio(
     p_a: float, p_b: float, exponent: float, power: float
@@ -126,6 +130,8 @@ def mean_viscosity_ratio(
     exponent, power [-]
         Of :class:`PressureViscosity`.
     """
+    if exponent == 0.0:
+        return 1.0, 0.0, 0.0
     fluidity = by_a = by_b = 0.0
     for k in range(5):
         t = _AT[k]

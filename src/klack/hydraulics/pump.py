@@ -1,7 +1,7 @@
 r"""Pump of pistons: displacement with its kinematic ripple, and leakage."""
 
 from collections.abc import Mapping
-from math import cos, pi, sin
+from math import pi, sin
 from typing import Any, ClassVar, Self
 
 from pydantic import Field, model_validator
@@ -10,7 +10,7 @@ from klack.hydraulics.fluid_table import fluid_at
 from klack.hydraulics.network_fluid import energy_table, gas_is_slow
 from klack.input.problem import CaseProblem
 from klack.input.section import Count
-from klack.machine.compiling.jit import inner, njit
+from klack.machine.compiling.jit import njit
 from klack.network.component import Component
 from klack.network.port import FLOW, Port, Role
 from klack.network.rows import Book, Channel, Rows
@@ -49,10 +49,15 @@ def swept_share(angle: float, turned: float, pistons: int) -> float:
     return total / (2.0 * pistons)
 
 
-@inner(error_model="numpy", forceinline=True)
-def _deliver(par: Any, state: Any, inp: Any, out: Any, mixture: bool) -> None:
-    """Flow at the density of the table, or of the ``mixture`` before the pump."""
-    table = carray(par, (int(par[0]),))[5:]
+@step_function
+def pump_step(par: Any, state: Any, inp: Any, out: Any) -> int:
+    """Flow that the pistons deliver in the step, at the density before the pump.
+
+    ``par``: 0 size of all, 1 displacement, 2 turns per time, 3 pistons (0: no ripple), 4 angle at
+    time zero, 5 whether the gas of the fluid takes time to leave and enter it, fluid table.
+    ``state``: places in the fluid table of both ends, volume flow.
+    """
+    table = carray(par, (int(par[0]),))[6:]
     t, h, omega = inp[0], inp[1], _TURN * par[2]
     flow = par[1] * par[2]
     if par[3] > 0.0 and t >= 0.0:
@@ -67,28 +72,11 @@ def _deliver(par: Any, state: Any, inp: Any, out: Any, mixture: bool) -> None:
             flow *= pi / pistons * total
     rho, slope, g_a, hint_a = fluid_at(table, inp[2], int(state[0]))
     _, _, g_b, hint_b = fluid_at(table, inp[3], int(state[1]))
-    if mixture:
+    if par[5] > 0.0:
         rho = inp[4]
     out[0], out[1], out[2] = rho * flow, slope * flow, 0.0
     out[3], out[4], out[5] = hint_a, hint_b, flow
     out[6] = rho * flow * (g_b - g_a) * h
-
-
-@step_function
-def pump_step(par: Any, state: Any, inp: Any, out: Any) -> int:
-    """Flow that the pistons deliver in the step, at the density before the pump.
-
-    ``par``: 0 size of all, 1 displacement, 2 turns per time, 3 pistons (0: no ripple), 4 angle at
-    time zero, fluid table.  ``state``: places in the fluid table of both ends, volume flow.
-    """
-    _deliver(par, state, inp, out, False)
-    return 0
-
-
-@step_function
-def pump_of_mixture_step(par: Any, state: Any, inp: Any, out: Any) -> int:
-    """As :func:`pump_step`, of a fluid whose gas takes time to leave and enter it."""
-    _deliver(par, state, inp, out, True)
     return 0
 
 
@@ -166,24 +154,14 @@ class Pump(Component):
             return 0.0
         return (1.0 - self.volumetric_efficiency) * self.mean_flow / self.rated_pressure
 
-    def flow_range(self) -> tuple[float, float]:
-        """Least and largest flow of the pistons over their mean [-]."""
-        if self.pistons is None:
-            return 1.0, 1.0
-        z = self.pistons
-        if z == 1:
-            return 0.0, pi
-        part = pi / z if z % 2 else 2.0 * pi / z  # of the shaft between two largest flows
-        largest = 0.5 * part / sin(0.5 * part)
-        return largest * cos(0.5 * part), largest
-
     def add_rows(self, rows: Rows) -> None:
         """Add a branch that supplies energy, and one that leaks."""
         table = energy_table(rows)
-        numbers = [self.displacement, self.speed, self.pistons or 0, self.phase, *table]
+        shaft = self.displacement, self.speed, self.pistons or 0, self.phase
+        numbers = [*shaft, float(gas_is_slow(rows)), *table]
         a, b = rows.port("a"), rows.port("b")
         rows.branch(
-            pump_of_mixture_step if gas_is_slow(rows) else pump_step,
+            pump_step,
             a=a,
             b=b,
             parameters=[len(numbers) + 1, *numbers],

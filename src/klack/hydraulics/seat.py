@@ -14,9 +14,8 @@ from klack.hydraulics.orifice import (
     NOT_CHOKED,
     choked_flow,
     orifice_flow,
-    orifice_flow_under_pressure,
 )
-from klack.hydraulics.pressure_viscosity import mean_viscosity_ratio
+from klack.hydraulics.pressure_viscosity import CONSTANT, PressureViscosity, mean_viscosity_ratio
 from klack.hydraulics.seat_across import SeatAcross, SeatPlace
 from klack.input.problem import CaseProblem
 from klack.machine.compiling.jit import inner, njit
@@ -99,13 +98,11 @@ def gap_pass(
     area: float,
     gap: float,
     cube: float,
-    law: int,
 ) -> None:
     """Flow through an opening at the lift ``x``, and the forces of the flow.
 
     ``area`` of the mantle, ``gap`` of its edge, ``cube`` that of the land to the third power;
-    ``par`` from 5 on and ``state`` as of :func:`seat_step`; ``law``: place in ``par`` of the two
-    numbers of the viscosity law, 0 without one.
+    ``par`` from 5 on and ``state`` as of :func:`seat_step`.
     """
     p_a, p_b, rho_a, rho_b = inp[2], inp[3], inp[4], inp[5]
     area = min(area, par[5])
@@ -116,21 +113,15 @@ def gap_pass(
         conductance = par[6] * area
         linear = par[7] / cube + par[8] / (conductance * gap)
         square = 0.5 * density / (conductance * conductance)
-        more_up = more_down = 1.0
-        if law > 0:
-            p_up, p_down = (p_a, p_b) if forward else (p_b, p_a)
-            ratio, by_up, by_down = mean_viscosity_ratio(p_up, p_down, par[law], par[law + 1])
-            volume, slope = gap_flow(abs(p_a - p_b), ratio * linear, square)
-            more_up = 1.0 - linear * volume * by_up
-            more_down = 1.0 + linear * volume * by_down
-        else:
-            volume, slope = gap_flow(abs(p_a - p_b), linear, square)
+        p_up, p_down = (p_a, p_b) if forward else (p_b, p_a)
+        ratio, by_up, by_down = mean_viscosity_ratio(p_up, p_down, par[16], par[17])
+        volume, slope = gap_flow(abs(p_a - p_b), ratio * linear, square)
         slope *= density
         flow, up, down = choked_flow(
             density * volume,
-            slope * more_up,
-            -slope * more_down,
-            p_a if forward else p_b,
+            slope * (1.0 - linear * volume * by_up),
+            -slope * (1.0 + linear * volume * by_down),
+            p_up,
             density,
             par[9] * area,
             par[10],
@@ -146,15 +137,9 @@ def gap_pass(
     out[3], out[4] = push, -push
     out[5], out[6], out[7], out[8], out[9] = x, area, jet, out[0], 1.0
     if par[11] > 0.0:
-        if law > 0:
-            flow, up, down = orifice_flow_under_pressure(
-                p_a, p_b, rho_a, rho_b,
-                par[11], par[12], par[13], par[10], par[law], par[law + 1],
-            )  # fmt: skip
-        else:
-            flow, up, down = orifice_flow(
-                p_a, p_b, rho_a, rho_b, par[11], par[12], par[13], par[10]
-            )
+        flow, up, down = orifice_flow(
+            p_a, p_b, rho_a, rho_b, par[11], par[12], par[13], par[10], par[16], par[17]
+        )
         out[0] += flow
         out[1] += up
         out[2] += down
@@ -166,21 +151,12 @@ def seat_step(par: Any, state: Any, inp: Any, out: Any) -> int:
 
     ``par``: 0 kind, 1 radius, 2-3 shape, 4 lift at the start, 5 largest area, 6 ``C_q``, 7
     ``12 mu w/(pi d)``, 8 ``lambda_c mu/8``, 9 contraction, 10 vapour pressure, 11-13 leak
-    (conductance, number, throat), 14 ``C_v cos(theta)``, 15 damping length.
+    (conductance, number, throat), 14 ``C_v cos(theta)``, 15 damping length, 16-17 viscosity law.
     ``state``: lift, area, jet force, mass flow, 1 once that flow is known.
     """
     x = max(par[4] + 0.5 * (inp[6] + inp[7] - inp[8] - inp[9]), 0.0)
     area, gap = _opening(par[0], x, par[1], par[2], par[3])
-    gap_pass(par, state, inp, out, x, area, gap, gap * gap * gap, 0)
-    return 0
-
-
-@step_function
-def seat_under_pressure_step(par: Any, state: Any, inp: Any, out: Any) -> int:
-    """Step of :func:`seat_step` with ``par``: 16-17 the numbers of the viscosity law."""
-    x = max(par[4] + 0.5 * (inp[6] + inp[7] - inp[8] - inp[9]), 0.0)
-    area, gap = _opening(par[0], x, par[1], par[2], par[3])
-    gap_pass(par, state, inp, out, x, area, gap, gap * gap * gap, 16)
+    gap_pass(par, state, inp, out, x, area, gap, gap * gap * gap)
     return 0
 
 
@@ -188,25 +164,14 @@ def seat_under_pressure_step(par: Any, state: Any, inp: Any, out: Any) -> int:
 def off_axis_seat_step(par: Any, state: Any, inp: Any, out: Any) -> int:
     """Step of a seat whose needle is off-axis or tilted.
 
-    ``par``, behind that of :func:`seat_step`: 16-17 sine and cosine of the angle of the face, 18-19
-    offset, 20-21 slopes of the face.
+    ``par``, behind that of :func:`seat_step`: 18-19 sine and cosine of the angle of the face, 20-21
+    offset, 22-23 slopes of the face.
     """
-    x = par[4] + 0.5 * (inp[6] + inp[7] - inp[8] - inp[9])
-    area, gap, cube = off_axis_opening(
-        par[0], par[1], par[16], par[17], x, par[18], par[19], par[20], par[21]
-    )
-    gap_pass(par, state, inp, out, max(x, 0.0), area, gap, cube, 0)
-    return 0
-
-
-@step_function
-def off_axis_seat_under_pressure_step(par: Any, state: Any, inp: Any, out: Any) -> int:
-    """Step of :func:`off_axis_seat_step` with ``par``: 16-17 law, 18-23 what were 16-21."""
     x = par[4] + 0.5 * (inp[6] + inp[7] - inp[8] - inp[9])
     area, gap, cube = off_axis_opening(
         par[0], par[1], par[18], par[19], x, par[20], par[21], par[22], par[23]
     )
-    gap_pass(par, state, inp, out, max(x, 0.0), area, gap, cube, 16)
+    gap_pass(par, state, inp, out, max(x, 0.0), area, gap, cube)
     return 0
 
 
@@ -318,12 +283,9 @@ class Seat(Component):
             return self.half_angle
         return acos(self.diameter / self.ball_diameter) if self.ball_diameter else pi / 2
 
-    @property
-    def normal_factor(self) -> float:
-        """Normal gap over a small lift [-]."""
-        return sin(self.surface_angle)
-
-    def parameters(self, viscosity: float, vapour_pressure: float) -> tuple[float, ...]:
+    def parameters(
+        self, viscosity: float, vapour_pressure: float, law: PressureViscosity = CONSTANT
+    ) -> tuple[float, ...]:
         """Parameters of :func:`seat_step` from viscosity [Pa s] and vapour pressure [Pa]."""
         r, bore = 0.5 * self.diameter, self.bore_diameter or self.diameter
         shape = (0.0, 0.0)
@@ -351,19 +313,18 @@ class Seat(Component):
             contraction * self.leak_area,
             force.momentum(self.surface_angle) if force else 0.0,
             force.damping_length if force else 0.0,
+            *law.numbers,
         )
 
     def add_rows(self, rows: Rows) -> None:
         """Add one branch that pushes needle and body."""
         fluid, viscosity = ambient_viscosity(rows)
-        parameters, step = self.parameters(viscosity, fluid.vapour_pressure), seat_step
-        law = viscosity_law(rows)
-        if law is not None:
-            parameters, step = (*parameters, *law.numbers), seat_under_pressure_step
+        parameters = self.parameters(viscosity, fluid.vapour_pressure, viscosity_law(rows))
+        step = seat_step
         if self.off_axis is not None:
             beta = self.surface_angle
             parameters = (*parameters, sin(beta), cos(beta), 0.0, 0.0, 0.0, 0.0)
-            step = off_axis_seat_step if law is None else off_axis_seat_under_pressure_step
+            step = off_axis_seat_step
         rows.branch(
             step,
             a=rows.port("a"),

@@ -13,6 +13,7 @@ from klack.hydraulics.network_fluid import fixed_viscosity
 from klack.hydraulics.notch import NUMBERS, Notch, notch_opening
 from klack.hydraulics.opening import OpeningComponent
 from klack.hydraulics.orifice import NOT_CHOKED, choked_flow
+from klack.hydraulics.pressure_viscosity import CONSTANT
 from klack.hydraulics.seat import gap_flow, gap_pass
 from klack.input.problem import CaseProblem
 from klack.machine.compiling.jit import inner
@@ -33,7 +34,7 @@ def _edge(par: Any, state: Any, inp: Any, out: Any, x: float) -> None:
     slot = max(x, 0.0)
     gap = sqrt(slot * slot + par[3] * par[3])
     covered = -x if x < 0.0 else 0.0
-    gap_pass(par, state, inp, out, x, par[2] * gap, gap, 1.0 / covered if covered > 0.0 else inf, 0)
+    gap_pass(par, state, inp, out, x, par[2] * gap, gap, 1.0 / covered if covered > 0.0 else inf)
     jet = out[7] * par[0] * slot / gap
     out[3] += jet - out[7]
     out[4] -= jet - out[7]
@@ -46,7 +47,7 @@ def spool_edge_step(par: Any, state: Any, inp: Any, out: Any) -> int:
 
     ``par``: 0 sign of the motion that opens, 1 overlap, 2 width, 3 clearance, 5 largest area,
     6 ``C_q``, 7 ``12 mu/(w c^3)`` of the closed gap, 8 ``lambda_c mu/8``, 9 contraction, 10 vapour
-    pressure, 11-13 no leak, 14 ``C_v cos(theta)``, 15 damping length.
+    pressure, 11-13 no leak, 14 ``C_v cos(theta)``, 15 damping length, 16-17 viscosity law.
     ``state``: opening, area, jet force, mass flow, 1 once that flow is known.
     """
     x = par[0] * 0.5 * (inp[6] + inp[7] - inp[8] - inp[9]) - par[1]
@@ -58,8 +59,8 @@ def spool_edge_step(par: Any, state: Any, inp: Any, out: Any) -> int:
 def notched_edge_step(par: Any, state: Any, inp: Any, out: Any) -> int:
     """Step of :func:`spool_edge_step` with notches in parallel to the rest of the edge.
 
-    ``par``: 2 width without notches, 16 number of their shapes, 17 ``12 mu``, 18 ``c^3`` with the
-    factor of the eccentricity, 19 gap length that resists as the edge, from 20 on the notches for
+    ``par``: 2 width without notches, 18 number of their shapes, 19 ``12 mu``, 20 ``c^3`` with the
+    factor of the eccentricity, 21 gap length that resists as the edge, from 22 on the notches for
     :func:`~klack.hydraulics.notch.notch_opening`.
     """
     x = par[0] * 0.5 * (inp[6] + inp[7] - inp[8] - inp[9]) - par[1]
@@ -69,16 +70,16 @@ def notched_edge_step(par: Any, state: Any, inp: Any, out: Any) -> int:
     supply, density = (p_a, rho_a) if forward else (p_b, rho_b)
     drop, area, jet = abs(p_a - p_b), out[6], out[7]
     flow = up = down = leak = 0.0
-    for n in range(int(par[16])):
-        k = 20 + NUMBERS * n
-        clear, narrow, gap, along, covered, flank = notch_opening(par, k, x, par[3], par[19])
+    for n in range(int(par[18])):
+        k = 22 + NUMBERS * n
+        clear, narrow, gap, along, covered, flank = notch_opening(par, k, x, par[3], par[21])
         leak += par[k + 1] * flank
         total = min(par[k + 1] * clear, par[5] - area)
         if total <= 0.0 or gap <= 1e-12:
             continue
         area += total
         conductance = par[6] * total
-        linear = par[17] * (along + covered / par[18]) / par[k + 1] + par[8] / (conductance * gap)
+        linear = par[19] * (along + covered / par[20]) / par[k + 1] + par[8] / (conductance * gap)
         volume, slope = gap_flow(drop, linear, 0.5 * density / (conductance * conductance))
         passed, more, less = choked_flow(
             density * volume,
@@ -97,7 +98,7 @@ def notched_edge_step(par: Any, state: Any, inp: Any, out: Any) -> int:
         out[4] += lag
     out[3] += jet - out[7]
     out[4] -= jet - out[7]
-    leak *= density * par[18] / par[17]
+    leak *= density * par[20] / par[19]
     through, up, down = flow + leak * drop, up + leak, down - leak
     if forward:
         out[0], out[1], out[2] = out[0] + through, out[1] + up, out[2] + down
@@ -261,6 +262,7 @@ class SpoolEdge(OpeningComponent):
             0.0,
             force.momentum(JET_ANGLE) if force else 0.0,
             force.damping_length if force else 0.0,
+            *CONSTANT.numbers,
         )
 
     def add_rows(self, rows: Rows) -> None:

@@ -6,7 +6,7 @@ from math import exp, log, pi
 import numpy as np
 from scipy.integrate import quad
 
-from klack.hydraulics.annulus import Annulus, annulus_under_pressure_step
+from klack.hydraulics.annulus import Annulus, annulus_step
 from klack.hydraulics.fluid_choice import FluidChoice
 from klack.hydraulics.fluid_library import library_fluid
 from klack.hydraulics.liquid import ATMOSPHERE
@@ -171,8 +171,8 @@ def _gap() -> list[Check]:
     par = (gap.conductance(mu), 0.5 * pi * 4e-3 * 3e-6, gap.drag(mu))
     numbers = (*par, *PressureViscosity.barus(alpha).numbers)
     inputs = [0.0, 1e-6, p_a, p_b, rho, rho, 0.0, 1e-6, 0.0, 0.0]
-    _, moved = evaluate(annulus_under_pressure_step, numbers, [], inputs, 5)
-    _, held = evaluate(annulus_under_pressure_step, numbers, [], [*inputs[:7], 0.0, 0.0, 0.0], 5)
+    _, moved = evaluate(annulus_step, numbers, [], inputs, 5)
+    _, held = evaluate(annulus_step, numbers, [], [*inputs[:7], 0.0, 0.0, 0.0], 5)
     fluidity = (1.0 - exp(-alpha * (p_a - p_b))) / (alpha * mu)
     return [
         check(
