@@ -96,8 +96,6 @@ class GapReluctance:
     """
 
     points: Vector
-    reluctance: Vector
-    reluctance_slope: Vector
     rows: Vector = field(init=False, repr=False)
 
     def __init__(self, points: ArrayLike, reluctance: ArrayLike, slope: ArrayLike) -> None:
@@ -117,8 +115,6 @@ class GapReluctance:
                 hint="give the closed gap its residual gap (coating, roughness, shim).",
             )
         object.__setattr__(self, "points", x)
-        object.__setattr__(self, "reluctance", R)
-        object.__setattr__(self, "reluctance_slope", dR)
         object.__setattr__(self, "rows", _two_sided_rows(x, R, dR))
 
     @classmethod
@@ -166,14 +162,11 @@ class IronReluctance:
     ----------
     points (k,) [Wb]
         Fluxes, increasing from 0.
-    mmf_points, slope_points (k,) [A], [A/Wb]
+    mmf, slope (k,) [A], [A/Wb]
         Mmf and its slope there; a cubic between, straight beyond the last point.  Both must rise:
         the solver relies on one solution.
     """
 
-    points: Vector
-    mmf_points: Vector
-    slope_points: Vector
     rows: Vector = field(init=False, repr=False)
 
     def __init__(self, points: ArrayLike, mmf: ArrayLike, slope: ArrayLike) -> None:
@@ -192,11 +185,7 @@ class IronReluctance:
                 expected="mmf and slope that increase with the flux",
                 hint="sort the points by flux; smooth measured curves first.",
             )
-        rows = _one_sided_rows(phi, F, dF)
-        object.__setattr__(self, "points", phi)
-        object.__setattr__(self, "mmf_points", F)
-        object.__setattr__(self, "slope_points", dF)
-        object.__setattr__(self, "rows", rows)
+        object.__setattr__(self, "rows", _one_sided_rows(phi, F, dF))
 
     def mmf(self, flux: ArrayLike, gap: ArrayLike) -> Vector:
         """Mmf [A] at a flux [Wb], whatever the gap [m]."""
