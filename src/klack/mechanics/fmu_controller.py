@@ -10,19 +10,17 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TypeVar
 
 from klack.control.controlled import Controlled
 from klack.control.law import Law
-from klack.errors import ConvergenceError, InputError
+from klack.errors import InputError
 from klack.input.problem import nearest, one_of
 from klack.input.section import instead_of_file
 from klack.mechanics.fmu_child import ADVANCE, FORCE, RUN
-from klack.mechanics.fmu_file import FmuDescription, FmuVariable, describe_fmu, unpack_fmu
-from klack.mechanics.fmu_process import FmuFailed, FmuProcess
-from klack.mechanics.fmu_slave import TIME_LIMIT
-from klack.units import KINDS, format_si, parse_quantity
+from klack.mechanics.fmu_file import FmuDescription, FmuVariable, describe_fmu
+from klack.mechanics.fmu_slave import TIME_LIMIT, FmuInstance
+from klack.units import KINDS, parse_quantity
 
 __all__ = ["FmuController", "controlled_by_fmu"]
 
@@ -62,67 +60,31 @@ class FmuController:
 
     def begin(self, period: float) -> Law:
         """Fresh instance as a function, in steps of ``period`` [s]."""
-        return _Running(self, period)
+        return _Running(self)
 
 
-class _Running:
-    def __init__(self, controller: FmuController, period: float) -> None:
-        self._of, self._period = controller, period
-        self._folder = TemporaryDirectory(prefix="klack-fmu-", ignore_cleanup_errors=True)
-        self._library = unpack_fmu(controller.fmu, Path(self._folder.name))
-        self._process: FmuProcess | None = None
-        self._last = 0.0
+class _Running(FmuInstance):
+    def __init__(self, controller: FmuController) -> None:
+        super().__init__(
+            controller.fmu,
+            inputs=[name for name, _ in controller.inputs.values()],
+            output=controller.output[0],
+            parameters=controller.parameters,
+            time_limit=controller.time_limit,
+            advice="another sample time",
+        )
+        self._of, self._last = controller, 0.0
 
     def __call__(self, time: float, signals: Mapping[str, float]) -> float:
         inputs = [signals[name] * size for name, (_, size) in self._of.inputs.items()]
-        unit = self._of.output[1]
         if self._process is None:
-            self._process = self._started()
-            output = self._asked(FORCE, 0.0, 0.0, *inputs)
-            self._asked(RUN, 0.0, 0.0, *inputs)
+            self.begin()
+            output = self.ask(FORCE, 0.0, 0.0, *inputs)
+            self.ask(RUN, 0.0, 0.0, *inputs)
         else:
-            output = self._asked(ADVANCE, self._last, time - self._last, *inputs)
+            output = self.ask(ADVANCE, self._last, time - self._last, *inputs)
         self._last = time
-        return output * unit
-
-    def _started(self) -> FmuProcess:
-        fmu = self._of.fmu
-        variables = fmu.variables
-        given = {
-            "version": fmu.version,
-            "library": str(self._library),
-            "resources": str(Path(self._folder.name) / "resources"),
-            "token": fmu.token,
-            "parameters": [
-                (variables[name].reference, variables[name].kind, value)
-                for name, value in self._of.parameters.items()
-            ],
-            "inputs": [variables[name].reference for name, _ in self._of.inputs.values()],
-            "force": variables[self._of.output[0]].reference,
-        }
-        try:
-            return FmuProcess(given, self._of.time_limit)
-        except FmuFailed as error:
-            raise self._failed("in its initialisation", error) from None
-
-    def _asked(self, what: int, time: float, step: float, *inputs: float) -> float:
-        assert self._process is not None
-        try:
-            return self._process.call(what, time, step, *inputs)
-        except FmuFailed as error:
-            when = "in its initialisation, at 0 s"
-            if what == ADVANCE:
-                ends = (format_si(t, "s", 8) for t in (time, time + step))
-                when = f"in its step from {' to '.join(ends)}"
-            raise self._failed(when, error) from None
-
-    def _failed(self, when: str, error: FmuFailed) -> ConvergenceError:
-        name = self._of.fmu.path.name
-        return ConvergenceError(
-            f"{name}: the FMU {error}, {when}.\n"
-            f"Try: 'fmpy simulate {name}' alone, another sample time; a time_limit above "
-            f"{self._of.time_limit:g} s if it needs that long."
-        )
+        return output * self._of.output[1]
 
 
 def controlled_by_fmu(
