@@ -167,7 +167,7 @@ def modal_response(
     axis, values = aligned_forces(structure, forces)
     every = _interval(sample, axis)
     w, zeta, phi = structure.omega, structure.damping, structure.port_shapes
-    P, D = modal_propagator(w, zeta, axis.step), damping_loss(w, zeta, axis.step)
+    P = modal_propagator(w, zeta, axis.step)
     q = phi @ values[0] / w**2
     before = float(0.5 * np.sum((w * q) ** 2))
     n, m, count = len(values), len(w), (len(values) // every + 1 if every else 0)
@@ -177,7 +177,7 @@ def modal_response(
     v = np.zeros(m)
     _march(
         np.array([P.A11, P.A12, P.A21, P.A22, P.B1, P.B2]),
-        np.array([D.Q11, D.Q12, D.Q22, D.L1, D.L2, D.S]),
+        damping_loss(w, zeta, axis.step),
         w**2,
         np.ascontiguousarray(phi),
         structure.participation,

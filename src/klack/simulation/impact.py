@@ -123,7 +123,6 @@ def flatten(system: ReducedSystem, velocities: Mapping[str, float], step: float)
     laws = [contact.law.flat() for contact in system.contacts]
     sizes = [law.parameters.size for law in laws]
     damped_modes = (z > 0.0) & (w > 0.0)
-    loss = damping_loss(w, np.where(damped_modes, z, 0.0), step)
     return FlatSystem(
         blocks=tuple(blocks),
         omega=w,
@@ -144,7 +143,7 @@ def flatten(system: ReducedSystem, velocities: Mapping[str, float], step: float)
         losses=Losses(
             damped=bool(np.any(damped_modes)),
             weight=np.array([0.5 * w**2, np.full(w.size, 0.5)]) * damped_modes,
-            forms=np.array([loss.Q11, loss.Q12, loss.Q22, loss.L1, loss.L2, loss.S]),
+            forms=damping_loss(w, z, step),
         ),
         watched=Watched(
             q=watch_q,

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from klack.contact.step_constants import TAYLOR_BELOW, TAYLOR_TERMS
 from klack.errors import InputError, require_positive
 
-__all__ = ["DampingLoss", "Propagator", "damping_loss", "modal_propagator"]
+__all__ = ["Propagator", "damping_loss", "modal_propagator"]
 
 _TWICE_BELOW = 0.5  # as TAYLOR_BELOW, for an integral that loses digits twice
 
@@ -51,24 +51,6 @@ class Propagator:
     R1: NDArray[np.float64]
     R2: NDArray[np.float64]
     Rm: NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class DampingLoss:
-    r"""Energy lost in the damping of each mode over one step, as a quadratic form.
-
-    .. math:: \int_0^h 2\zeta\omega\,\dot q^2\,\mathrm dt = Q_{11} q^2 + Q_{12} q \dot q
-              + Q_{22} \dot q^2 + f\,(L_1 q + L_2 \dot q) + S f^2
-
-    with the state at the start of the step; arrays of shape (m,).
-    """
-
-    Q11: NDArray[np.float64]
-    Q12: NDArray[np.float64]
-    Q22: NDArray[np.float64]
-    L1: NDArray[np.float64]
-    L2: NDArray[np.float64]
-    S: NDArray[np.float64]
 
 
 def modal_propagator(
@@ -134,10 +116,14 @@ def _matrices(omega: bytes, damping: bytes, h: float) -> NDArray[np.float64]:
 
 def damping_loss(
     omega: NDArray[np.float64], damping: NDArray[np.float64], step: float
-) -> DampingLoss:
-    """Quadratic forms of the modal damping loss, by Gauss integration of the exact velocity.
+) -> NDArray[np.float64]:
+    r"""Energy lost in the damping of each mode over one step, as a quadratic form.
 
-    Independent of the energy balance, which it therefore checks.
+    .. math:: \int_0^h 2\zeta\omega\,\dot q^2\,\mathrm dt = Q_{11} q^2 + Q_{12} q \dot q
+              + Q_{22} \dot q^2 + f\,(L_1 q + L_2 \dot q) + S f^2
+
+    with the state at the start of the step: the rows of the result (6, m), by Gauss integration of
+    the exact velocity.  Independent of the energy balance, which it therefore checks.
 
     Parameters
     ----------
@@ -150,8 +136,7 @@ def damping_loss(
     lossy = (w > 0.0) & (z > 0.0)
     if np.any(lossy):
         forms[:, lossy] = _loss_forms(w[lossy], z[lossy], float(step))
-    Q11, Q12, Q22, L1, L2, S = forms
-    return DampingLoss(Q11=Q11, Q12=Q12, Q22=Q22, L1=L1, L2=L2, S=S)
+    return forms
 
 
 def _loss_forms(w: NDArray[np.float64], z: NDArray[np.float64], step: float) -> NDArray[np.float64]:

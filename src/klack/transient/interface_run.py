@@ -282,8 +282,7 @@ def modes_of_step(model: InterfaceModel, step: float) -> Modes:
     P = modal_propagator(model.omega, model.damping, step)
     loss = np.zeros((0, model.mode_count))
     if np.any(model.damping > 0):
-        L = damping_loss(model.omega, model.damping, step)
-        loss = np.array([L.Q11, L.Q12, L.Q22, L.L1, L.L2, L.S])
+        loss = damping_loss(model.omega, model.damping, step)
     push = np.ascontiguousarray(model.rigid[2])
     return Modes(P.A11, P.A12, P.A21, P.A22, P.B1, P.B2, loss, push, model.drift, step)
 
