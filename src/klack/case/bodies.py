@@ -23,7 +23,7 @@ from klack.case.parameters import PARAMETERS, Written
 from klack.case.plausible import GO_ON, Number
 from klack.contact.friction import MOST_FRICTION
 from klack.errors import InputError
-from klack.input.problem import CaseProblem, Key, key_text, nearest, one_of, reject_if
+from klack.input.problem import CaseProblem, Key, key_text, nearest, one_of, refuse_key_if
 from klack.input.section import Count, Name, NamedSection, PlainName, Section, Text
 from klack.materials.hardening import (
     HARDNESS_SPREAD,
@@ -368,7 +368,7 @@ class CaseBody(Section):
             if not self.geometry.is_absent:
                 self._refuse_with(("geometry",), "a reduced model", "it has no shape")
             return self
-        reject_if(
+        refuse_key_if(
             self.geometry.is_absent,
             (),
             got="no key 'geometry'",
@@ -377,7 +377,7 @@ class CaseBody(Section):
         )
         if self.matrices is not None:
             self._refuse_with(("material",), "matrices", "they already include the material")
-            reject_if(
+            refuse_key_if(
                 self.geometry.mesh is None and self.geometry.nodes is None,
                 ("matrices",),
                 got="matrices with a shape that klack meshes",
@@ -402,7 +402,7 @@ class CaseBody(Section):
             raise CaseProblem((), got="no key 'mesh'", expected="mesh: {size: ...}", hint=hint)
         if self.geometry.dimension == 2:
             for i, support in enumerate(self.fixed or ()):
-                reject_if(
+                refuse_key_if(
                     support.sectors is not None,
                     ("fixed", i, "sectors"),
                     got="sectors on an axisymmetric body",
@@ -452,7 +452,7 @@ class CaseBody(Section):
             return
         geometry = self.geometry
         no_parts = geometry.is_absent or geometry.nodes is not None or self.matrices is not None
-        reject_if(
+        refuse_key_if(
             no_parts or self.fits,
             ("layers",),
             got="a layer beside a press fit"
@@ -506,7 +506,7 @@ class ModeChoice(Section):
     @classmethod
     def _some_modes(cls, value: Any) -> Any:
         for key in ("count", "participation", "pool"):
-            reject_if(
+            refuse_key_if(
                 isinstance(value, Mapping) and value.get(key) == 0,
                 (key,),
                 got="0 modes",
@@ -520,7 +520,7 @@ class ModeChoice(Section):
         kind = self._exactly_one(("count", "frequency", "participation"), "which modes to keep")
         if kind != "participation":
             return self._refuse_with(("pool",), kind, "only participation chooses from a pool")
-        reject_if(
+        refuse_key_if(
             self.pool is None or self.participation is None or self.pool < self.participation,
             ("pool",) if self.pool is not None else (),
             got=f"a pool of {self.pool or 'no'} modes for {self.participation}",
@@ -555,14 +555,14 @@ class Reduction(Section):
         cls, shifts: Mapping[str, tuple[float, ...]]
     ) -> Mapping[str, tuple[float, ...]]:
         for body, frequencies in shifts.items():
-            reject_if(
+            refuse_key_if(
                 not 1 <= len(frequencies) <= _MOST_SHIFTS,
                 (body,),
                 got=f"{len(frequencies)} shifts",
                 expected=f"1 to {_MOST_SHIFTS} frequencies",
                 hint="two are usual for a free body; leave the body out for its residual mode.",
             )
-            reject_if(
+            refuse_key_if(
                 len(set(frequencies)) < len(frequencies),
                 (body,),
                 got="the same shift twice",
@@ -609,7 +609,7 @@ class WrittenCase(Section):
     @field_validator("klack", mode="before")
     @classmethod
     def _known_version(cls, version: Any) -> Any:
-        reject_if(
+        refuse_key_if(
             isinstance(version, bool) or version != 1,
             (),
             got=f"the format version {version}",

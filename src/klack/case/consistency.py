@@ -12,7 +12,7 @@ from klack.case.outputs import check_outputs
 from klack.case.valve_roles import find_roles
 from klack.case.valve_sections import ValveSections
 from klack.contact.friction import MOST_FRICTION
-from klack.input.problem import CaseProblem, Key, nearest, one_of, reject_if
+from klack.input.problem import CaseProblem, Key, nearest, one_of, refuse_key_if
 from klack.units import format_si
 
 __all__ = [
@@ -76,7 +76,7 @@ def check_given(case: ImpactSections) -> None:
     name = next(name for name, body in case.bodies.items() if not body.has_surfaces)
     what = "a reduced model" if case.bodies[name].reduced is not None else "nodes alone"
     for section in _ON_SURFACES:
-        reject_if(
+        refuse_key_if(
             getattr(case, section) is not None,
             (section,),
             got=f"'{section}' with '{name}', {what}",
@@ -84,14 +84,14 @@ def check_given(case: ImpactSections) -> None:
             hint=f"remove '{section}', or give '{name}' a mesh.",
             on_key=True,
         )
-    reject_if(
+    refuse_key_if(
         not case.motion.is_straight,
         ("motion",),
         got=f"a motion sideways or a spin with '{name}', {what}",
         expected="a motion along the axis: a port moves along it alone",
         hint="remove 'sideways_speed' and 'spin'.",
     )
-    reject_if(
+    refuse_key_if(
         not case.motion.placement.is_centred,
         ("motion", "placement"),
         got=f"an off-axis placement with '{name}', {what}",
@@ -99,7 +99,7 @@ def check_given(case: ImpactSections) -> None:
         hint="remove 'placement'.",
         on_key=True,
     )
-    reject_if(
+    refuse_key_if(
         case.run.transfer is not None,
         ("run", "transfer"),
         got=f"transfer functions of the full order with '{name}', {what}",
@@ -107,7 +107,7 @@ def check_given(case: ImpactSections) -> None:
         hint="remove 'transfer'.",
         on_key=True,
     )
-    reject_if(
+    refuse_key_if(
         case.reduction.shifts,
         ("reduction", "shifts"),
         got=f"shifts of attachment modes with '{name}', {what}",
@@ -118,14 +118,14 @@ def check_given(case: ImpactSections) -> None:
     _check_law(case, name, what)
     forms = ("crown", "waviness", "tilt", "roughness")
     form = next((key for key in forms if getattr(case.contact, key)), None)
-    reject_if(
+    refuse_key_if(
         not case.contact.faces.is_none,
         ("contact", "friction" if case.contact.friction else "static_friction"),
         got=f"friction with '{name}', {what}",
         expected="no friction: without a surface nothing is known of its slip",
         hint="leave it out, or give the body a mesh.",
     )
-    reject_if(
+    refuse_key_if(
         form is not None,
         ("contact", str(form)),
         got=f"the key '{form}' of faces with '{name}', {what}",
@@ -134,7 +134,7 @@ def check_given(case: ImpactSections) -> None:
         on_key=True,
     )
     for i, level in enumerate(case.run.levels):
-        reject_if(
+        refuse_key_if(
             level not in GIVEN_LEVELS,
             ("run", "levels", i) if "levels" in case.run.model_fields_set else ("run",),
             got=f"the level '{level}' with '{name}', {what}",
@@ -145,7 +145,7 @@ def check_given(case: ImpactSections) -> None:
 
 def _check_law(case: ImpactSections, name: str, what: str) -> None:
     law = case.contact.local_law
-    reject_if(
+    refuse_key_if(
         law.kind not in ("linear", "hertz"),
         ("contact", "local_law", "kind")
         if "local_law" in case.contact.model_fields_set
@@ -164,7 +164,7 @@ def _check_law(case: ImpactSections, name: str, what: str) -> None:
                     expected="modulus: the effective modulus E*",
                     hint="115 GPa for steel on steel.",
                 )
-    reject_if(
+    refuse_key_if(
         case.reduction.correction == "attachment",
         ("reduction", "correction"),
         got=f"attachment modes with '{name}', {what}",
@@ -205,7 +205,7 @@ def check_consistency(case: ImpactSections) -> None:
     centred = motion.placement.is_centred and motion.is_straight
     centred = centred and case.guide is None and case.shots is None
     # worn faces are those of a centred impact
-    reject_if(
+    refuse_key_if(
         case.contact.worn is not None and not (centred and case.has_surfaces),
         ("contact", "worn"),
         got="worn faces of bodies that meet off-axis, or of given models",
@@ -213,7 +213,7 @@ def check_consistency(case: ImpactSections) -> None:
         hint="remove 'worn', or the placement, guide or shots.",
         on_key=True,
     )
-    reject_if(
+    refuse_key_if(
         "lumped" in case.run.levels and case.lumped is None,
         ("run", "levels"),
         got="the level 'lumped' without a section 'lumped'",
@@ -242,7 +242,7 @@ def check_shifts(case: CaseFile, reduction: Reduction) -> None:
     for name in reduction.shifts:
         key: Key = ("reduction", "shifts", name)
         require_known(key, name, case.bodies, "body", on_key=True)
-        reject_if(
+        refuse_key_if(
             case.bodies[name].reduced is not None,
             key,
             got=f"shifts of '{name}', which is a reduced model already",
@@ -253,7 +253,7 @@ def check_shifts(case: CaseFile, reduction: Reduction) -> None:
 
 
 def _check_bodies(case: ImpactSections) -> None:
-    reject_if(
+    refuse_key_if(
         case.opposite is not None and case.backing is not None,
         ("backing",),
         got="a body behind the struck one together with an upper stop",
@@ -296,7 +296,7 @@ def _check_roles(case: ImpactSections) -> None:
             expected="surfaces of two bodies",
             hint=f"name a surface of {one_of(n for n in case.bodies if n != moving.body)}.",
         )
-    reject_if(
+    refuse_key_if(
         case.moving_body.fixed,
         ("bodies", moving.body, "fixed"),
         got=f"supports of '{moving.body}', the body that moves",
@@ -362,14 +362,14 @@ def _check_local_law(case: ImpactSections) -> None:
     correction, law = case.reduction.correction, case.contact.local_law.kind
     if not case.has_surfaces:
         return  # in given_consistency
-    reject_if(
+    refuse_key_if(
         correction == "consistent" and law != "consistent",
         ("contact", "local_law", "kind"),
         got=f"a {law} law with the correction 'consistent'",
         expected="the law 'consistent', which carries the residual compliance",
         hint="remove local_law, or set 'reduction: {correction: attachment}' for it.",
     )
-    reject_if(
+    refuse_key_if(
         correction != "consistent" and law == "consistent",
         ("reduction", "correction"),
         got=f"the correction '{correction}' with a consistent local law",
@@ -393,7 +393,7 @@ def _check_opposite(case: ImpactSections) -> None:
             expected=f"a surface of the third body, then one of '{between[0]}', which moves",
             hint="the upper stop is a separate body.",
         )
-    reject_if(
+    refuse_key_if(
         case.bodies[stop.body].geometry.dimension != case.dimension,
         ("bodies", stop.body, "geometry", "model"),
         got=f"'{stop.body}' of another dimension than the moving body",
@@ -415,7 +415,7 @@ def _check_backing(case: ImpactSections) -> None:
         check_surface(case, ("backing", "between", i), surface)
     lower, third = backing.between
     moving, struck = case.contact.between
-    reject_if(
+    refuse_key_if(
         lower.body != struck.body or third.body in (moving.body, struck.body) or lower == struck,
         ("backing", "between"),
         got=f"{lower} and {third}",
@@ -431,7 +431,7 @@ def _check_backing(case: ImpactSections) -> None:
             on_key=True,
         )
     middle, last = case.bodies[struck.body], case.bodies[third.body]
-    reject_if(
+    refuse_key_if(
         middle.fixed,
         ("bodies", struck.body, "fixed"),
         got=f"supports of '{struck.body}', and a body behind it",
@@ -439,7 +439,7 @@ def _check_backing(case: ImpactSections) -> None:
         hint="remove 'fixed', or 'backing' and the third body.",
         on_key=True,
     )
-    reject_if(
+    refuse_key_if(
         last.geometry.dimension != case.dimension and case.has_surfaces,
         ("bodies", third.body, "geometry", "model"),
         got=f"'{third.body}' of another dimension than the moving body",
@@ -449,14 +449,14 @@ def _check_backing(case: ImpactSections) -> None:
     if backing.clamp is not None:
         key: Key = ("backing", "clamp", "surface")
         check_surface(case, key, SurfaceName(body=struck.body, surface=backing.clamp.surface))
-        reject_if(
+        refuse_key_if(
             backing.clamp.surface in (lower.surface, struck.surface),
             key,
             got=f"'{backing.clamp.surface}', where '{struck.body}' meets another body",
             expected="a surface of its own, such as a shoulder",
             hint="split the edge in the drawing.",
         )
-        reject_if(
+        refuse_key_if(
             not last.fixed,
             ("backing", "clamp"),
             got=f"a clamp, but nothing holds '{third.body}'",
@@ -549,7 +549,7 @@ def _check_solid_only(case: ImpactSections) -> None:
         (("contact", "waviness", "direction"), straight, "straight waves on the faces"),
     ]
     for key, is_there, what in asked:
-        reject_if(
+        refuse_key_if(
             is_there,
             key,
             got=f"{what} of axisymmetric bodies",
@@ -561,7 +561,7 @@ def _check_solid_only(case: ImpactSections) -> None:
 
 def _check_off_axis(case: ImpactSections) -> None:
     """Reject what axisymmetric bodies cannot have off-axis."""
-    reject_if(
+    refuse_key_if(
         case.contact.angles is not None and case.dimension == 3,
         ("contact", "angles"),
         got="angles of bodies of three dimensions",
@@ -599,7 +599,7 @@ def _check_oblique(case: ImpactSections) -> None:
         ("run_in", several, "impacts one after another"),
     ]
     for name, is_there, what in asked:
-        reject_if(
+        refuse_key_if(
             is_there,
             ("motion", key),
             got=f"a motion sideways or a spin, and {what}",
@@ -616,7 +616,7 @@ def _check_ends(case: ImpactSections) -> None:
             continue
         key: Key = ("bodies", name, "non_reflecting")
         stop = case.contact.stop
-        reject_if(
+        refuse_key_if(
             case.shots is not None or case.opposite is not None,
             key,
             got="a non-reflecting end together with 'shots' or 'opposite'",
@@ -624,7 +624,7 @@ def _check_ends(case: ImpactSections) -> None:
             hint="remove non_reflecting.",
             on_key=True,
         )
-        reject_if(
+        refuse_key_if(
             name != stop.body or not body.has_surfaces or not isinstance(body.material, str),
             key,
             got=f"a non-reflecting end of '{name}'",
@@ -634,7 +634,7 @@ def _check_ends(case: ImpactSections) -> None:
         )
         check_surface(case, key, SurfaceName(body=name, surface=body.non_reflecting))
         held = [support.surface for support in body.fixed or ()]
-        reject_if(
+        refuse_key_if(
             body.non_reflecting in (stop.surface, *held),
             key,
             got=f"'{body.non_reflecting}', a surface that is hit or held",
@@ -704,7 +704,7 @@ def _check_shots(case: ImpactSections) -> None:
     shots = case.shots
     if shots is None:
         return
-    reject_if(
+    refuse_key_if(
         case.guide is None and shots.friction is not None,
         ("shots", "friction"),
         got="friction without a guide",
@@ -716,7 +716,7 @@ def _check_shots(case: ImpactSections) -> None:
         check_drawn_place(shots.eccentricity, shots.tilt)
     _check_drawn_friction(case)
     drawn = ("eccentricity", "tilt", "force", "contact_friction", "waviness")
-    reject_if(
+    refuse_key_if(
         case.guide is None and all(getattr(shots, name) is None for name in drawn),
         ("shots",),
         got="identical shots",
@@ -731,7 +731,7 @@ def check_drawn_place(eccentricity: object, tilt: object) -> None:
     given, other = "tilt", "eccentricity"
     if tilt is None:
         given, other = other, given
-    reject_if(
+    refuse_key_if(
         (eccentricity is None) != (tilt is None),
         ("shots", given),
         got=f"{given} without {other}, and a guide",
@@ -786,7 +786,7 @@ def check_noise(case: ImpactSections | ValveSections) -> None:
         check_surface(case, key, surface)
         if surface.body in held:
             continue
-        reject_if(
+        refuse_key_if(
             surface.body == _moving(case),
             key,
             got=f"'{surface}', but nothing holds '{surface.body}'",
@@ -814,7 +814,7 @@ def _check_mounts(case: ImpactSections | ValveSections, noise: CaseNoise) -> Non
         supports = [support.surface for support in case.bodies[place.body].fixed or ()]
         held = [f"{place.body}.{surface}" for surface in supports]
         on_mount = key[1] == "mounts"
-        reject_if(
+        refuse_key_if(
             (on_mount and place.surface not in supports) or not supports,
             key,
             got=f"'{place}', which nothing holds",
@@ -832,7 +832,7 @@ def _check_mounts(case: ImpactSections | ValveSections, noise: CaseNoise) -> Non
             taken[place] = str(key[2])
     for body in {place.body for place in taken}:
         for support in case.bodies[body].fixed or ():
-            reject_if(
+            refuse_key_if(
                 SurfaceName(body, support.surface) not in taken,
                 ("noise", "mounts"),
                 got=f"no mount at '{body}.{support.surface}', which is held",
@@ -847,7 +847,7 @@ def _check_mounts(case: ImpactSections | ValveSections, noise: CaseNoise) -> Non
         key = ("noise", "passages", name)
         require_known(key, name, components, "component of the network")
     for word in ("reactions", "passages"):
-        reject_if(
+        refuse_key_if(
             getattr(noise, word) and not noise.mounts,
             ("noise", word),
             got=f"{word} without mounts",
@@ -866,7 +866,7 @@ def _check_machine(case: ImpactSections | ValveSections, noise: CaseNoise) -> No
         "indicators": (noise.indicators, "receiver", noise.receiver),
     }
     for name, (given, needed, there) in without.items():
-        reject_if(
+        refuse_key_if(
             given and not there,
             ("noise", name),
             got=f"{name} without {needed}",
@@ -880,7 +880,7 @@ def _check_machine(case: ImpactSections | ValveSections, noise: CaseNoise) -> No
     if receiver is None:
         return
     for name in ("mount", "plate"):
-        reject_if(
+        refuse_key_if(
             getattr(noise, name) is not None,
             ("noise", name),
             got=f"{name} beside a receiver",
@@ -893,7 +893,7 @@ def _check_machine(case: ImpactSections | ValveSections, noise: CaseNoise) -> No
         key = ("noise", "receiver", kind, "material")
         require_known(key, receiver.is_plate.material, case.materials, "material")
     body = receiver.body
-    reject_if(
+    refuse_key_if(
         body is not None and body.inertia is None and len(noise.mounts or {}) > 1,
         ("noise", "receiver", "body"),
         got="no inertia of a body below several mounts",

@@ -5,7 +5,7 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from klack.input.problem import reject_if
+from klack.input.problem import refuse_key_if
 from klack.input.section import Count, InputPath, Name, Section, Text
 from klack.input.unit_systems import UnitSystemName
 from klack.units import Mass
@@ -65,7 +65,7 @@ class ReducedModel(Section):
 
     @model_validator(mode="after")
     def _stored_in_si(self) -> Self:
-        reject_if(
+        refuse_key_if(
             self.kind == "klack" and self.units.name != "m kg s",
             ("units",),
             got=f"'{self.units.name}'",

@@ -8,7 +8,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from klack.errors import InputError
-from klack.input.problem import CaseProblem, Key, reject_if
+from klack.input.problem import CaseProblem, Key, refuse_key_if
 from klack.input.section import Count, InputPath, Name, Number, Section
 from klack.mesh.profile import Arc, Line, Profile
 from klack.units import LENGTH, Angle, Length, LengthUnit, format_si
@@ -71,7 +71,7 @@ class Outline(Section):
     @model_validator(mode="after")
     def _close_is_last(self) -> Self:
         for i, edge in enumerate(self.edges[:-1]):
-            reject_if(
+            refuse_key_if(
                 edge.close,
                 ("edges", i, "close"),
                 got=f"close at edge {i + 1} of {len(self.edges)}",
@@ -238,7 +238,7 @@ class Geometry(Section):
             "mesh": ("solid", "axisymmetric"),
             "nodes": ("solid", "axisymmetric"),
         }[kind]
-        reject_if(
+        refuse_key_if(
             kind == "profile" and self.model is None,
             (),
             got="a profile without model",

@@ -25,7 +25,7 @@ from klack.case.study import CaseStudy
 from klack.contact.face_form import STEEPEST, Waves
 from klack.contact.friction import MOST_FRICTION, Friction
 from klack.contact.worn_faces import WornFaces
-from klack.input.problem import CaseProblem, reject_if
+from klack.input.problem import CaseProblem, refuse_key_if
 from klack.input.section import Count, Name, Section
 from klack.units import (
     Angle,
@@ -225,7 +225,7 @@ class FaceRoughness(Section):
             )
         points = ((0.0, 0.0), *self.curve) if self.curve[:1] != ((0.0, 0.0),) else self.curve
         rises = all(b[0] > a[0] and b[1] > a[1] for a, b in pairwise(points))
-        reject_if(
+        refuse_key_if(
             len(points) < 2 or not rises,
             ("curve",),
             got=f"{len(self.curve)} pairs that do not rise from 0",
@@ -322,7 +322,7 @@ class CaseWorn(Section):
 
     @model_validator(mode="after")
     def _a_profile(self) -> Self:
-        reject_if(
+        refuse_key_if(
             len(self.opening) != len(self.radius),
             ("opening",),
             got=f"{len(self.opening)} values for {len(self.radius)} radii",

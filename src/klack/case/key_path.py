@@ -11,7 +11,7 @@ from klack.case.distribution import Distribution
 from klack.case.origin import ExpandedCase
 from klack.case.parameters import ParameterValue
 from klack.errors import InputError
-from klack.input.problem import CaseProblem, Key, nearest, one_of, reject_if
+from klack.input.problem import CaseProblem, Key, nearest, one_of, refuse_key_if
 from klack.input.section import Section
 from klack.units import RATIO, Kind, parse_quantity
 
@@ -60,7 +60,7 @@ class Quantity:
 def split_path(text: str) -> Key:
     """``a.b.0.c`` as ``("a", "b", 0, "c")``; list entries count from 0."""
     parts = text.split(".")
-    reject_if(
+    refuse_key_if(
         not all(part.strip() == part and part for part in parts),
         (),
         got=f"'{text}'",
@@ -132,14 +132,14 @@ def _require_of_case(case: Section, key: Key) -> None:
         return
     place = ".".join(map(str, key))
     copy = found.origin(key).copy
-    reject_if(
+    refuse_key_if(
         copy,
         (),
         got=f"'{place}', which stands in the part '{copy}'",
         expected="a key of the case itself",
         hint="make it a parameter of the part, and name include.N.with.PARAMETER (N from 0).",
     )
-    reject_if(
+    refuse_key_if(
         not found.behind(key),
         (),
         got=f"'{place}', which no value of the case follows from",

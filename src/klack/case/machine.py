@@ -5,7 +5,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
-from klack.input.problem import CaseProblem, Key, reject_if
+from klack.input.problem import CaseProblem, Key, refuse_key_if
 from klack.input.section import Count, InputPath, Name, Number, Section, Text
 from klack.input.unit_systems import UnitSystemName
 from klack.units import DampingCoefficient, Inertia, Length, Mass, Ratio, Stiffness
@@ -63,7 +63,7 @@ class NoiseElement(Section):
         if self._exactly_one(("stiffness", "file"), "how stiff it is") == "file":
             self._refuse_with(("damping",), "a file", "the file holds the losses")
         for direction in self.damping or {}:
-            reject_if(
+            refuse_key_if(
                 direction not in (self.stiffness or {}),
                 ("damping", direction),
                 got=f"damping along {direction}, in which the element is rigid",
@@ -141,7 +141,7 @@ class NoiseMatrices(Section):
     @model_validator(mode="after")
     def _freedoms(self) -> Self:
         for name in self.rows:
-            reject_if(
+            refuse_key_if(
                 "." not in name,
                 ("rows", name),
                 got=f"'{name}'",
@@ -219,7 +219,7 @@ class NoiseReceiver(Section):
         kind = self._exactly_one(kinds, "what the machine is")
         if kind != "file":
             for name in ("points", "quantity", "offset"):
-                reject_if(
+                refuse_key_if(
                     name in self.model_fields_set and (name != "points" or self.pressures is None),
                     (name,),
                     got=f"{name} together with {kind}",
@@ -227,7 +227,7 @@ class NoiseReceiver(Section):
                     hint=f"remove {name}.",
                     on_key=True,
                 )
-            reject_if(
+            refuse_key_if(
                 isinstance(self.axes, dict),
                 ("axes",),
                 got=f"axes by mount together with {kind}",

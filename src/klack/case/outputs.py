@@ -6,7 +6,7 @@ from typing import Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from klack.bodies.gauges.gauge import GaugeKind
-from klack.input.problem import CaseProblem, reject_if
+from klack.input.problem import CaseProblem, refuse_key_if
 from klack.input.section import Count, Name, Number, Section
 from klack.signals.low_pass import LowPass
 from klack.units import Frequency, Length
@@ -75,7 +75,7 @@ class CaseOutput(Section):
 
     @model_validator(mode="after")
     def _has_kind(self) -> Self:
-        reject_if(
+        refuse_key_if(
             self.direction == "around" and self.kind in ("displacement", "velocity"),
             ("direction",),
             got=f"'around' for a {self.kind}",
@@ -107,7 +107,7 @@ def check_outputs(
     """
     names: set[str] = set()
     for i, output in enumerate(outputs):
-        reject_if(
+        refuse_key_if(
             output.name in names,
             ("outputs", i, "name"),
             got=f"'{output.name}' twice",
@@ -123,7 +123,7 @@ def check_outputs(
             if isinstance(output.direction, str)
             else len(output.direction) == dimension
         )
-        reject_if(
+        refuse_key_if(
             other,
             ("outputs",),
             got=f"outputs together with '{other}'",

@@ -12,7 +12,7 @@ from klack.case.distribution import (
     RatioDistribution,
 )
 from klack.contact.friction import MOST_FRICTION
-from klack.input.problem import CaseProblem, reject_if
+from klack.input.problem import CaseProblem, refuse_key_if
 from klack.input.section import Count, Section
 from klack.units import Time, format_si
 
@@ -39,7 +39,7 @@ class Waviness(Section):
     @model_validator(mode="after")
     def _ordered(self) -> Self:
         low, high = self.harmonics
-        reject_if(
+        refuse_key_if(
             not 2 <= low <= high <= _HIGHEST_HARMONIC,
             ("harmonics",),
             got=f"[{low}, {high}]",

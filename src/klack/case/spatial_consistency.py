@@ -8,7 +8,7 @@ from klack.case.consistency import check_surface
 from klack.case.valve_roles import END_STOP, FLEXIBLE_BODY, Meeting, ValveRoles
 from klack.case.valve_sections import ValveSections
 from klack.errors import InputError
-from klack.input.problem import CaseProblem, Key, one_of, reject_if
+from klack.input.problem import CaseProblem, Key, one_of, refuse_key_if
 from klack.network.across import OffAxisPart
 from klack.network.component import Component
 from klack.units import format_si
@@ -34,7 +34,7 @@ def check_off_axis(case: ValveSections, needle: str) -> None:
         points = getattr(case.network.components[needle], "points", ())
         at = {f"{needle}.{point}" for point in points}
         own = f"{name}.{part.port}"
-        reject_if(
+        refuse_key_if(
             not any(own in link and at & set(link) for link in case.network.connections),
             key,
             got=f"'{own}', which is not connected to '{needle}'",
@@ -71,7 +71,7 @@ def check_motion(case: ValveSections, meetings: Mapping[str, Meeting], roles: Va
     """Reject the first thing that a motion in space cannot have."""
     if case.motion == "axial":
         for key in ("guide", "guides", "placement"):
-            reject_if(
+            refuse_key_if(
                 getattr(case, key),
                 (key,),
                 got=f"'{key}' of a needle that moves along its axis",
@@ -87,14 +87,14 @@ def check_motion(case: ValveSections, meetings: Mapping[str, Meeting], roles: Va
     parts = case.network.components
     for name, part in parts.items():
         at: Key = ("network", "components", name)
-        reject_if(
+        refuse_key_if(
             part.type in _MOVES,
             at,
             got=f"a {part.type} in a motion in three dimensions",
             expected=f"bodies with all their freedoms: {{type: {FLEXIBLE_BODY}}}",
             hint="draw it as a body, or use motion: axial.",
         )
-        reject_if(
+        refuse_key_if(
             part.type in _FRICTION,
             at,
             got="friction along the axis beside a motion in three dimensions",
@@ -108,7 +108,7 @@ def check_motion(case: ValveSections, meetings: Mapping[str, Meeting], roles: Va
     _check_ends(case, meetings, roles)
     _check_placement(case)
     check_off_axis(case, roles.needle)
-    reject_if(
+    refuse_key_if(
         case.reduction.correction != "consistent",
         ("reduction", "correction"),
         got=f"'{case.reduction.correction}' with motion: three-dimensional",
@@ -116,7 +116,7 @@ def check_motion(case: ValveSections, meetings: Mapping[str, Meeting], roles: Va
         hint="leave it out: contact points carry what the modes miss.",
     )
     for variant in case.run.variants:
-        reject_if(
+        refuse_key_if(
             variant.endswith("lumped"),
             ("run", "variants"),
             got=f"the variant '{variant}' with motion: three-dimensional",
@@ -138,7 +138,7 @@ def _check_bodies(case: ValveSections) -> None:
             f"for '{solid[0]}' if it is a turned part.",
         )
     for name in flat:
-        reject_if(
+        refuse_key_if(
             case.bodies[name].matrices is not None,
             ("bodies", name, "matrices"),
             got=f"the axial motion of '{name}' with motion: three-dimensional",
@@ -151,7 +151,7 @@ def _check_bodies(case: ValveSections) -> None:
 
 
 def _refuse_angles(case: ValveSections, what: str) -> None:
-    reject_if(
+    refuse_key_if(
         case.angles is not None,
         ("angles",),
         got=what,
@@ -163,14 +163,14 @@ def _refuse_angles(case: ValveSections, what: str) -> None:
 
 def _check_stop(case: ValveSections, name: str, part: Component) -> None:
     key: Key = ("network", "components", name)
-    reject_if(
+    refuse_key_if(
         name not in case.stops,
         key,
         got=f"the end stop '{name}' without surfaces",
         expected=f"its two surfaces: stops: {{{name}: {{between: ...}}}}",
         hint="in three dimensions every stop is touched point by point.",
     )
-    reject_if(
+    refuse_key_if(
         getattr(getattr(part, "law", None), "kind", "") != "consistent",
         (*key, "law"),
         got="a law of its own, which contact point by point would replace",
@@ -186,7 +186,7 @@ def _check_stop(case: ValveSections, name: str, part: Component) -> None:
             hint="leave it out, or use motion: axial.",
         )
     stop = case.stops[name]
-    reject_if(
+    refuse_key_if(
         stop.worn is not None,
         ("stops", name, "worn"),
         got="'worn' with motion: three-dimensional",
@@ -211,14 +211,14 @@ def _check_ends(case: ValveSections, meetings: Mapping[str, Meeting], roles: Val
                 hint="remove it, or draw what it hits as a body with 'fixed'.",
             )
     for name in _drawn(case):
-        reject_if(
+        refuse_key_if(
             name not in used,
             ("network", "components", name),
             got=f"the body '{name}', which touches nothing",
             expected="the needle and what it hits with motion: three-dimensional",
             hint="remove it, or give it an end stop.",
         )
-    reject_if(
+    refuse_key_if(
         case.shots is not None and case.shots.carry and len(free) > 1,
         ("shots", "carry"),
         got=f"strokes that begin where the one before has ended, and {len(free)} bodies that move",
@@ -247,7 +247,7 @@ def _check_guides(case: ValveSections, needle: str, free: list[str]) -> None:
     if case.guide is not None:
         check_surface(case, ("guide", "surface"), _surface(needle, case.guide.surface))
     for name, guide in case.guides.items():
-        reject_if(
+        refuse_key_if(
             name not in others,
             ("guides", name),
             got=f"a guide of '{name}'",
@@ -261,7 +261,7 @@ def _check_guides(case: ValveSections, needle: str, free: list[str]) -> None:
         if guide.on is None:
             continue
         below = case.guides.get(guide.on.body)
-        reject_if(
+        refuse_key_if(
             guide.on.body not in free or guide.on.body == name or (below and below.on),
             ("guides", name, "on"),
             got=f"'{guide.on}', a body that is held, slides itself on another, or is '{name}'",
@@ -276,7 +276,7 @@ def _check_placement(case: ValveSections) -> None:
     at = case.placement
     if at is None or at.seed is None:
         return
-    reject_if(
+    refuse_key_if(
         not at.is_centred,
         ("placement", "seed"),
         got="a seed beside a given position",

@@ -7,7 +7,7 @@ from pydantic import BeforeValidator, Field, Strict, model_validator
 
 from klack.case.levels import Level, Variant
 from klack.case.parameters import as_written
-from klack.input.problem import one_of, reject_if
+from klack.input.problem import one_of, refuse_key_if
 from klack.input.section import Count, InputPath, Number, Section, Text
 
 __all__ = [
@@ -67,7 +67,7 @@ class StudyParameter(Section):
             "fixed": self.fixed,
         }
         found = [name for name, value in given.items() if value is not None]
-        reject_if(
+        refuse_key_if(
             found not in (["from", "to"], ["normal"], ["values"], ["fixed"]),
             (),
             got=f"the keys {one_of(found)}" if found else "no values",
@@ -75,7 +75,7 @@ class StudyParameter(Section):
             "{values: [8 N, 12 N]}, {fixed: 12 N}",
             hint="a range has both ends." if len(found) < 2 else f"keep one of {one_of(found)}.",
         )
-        reject_if(
+        refuse_key_if(
             self.scale == "log" and found != ["from", "to"],
             ("scale",),
             got="log without a range",
@@ -117,7 +117,7 @@ class StudyDesign(Section):
 
     @model_validator(mode="after")
     def _file(self) -> Self:
-        reject_if(
+        refuse_key_if(
             (self.kind == "file") != (self.file is not None),
             ("kind",),
             got=f"kind: {self.kind}" + (" with a file" if self.file else " without a file"),
@@ -138,7 +138,7 @@ class StudyLimit(Section):
 
     @model_validator(mode="after")
     def _some(self) -> Self:
-        reject_if(
+        refuse_key_if(
             self.most is None and self.least is None,
             (),
             got="no bound",

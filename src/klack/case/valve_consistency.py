@@ -14,7 +14,7 @@ from klack.case.spatial_consistency import check_motion
 from klack.case.thermal import CaseThermal
 from klack.case.valve_roles import END_STOP, FLEXIBLE_BODY, Meeting, find_meetings, find_roles
 from klack.case.valve_sections import ValveSections
-from klack.input.problem import CaseProblem, Key, nearest, one_of, reject_if
+from klack.input.problem import CaseProblem, Key, nearest, one_of, refuse_key_if
 from klack.network.component import Component
 from klack.network.described import kind_of_field
 from klack.network.port import Role
@@ -29,7 +29,7 @@ def check_shots_of_valve(case: ValveSections) -> None:
     if shots is None:
         return
     placed = case.placement is not None
-    reject_if(
+    refuse_key_if(
         case.motion == "axial",
         ("shots",),
         got="shots of a needle that moves along its axis",
@@ -46,7 +46,7 @@ def check_shots_of_valve(case: ValveSections) -> None:
             on_key=True,
         )
     check_drawn_place(shots.eccentricity, shots.tilt)
-    reject_if(
+    refuse_key_if(
         placed and not shots.carry,
         ("placement",),
         got="a placement beside shots, each of which has one of its own",
@@ -55,7 +55,7 @@ def check_shots_of_valve(case: ValveSections) -> None:
         "the first stroke starts from it.",
         on_key=True,
     )
-    reject_if(
+    refuse_key_if(
         placed and shots.draws_position,
         ("shots", "eccentricity"),
         got="a drawn position beside a placement",
@@ -71,7 +71,7 @@ def check_valve(case: ValveSections) -> None:
         require_surfaces(case, name)
         check_body(case, name)
         _check_ports(case, name)
-        reject_if(
+        refuse_key_if(
             case.bodies[name].non_reflecting is not None,
             ("bodies", name, "non_reflecting"),
             got="a non-reflecting end of a body of a valve",
@@ -82,7 +82,7 @@ def check_valve(case: ValveSections) -> None:
     for name in case.reduction.modes:
         require_known(("reduction", "modes", name), name, case.bodies, "body", on_key=True)
     check_shifts(case, case.reduction)
-    reject_if(
+    refuse_key_if(
         case.reduction.shifts and case.reduction.correction != "attachment",
         ("reduction", "shifts"),
         got=f"shifts of attachment modes with the correction '{case.reduction.correction}'",
@@ -100,7 +100,7 @@ def check_valve(case: ValveSections) -> None:
     _check_worn(case)
     if case.lumped is None:
         for variant in case.run.variants:
-            reject_if(
+            refuse_key_if(
                 variant.endswith("lumped"),
                 ("run", "variants"),
                 got=f"the variant '{variant}' without a section 'lumped'",
@@ -119,7 +119,7 @@ def _check_ports(case: ValveSections, name: str) -> None:
         if profile is None:
             continue
         require_known((*key, "surface"), place.surface, profile.surfaces, f"surface of {name}")
-        reject_if(
+        refuse_key_if(
             port in profile.surfaces and port != place.surface,
             key,
             got=f"the name of the surface '{port}' for a port on '{place.surface}'",
@@ -151,7 +151,7 @@ def _check_flexible_bodies(case: ValveSections) -> None:
             if known is not None:
                 require_known((*key, "points", i), point, known, f"surface or port of {body}")
     for body in case.bodies:
-        reject_if(
+        refuse_key_if(
             body not in used,
             ("bodies", body),
             got=f"a body '{body}' that the network does not use",
@@ -173,14 +173,14 @@ def _check_stop(case: ValveSections, name: str, meetings: dict[str, Meeting]) ->
     for i, surface in enumerate(stop.between):
         check_surface(case, (*key, "between", i), surface)
         for other, rival in case.stops.items():
-            reject_if(
+            refuse_key_if(
                 other != name and surface in rival.between,
                 (*key, "between", i),
                 got=f"{surface}, which the stop '{other}' uses as well",
                 expected="a surface for each stop",
                 hint="split the edge in the drawing.",
             )
-    reject_if(
+    refuse_key_if(
         stop.upper.body == stop.lower.body,
         (*key, "between"),
         got=f"{stop.upper} and {stop.lower}, two surfaces of one body",
@@ -216,7 +216,7 @@ def _check_laws(case: ValveSections) -> None:
     for name, part in case.network.components.items():
         if part.type != END_STOP or not is_consistent(part):
             continue
-        reject_if(
+        refuse_key_if(
             name not in case.stops,
             ("network", "components", name, "law"),
             got="a consistent law, but no surfaces to compute it from",
@@ -231,7 +231,7 @@ def _check_laws(case: ValveSections) -> None:
                 expected="no series compliance: that law comes with its own",
                 hint="leave it out, or give the end stop a linear law.",
             )
-        reject_if(
+        refuse_key_if(
             case.reduction.correction != "consistent",
             ("reduction", "correction"),
             got=f"'{case.reduction.correction}' with the consistent law of '{name}'",
@@ -267,7 +267,7 @@ def _check_friction(case: ValveSections) -> None:
 def _check_worn(case: ValveSections) -> None:
     """Worn faces are those of a computed law."""
     for name, stop in case.stops.items():
-        reject_if(
+        refuse_key_if(
             stop.worn is not None and not is_consistent(case.network.components[name]),
             ("stops", name, "worn"),
             got="worn faces at an end stop whose law is not computed",
@@ -293,7 +293,7 @@ def check_thermal(case: ValveSections) -> None:
         return
     parts = case.network.components
     nodes = [name for name, part in parts.items() if _role(part) in _NODES]
-    reject_if(
+    refuse_key_if(
         not nodes,
         ("thermal",),
         got="no thermal node in the network",
@@ -311,7 +311,7 @@ def check_thermal(case: ValveSections) -> None:
             hint="a stroke has to end before the next one begins; shorten run.duration.",
         )
     _check_heat(thermal, parts)
-    reject_if(
+    refuse_key_if(
         thermal.fluid is not None and case.network.fluid is None,
         ("thermal", "fluid"),
         got="a node for the fluid of a dry valve",
@@ -374,7 +374,7 @@ def _check_heat(thermal: CaseThermal, parts: Mapping[str, Component]) -> None:
         require_known(key, component, list(parts.keys()), "component")
         for other in shares:
             same = other.split(" ")[0] == component and other != sent.loss
-            reject_if(
+            refuse_key_if(
                 same and component in (other, sent.loss),
                 key,
                 got=f"'{sent.loss}' beside '{other}', which counts some heat twice",

@@ -5,7 +5,7 @@ from difflib import get_close_matches
 
 from klack.errors import InputError
 
-__all__ = ["CaseProblem", "Key", "nearest", "one_of", "reject_if"]
+__all__ = ["CaseProblem", "Key", "nearest", "one_of", "refuse_key_if"]
 
 Key = tuple[str | int, ...]
 
@@ -28,7 +28,7 @@ class CaseProblem(InputError):
         super().__init__(key_text(key) or "case", got=got, expected=expected, hint=hint)
 
 
-def reject_if(
+def refuse_key_if(
     wrong: object, key: Key, *, got: str, expected: str, hint: str, on_key: bool = False
 ) -> None:
     """Raise :class:`CaseProblem` where something in a case cannot be used."""

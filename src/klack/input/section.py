@@ -23,8 +23,8 @@ from pydantic.fields import FieldInfo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from klack.errors import InputError
-from klack.input.problem import CaseProblem, nearest, one_of
+from klack.errors import InputError, refuse_if
+from klack.input.problem import CaseProblem, nearest, one_of, refuse_key_if
 
 __all__ = [
     "Computed",
@@ -150,14 +150,14 @@ class Section(BaseModel):
     def _refuse_with(self, names: tuple[str, ...], chosen: str, why: str) -> Self:
         """Raise if one of ``names`` is given, for which ``chosen`` has no use."""
         for name in names:
-            if getattr(self, name) is not None:
-                raise CaseProblem(
-                    (name,),
-                    got=f"{name} together with {chosen}",
-                    expected=f"no {name}: {why}",
-                    hint=f"remove {name}.",
-                    on_key=True,
-                )
+            refuse_key_if(
+                getattr(self, name) is not None,
+                (name,),
+                got=f"{name} together with {chosen}",
+                expected=f"no {name}: {why}",
+                hint=f"remove {name}.",
+                on_key=True,
+            )
         return self
 
 
@@ -209,13 +209,13 @@ def refuse_lfs_pointer(path: Path) -> None:
             start = stream.read(len(_LFS_POINTER))
     except OSError:
         return
-    if start == _LFS_POINTER:
-        raise InputError(
-            str(path),
-            got="a git-LFS pointer: a placeholder for a file that was not downloaded",
-            expected="the file itself",
-            hint="run 'git lfs pull' in its repository, or download the file by hand.",
-        )
+    refuse_if(
+        start == _LFS_POINTER,
+        str(path),
+        got="a git-LFS pointer: a placeholder for a file that was not downloaded",
+        expected="the file itself",
+        hint="run 'git lfs pull' in its repository, or download the file by hand.",
+    )
 
 
 def instead_of_file(path: Path) -> str:

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, WithJsonSchema
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 
 __all__ = ["UNIT_SYSTEMS", "UnitSystem", "UnitSystemName", "unit_system"]
 
@@ -69,13 +69,13 @@ def unit_system(name: str, where: str = "units") -> UnitSystem:
     1.0
     """
     words = " ".join(str(name).replace("-", " ").replace(",", " ").replace("_", " ").split())
-    if words not in UNIT_SYSTEMS:
-        raise InputError(
-            where,
-            got=f"'{name}'",
-            expected=f"one of: {', '.join(UNIT_SYSTEMS)}",
-            hint="use 'mm t s' for a model in mm, N and MPa, 'm kg s' for one in SI.",
-        )
+    refuse_if(
+        words not in UNIT_SYSTEMS,
+        where,
+        got=f"'{name}'",
+        expected=f"one of: {', '.join(UNIT_SYSTEMS)}",
+        hint="use 'mm t s' for a model in mm, N and MPa, 'm kg s' for one in SI.",
+    )
     return UNIT_SYSTEMS[words]
 
 
