@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from klack.hydraulics.network_fluid import fixed_viscosity
 from klack.hydraulics.opening import OpeningComponent, opening_flow, ramp
-from klack.input.problem import CaseProblem
+from klack.input.problem import refuse_key_if
 from klack.network.port import FLOW, Port
 from klack.network.rows import Channel, Rows
 from klack.network.step_function import step_function
@@ -71,21 +71,21 @@ class CheckValve(OpeningComponent):
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         self._exactly_one(("diameter", "area"), "size when fully open")
-        if self.open_pressure <= self.cracking_pressure:
-            raise CaseProblem(
-                ("open_pressure",),
-                got=f"{self.open_pressure:g} Pa at a cracking pressure of "
-                f"{self.cracking_pressure:g} Pa",
-                expected="more than the cracking pressure",
-                hint="give the pressure difference at which the poppet meets its stop.",
-            )
-        if self.leak_area >= self.open_area:
-            raise CaseProblem(
-                ("leak_area",),
-                got=f"{self.leak_area:g} m^2 of {self.open_area:g} m^2 when open",
-                expected="less than the area when open",
-                hint="a leak is 0 to 1 um^2.",
-            )
+        refuse_key_if(
+            self.open_pressure <= self.cracking_pressure,
+            ("open_pressure",),
+            got=f"{self.open_pressure:g} Pa at a cracking pressure of "
+            f"{self.cracking_pressure:g} Pa",
+            expected="more than the cracking pressure",
+            hint="give the pressure difference at which the poppet meets its stop.",
+        )
+        refuse_key_if(
+            self.leak_area >= self.open_area,
+            ("leak_area",),
+            got=f"{self.leak_area:g} m^2 of {self.open_area:g} m^2 when open",
+            expected="less than the area when open",
+            hint="a leak is 0 to 1 um^2.",
+        )
         return self
 
     @property

@@ -17,7 +17,7 @@ from klack.hydraulics.opening import OpeningComponent
 from klack.hydraulics.orifice import NOT_CHOKED
 from klack.hydraulics.pressure_face import PressureFace
 from klack.hydraulics.seat import gap_pass
-from klack.input.problem import CaseProblem
+from klack.input.problem import CaseProblem, refuse_key_if
 from klack.machine.compiling.jit import inner
 from klack.network.port import ELEMENT, FLOW, Port, Role
 from klack.network.rows import Channel, Rows
@@ -185,48 +185,48 @@ class ConicalSeat(OpeningComponent):
 
     def _check_angles(self) -> None:
         seat = degrees(self.half_angle)
-        if self.half_angle >= pi / 2:
-            raise CaseProblem(
-                ("half_angle",),
-                got=f"{seat:g} deg",
-                expected="less than 90 deg, measured from the axis",
-                hint="half of the angle in a drawing; a flat seat is a seat with shape: flat.",
-            )
-        if self.tip_half_angle <= self.half_angle:
-            raise CaseProblem(
-                ("tip_half_angle",),
-                got=f"{degrees(self.tip_half_angle):g} deg",
-                expected=f"more than the {seat:g} deg of the seat: the tip must leave it below "
-                "the edge",
-                hint="swap both angles; a tip that is steeper than its seat touches the upper end "
-                "of the seat: that is a seat with shape: cone.",
-            )
-        if self.shank_half_angle >= self.half_angle:
-            raise CaseProblem(
-                ("shank_half_angle",),
-                got=f"{degrees(self.shank_half_angle):g} deg",
-                expected=f"less than the {seat:g} deg of the seat: the shank must leave it above "
-                "the edge",
-                hint="0 deg is a cylinder; angles are measured from the axis.",
-            )
+        refuse_key_if(
+            self.half_angle >= pi / 2,
+            ("half_angle",),
+            got=f"{seat:g} deg",
+            expected="less than 90 deg, measured from the axis",
+            hint="half of the angle in a drawing; a flat seat is a seat with shape: flat.",
+        )
+        refuse_key_if(
+            self.tip_half_angle <= self.half_angle,
+            ("tip_half_angle",),
+            got=f"{degrees(self.tip_half_angle):g} deg",
+            expected=f"more than the {seat:g} deg of the seat: the tip must leave it below "
+            "the edge",
+            hint="swap both angles; a tip that is steeper than its seat touches the upper end "
+            "of the seat: that is a seat with shape: cone.",
+        )
+        refuse_key_if(
+            self.shank_half_angle >= self.half_angle,
+            ("shank_half_angle",),
+            got=f"{degrees(self.shank_half_angle):g} deg",
+            expected=f"less than the {seat:g} deg of the seat: the shank must leave it above "
+            "the edge",
+            hint="0 deg is a cylinder; angles are measured from the axis.",
+        )
         chamfer = self.chamfer_half_angle
         if chamfer is None:
             return
-        if not self.shank_half_angle < chamfer < self.tip_half_angle:
-            raise CaseProblem(
-                ("chamfer_half_angle",),
-                got=f"{degrees(chamfer):g} deg",
-                expected=f"between those of shank and tip, {degrees(self.shank_half_angle):g} and "
-                f"{degrees(self.tip_half_angle):g} deg",
-                hint="measured from the axis, like all of them.",
-            )
-        if abs(chamfer - self.half_angle) < _PARALLEL:
-            raise CaseProblem(
-                ("chamfer_half_angle",),
-                got=f"{degrees(chamfer):g} deg, parallel to the seat",
-                expected="another angle than that of the seat: a land has no sealing diameter",
-                hint="a parallel land is a seat with shape: cone, its land_width and a land-face.",
-            )
+        refuse_key_if(
+            not self.shank_half_angle < chamfer < self.tip_half_angle,
+            ("chamfer_half_angle",),
+            got=f"{degrees(chamfer):g} deg",
+            expected=f"between those of shank and tip, {degrees(self.shank_half_angle):g} and "
+            f"{degrees(self.tip_half_angle):g} deg",
+            hint="measured from the axis, like all of them.",
+        )
+        refuse_key_if(
+            abs(chamfer - self.half_angle) < _PARALLEL,
+            ("chamfer_half_angle",),
+            got=f"{degrees(chamfer):g} deg, parallel to the seat",
+            expected="another angle than that of the seat: a land has no sealing diameter",
+            hint="a parallel land is a seat with shape: cone, its land_width and a land-face.",
+        )
 
     def _check_edge(self) -> None:
         start, blunt = 2e3 * self.contour.edge_start, 1e3 * self.tip_diameter
@@ -240,15 +240,15 @@ class ConicalSeat(OpeningComponent):
                 hint=f"make {name} smaller.",
             )
         seal = self.sealing_diameter
-        if not self.lower_diameter < seal < self.upper_diameter:
-            raise CaseProblem(
-                ("edge_diameter",),
-                got=f"a needle that meets the cone at {1e3 * seal:g} mm",
-                expected=f"between the ends of the seat, {1e3 * self.lower_diameter:g} and "
-                f"{1e3 * self.upper_diameter:g} mm",
-                hint="check the diameters and their units; an end of the seat that seals is a seat "
-                "with shape: cone.",
-            )
+        refuse_key_if(
+            not self.lower_diameter < seal < self.upper_diameter,
+            ("edge_diameter",),
+            got=f"a needle that meets the cone at {1e3 * seal:g} mm",
+            expected=f"between the ends of the seat, {1e3 * self.lower_diameter:g} and "
+            f"{1e3 * self.upper_diameter:g} mm",
+            hint="check the diameters and their units; an end of the seat that seals is a seat "
+            "with shape: cone.",
+        )
 
     @property
     def contour(self) -> NeedleContour:

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from klack.errors import InputError, MissingExtraError
+from klack.errors import InputError, MissingExtraError, refuse_if
 from klack.hydraulics.fluid_definition import FluidDefinition, FluidState
 from klack.hydraulics.liquid import ATMOSPHERE
 from klack.hydraulics.property_table import CompressedLiquid
@@ -127,14 +127,14 @@ def _tabulated(name: str, temperature: float) -> FluidState:
         pressure.append(float(p))
         density.append(rho)
         fall.append(1.0 / (rho * c * c))
-    if not pressure or pressure[-1] < _LEAST:
-        raise InputError(
-            f"fluid '{name}': temperature",
-            got=f"{temperature - 273.15:g} degC, where its equation of state does not reach "
-            f"{_LEAST / 1e5:g} bar",
-            expected="a liquid",
-            hint="choose another temperature or fluid.",
-        )
+    refuse_if(
+        not pressure or pressure[-1] < _LEAST,
+        f"fluid '{name}': temperature",
+        got=f"{temperature - 273.15:g} degC, where its equation of state does not reach "
+        f"{_LEAST / 1e5:g} bar",
+        expected="a liquid",
+        hint="choose another temperature or fluid.",
+    )
     base, slope = _viscosity(state, name, temperature, start)
     return FluidState(
         liquid=CompressedLiquid(name, pressure, density[0], fall),

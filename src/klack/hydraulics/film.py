@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from klack.errors import InputError
 from klack.hydraulics.network_fluid import network_fluid
-from klack.input.problem import CaseProblem
+from klack.input.problem import CaseProblem, refuse_key_if
 from klack.input.section import Section
 from klack.network.ranges import value_text
 from klack.network.rows import FilmRow, Rows
@@ -233,13 +233,13 @@ class RingFilm(Film):
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
-        if self.outer_radius <= self.inner_radius:
-            raise CaseProblem(
-                ("outer_radius",),
-                got=format_si(self.outer_radius, "m"),
-                expected=f"more than the inner radius, {format_si(self.inner_radius, 'm')}",
-                hint="swap them, or check their units.",
-            )
+        refuse_key_if(
+            self.outer_radius <= self.inner_radius,
+            ("outer_radius",),
+            got=format_si(self.outer_radius, "m"),
+            expected=f"more than the inner radius, {format_si(self.inner_radius, 'm')}",
+            hint="swap them, or check their units.",
+        )
         return self
 
     @property
@@ -275,13 +275,13 @@ class ConeFilm(Film):
 
     @model_validator(mode="after")
     def _narrow(self) -> Self:
-        if 0.5 * self.width * sin(self.half_angle) >= self.mean_radius:
-            raise CaseProblem(
-                ("width",),
-                got=format_si(self.width, "m"),
-                expected=f"less than the cone at a mean radius {format_si(self.mean_radius, 'm')}",
-                hint="the land must not reach the axis; check radius (not diameter) and width.",
-            )
+        refuse_key_if(
+            0.5 * self.width * sin(self.half_angle) >= self.mean_radius,
+            ("width",),
+            got=format_si(self.width, "m"),
+            expected=f"less than the cone at a mean radius {format_si(self.mean_radius, 'm')}",
+            hint="the land must not reach the axis; check radius (not diameter) and width.",
+        )
         return self
 
     @property
@@ -325,21 +325,21 @@ class SphereFilm(Film):
 
     @model_validator(mode="after")
     def _curved(self) -> Self:
-        if self.face_radius > self.radius:
-            raise CaseProblem(
-                ("edge_radius",),
-                got=format_si(self.face_radius, "m"),
-                expected=f"at most the radius of the sphere, {format_si(self.radius, 'm')}",
-                hint="radius is that of the sphere, edge_radius that of the face seen from above.",
-            )
-        if self.rise < _LEAST_RISE * self.lowest_height:
-            raise CaseProblem(
-                ("radius",),
-                got=f"a face that rises by {format_si(self.rise, 'm')} to its edge",
-                expected=f"a rise above {_LEAST_RISE:g} cut-offs, "
-                f"{format_si(_LEAST_RISE * self.lowest_height, 'm')}",
-                hint="so flat a face is nearly a disc: use shape: disc.",
-            )
+        refuse_key_if(
+            self.face_radius > self.radius,
+            ("edge_radius",),
+            got=format_si(self.face_radius, "m"),
+            expected=f"at most the radius of the sphere, {format_si(self.radius, 'm')}",
+            hint="radius is that of the sphere, edge_radius that of the face seen from above.",
+        )
+        refuse_key_if(
+            self.rise < _LEAST_RISE * self.lowest_height,
+            ("radius",),
+            got=f"a face that rises by {format_si(self.rise, 'm')} to its edge",
+            expected=f"a rise above {_LEAST_RISE:g} cut-offs, "
+            f"{format_si(_LEAST_RISE * self.lowest_height, 'm')}",
+            hint="so flat a face is nearly a disc: use shape: disc.",
+        )
         return self
 
     @property

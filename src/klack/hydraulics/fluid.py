@@ -6,7 +6,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from klack.errors import InputError, require_nonnegative, require_positive
+from klack.errors import refuse_if, require_nonnegative, require_positive
 from klack.hydraulics.liquid import ATMOSPHERE, LiquidLaw, PressureRange, barus_viscosity
 from klack.hydraulics.mixture import LOWEST_PRESSURE, EntrainedGas, Vapour
 from klack.hydraulics.pressure_viscosity import PressureViscosity
@@ -67,15 +67,14 @@ class Fluid:
         require_positive("Fluid.temperature", self.temperature, "K")
         require_nonnegative("Fluid.base_viscosity", self.base_viscosity, "Pa s")
         top = max(self.vapour.kinks)
-        if float(self.liquid.density(LOWEST_PRESSURE)) <= self.vapour.density * max(
-            1.0, top / self.vapour.pressure
-        ):
-            raise InputError(
-                f"fluid '{self.name}': vapour density",
-                got=f"{self.vapour.density:g} kg/m^3",
-                expected="far less than the density of the liquid",
-                hint="leave it out: an ideal gas of 0.1 kg/mol is assumed.",
-            )
+        refuse_if(
+            float(self.liquid.density(LOWEST_PRESSURE))
+            <= self.vapour.density * max(1.0, top / self.vapour.pressure),
+            f"fluid '{self.name}': vapour density",
+            got=f"{self.vapour.density:g} kg/m^3",
+            expected="far less than the density of the liquid",
+            hint="leave it out: an ideal gas of 0.1 kg/mol is assumed.",
+        )
 
     @property
     def vapour_pressure(self) -> float:

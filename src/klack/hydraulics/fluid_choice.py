@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, TypeAdapter, ValidationInfo, model_validator
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.hydraulics.coolprop_fluid import coolprop_fluid, is_coolprop_name
 from klack.hydraulics.fluid import Fluid
 from klack.hydraulics.fluid_definition import FixedProperties, FluidDefinition
@@ -274,14 +274,14 @@ class FluidChoice(NamedSection):
     def _law(self, fluid: Fluid) -> PressureViscosity | None:
         if self.viscosity_law == "ambient":
             return None
-        if fluid.pressure_viscosity == 0.0:
-            raise InputError(
-                f"fluid '{self.name}': viscosity_law",
-                got=f"{self.viscosity_law} for a fluid without a pressure-viscosity coefficient",
-                expected="a coefficient",
-                hint="give a fluid of your own viscosity_pressure, e.g. 500 bar for oil, or "
-                "leave viscosity_law out.",
-            )
+        refuse_if(
+            fluid.pressure_viscosity == 0.0,
+            f"fluid '{self.name}': viscosity_law",
+            got=f"{self.viscosity_law} for a fluid without a pressure-viscosity coefficient",
+            expected="a coefficient",
+            hint="give a fluid of your own viscosity_pressure, e.g. 500 bar for oil, or "
+            "leave viscosity_law out.",
+        )
         if self.viscosity_law == "barus":
             return PressureViscosity.barus(fluid.pressure_viscosity)
         return PressureViscosity.roelands(fluid.base_viscosity, fluid.pressure_viscosity)

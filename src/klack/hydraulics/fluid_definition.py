@@ -7,7 +7,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 import scipy
 
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.hydraulics.fluid import Fluid
 from klack.hydraulics.liquid import (
     ATMOSPHERE,
@@ -324,14 +324,14 @@ class FluidDefinition:
             See :class:`~klack.hydraulics.mixture.Vapour`.
         """
         low, high = self.lowest_temperature, self.highest_temperature
-        if not low - _SLACK <= temperature <= high + _SLACK:
-            raise InputError(
-                f"fluid '{self.name}': temperature",
-                got=f"{temperature - _ZERO_CELSIUS:g} degC",
-                expected=f"{low - _ZERO_CELSIUS:g} to {high - _ZERO_CELSIUS:g} degC",
-                hint="describe your own fluid by density, viscosity and bulk_modulus at "
-                "this temperature; the constants of the library hold within the range.",
-            )
+        refuse_if(
+            not low - _SLACK <= temperature <= high + _SLACK,
+            f"fluid '{self.name}': temperature",
+            got=f"{temperature - _ZERO_CELSIUS:g} degC",
+            expected=f"{low - _ZERO_CELSIUS:g} to {high - _ZERO_CELSIUS:g} degC",
+            hint="describe your own fluid by density, viscosity and bulk_modulus at "
+            "this temperature; the constants of the library hold within the range.",
+        )
         state = self.properties.at(temperature)
         return Fluid(
             name=self.name,

@@ -7,7 +7,7 @@ from typing import ClassVar, Literal, Self
 from pydantic import Field, model_validator
 
 from klack.hydraulics.network_fluid import network_fluid
-from klack.input.problem import CaseProblem
+from klack.input.problem import refuse_key_if
 from klack.network.component import Component
 from klack.network.port import ELEMENT, FLOW, Port
 from klack.network.rows import Rows
@@ -75,13 +75,13 @@ class LandFace(Component):
 
     @model_validator(mode="after")
     def _inside_is_smaller(self) -> Self:
-        if self.inner_diameter >= self.outer_diameter:
-            raise CaseProblem(
-                ("inner_diameter",),
-                got=f"{self.inner_diameter:g} m inside of {self.outer_diameter:g} m",
-                expected="less than outer_diameter",
-                hint="swap both.",
-            )
+        refuse_key_if(
+            self.inner_diameter >= self.outer_diameter,
+            ("inner_diameter",),
+            got=f"{self.inner_diameter:g} m inside of {self.outer_diameter:g} m",
+            expected="less than outer_diameter",
+            hint="swap both.",
+        )
         return self
 
     def add_rows(self, rows: Rows) -> None:

@@ -16,7 +16,7 @@ from klack.hydraulics.local_line import LocalLine
 from klack.hydraulics.network_fluid import network_fluid
 from klack.hydraulics.pipe_friction import LAMINAR, PipeFriction
 from klack.hydraulics.wall_compliance import Wall
-from klack.input.problem import CaseProblem
+from klack.input.problem import CaseProblem, refuse_key_if
 from klack.input.section import Count
 from klack.network.component import Component
 from klack.network.port import FLOW
@@ -119,21 +119,21 @@ class Line(Component):
                 expected="wall_thickness and wall_modulus together, or none of them",
                 hint=f"add {missing[0]}; leave both out for a bore in a thick body.",
             )
-        if self.roughness is not None and self.friction != "turbulent":
-            raise CaseProblem(
-                ("roughness",),
-                got=f"a roughness with friction: {self.friction}",
-                expected="it with friction: turbulent alone",
-                hint="leave it out, or choose friction: turbulent.",
-            )
+        refuse_key_if(
+            self.roughness is not None and self.friction != "turbulent",
+            ("roughness",),
+            got=f"a roughness with friction: {self.friction}",
+            expected="it with friction: turbulent alone",
+            hint="leave it out, or choose friction: turbulent.",
+        )
         wrong = "segments" if self.properties == "local" else "cells"
-        if getattr(self, wrong) is not None:
-            raise CaseProblem(
-                (wrong,),
-                got=f"{wrong} in a line with properties: {self.properties}",
-                expected="segments with properties: fixed, cells with properties: local",
-                hint="leave it out, or change properties.",
-            )
+        refuse_key_if(
+            getattr(self, wrong) is not None,
+            (wrong,),
+            got=f"{wrong} in a line with properties: {self.properties}",
+            expected="segments with properties: fixed, cells with properties: local",
+            hint="leave it out, or change properties.",
+        )
         if self.wall is not None:
             self._refuse_with(tuple(given), "wall", "the wall is given twice")
             if self.wall.diameter not in (None, self.diameter):

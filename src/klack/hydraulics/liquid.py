@@ -7,7 +7,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from klack.errors import InputError, require_nonnegative, require_positive
+from klack.errors import InputError, refuse_if, require_nonnegative, require_positive
 
 __all__ = [
     "ATMOSPHERE",
@@ -289,13 +289,13 @@ class TabulatedLiquid:
 
 
 def _require_rising(p: Values, rho: Values) -> None:
-    if p.size != rho.size or p.size < 2:
-        raise InputError(
-            "TabulatedLiquid",
-            got=f"{p.size} pressures and {rho.size} densities",
-            expected="the same number of both, at least two",
-            hint="give one density per pressure.",
-        )
+    refuse_if(
+        p.size != rho.size or p.size < 2,
+        "TabulatedLiquid",
+        got=f"{p.size} pressures and {rho.size} densities",
+        expected="the same number of both, at least two",
+        hint="give one density per pressure.",
+    )
     if not (np.all(np.diff(p) > 0.0) and np.all(np.diff(rho) > 0.0) and rho[0] > 0 and p[0] > 0):
         raise InputError(
             "TabulatedLiquid",

@@ -7,7 +7,7 @@ from math import pi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.hydraulics.fluid_table import fluid_at, fluid_table
 from klack.hydraulics.line_cells import (
     HEAD,
@@ -189,14 +189,14 @@ def steady_state(
     lost += _profile(par, p_a, flow, ends[1] - ends[0] + lost, p)
     rho = np.array([fluid_at(par[HEAD:], x, 0)[0] for x in p])
     mass = rho * area * (1.0 + stretch * (p - ambient))
-    if not np.isfinite(lost):
-        raise InputError(
-            f"components.{component}: steady flow at the start",
-            got=f"{format_si(abs(flow), 'kg/s', 3)} through its bore, for which the pressure there "
-            "does not suffice",
-            expected="a flow that does not boil in the line",
-            hint="check its diameter, and the openings behind it; or start with a closed opening.",
-        )
+    refuse_if(
+        not np.isfinite(lost),
+        f"components.{component}: steady flow at the start",
+        got=f"{format_si(abs(flow), 'kg/s', 3)} through its bore, for which the pressure there "
+        "does not suffice",
+        expected="a flow that does not boil in the line",
+        hint="check its diameter, and the openings behind it; or start with a closed opening.",
+    )
     memory = np.repeat(flow / np.sqrt(mass), TERMS)
     state = np.concatenate([np.zeros(SCALARS), mass, np.full(n, flow), p, np.zeros(n), memory])
     return np.append(state, np.zeros(SCALARS + PER_CELL * n - state.size))

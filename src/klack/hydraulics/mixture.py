@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from klack.errors import InputError, require_positive
+from klack.errors import InputError, refuse_if, require_positive
 from klack.hydraulics.liquid import ATMOSPHERE, LiquidLaw
 
 __all__ = ["LOWEST_PRESSURE", "EntrainedGas", "Vapour"]
@@ -65,20 +65,20 @@ class EntrainedGas:
 
     def __post_init__(self) -> None:
         require_positive("EntrainedGas.reference_pressure", self.reference_pressure, "Pa")
-        if not 0.0 <= self.fraction < 1.0:
-            raise InputError(
-                "EntrainedGas.fraction",
-                got=f"{self.fraction:g}",
-                expected="a share of the volume from 0 to below 1",
-                hint="0.01 % to 0.5 % is usual: 1e-4 to 5e-3.",
-            )
-        if not 1.0 <= self.exponent <= 5.0 / 3.0:
-            raise InputError(
-                "EntrainedGas.exponent",
-                got=f"{self.exponent:g}",
-                expected="an exponent from 1 (isothermal) to 1.67 (adiabatic, one atom)",
-                hint="take 1.4 for air in fast strokes.",
-            )
+        refuse_if(
+            not 0.0 <= self.fraction < 1.0,
+            "EntrainedGas.fraction",
+            got=f"{self.fraction:g}",
+            expected="a share of the volume from 0 to below 1",
+            hint="0.01 % to 0.5 % is usual: 1e-4 to 5e-3.",
+        )
+        refuse_if(
+            not 1.0 <= self.exponent <= 5.0 / 3.0,
+            "EntrainedGas.exponent",
+            got=f"{self.exponent:g}",
+            expected="an exponent from 1 (isothermal) to 1.67 (adiabatic, one atom)",
+            hint="take 1.4 for air in fast strokes.",
+        )
         low, high = self.release_pressure, self.saturation_pressure
         if (low is None) != (high is None) or (
             low is not None and high is not None and not LOWEST_PRESSURE < low < high

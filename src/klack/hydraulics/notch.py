@@ -33,7 +33,7 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from klack.input.problem import CaseProblem
+from klack.input.problem import CaseProblem, refuse_key_if
 from klack.input.section import Count, Section
 from klack.machine.compiling.jit import inner, njit
 from klack.units import Length
@@ -226,13 +226,13 @@ class Notch(Section):
     def _shape_has_its_sizes(self) -> Self:
         if self.shape == "hole":
             self._refuse_with(("depth",), "shape: hole", "it goes through")
-            if self.length < self.width:
-                raise CaseProblem(
-                    ("length",),
-                    got=f"{1e3 * self.length:g} mm for a hole of {1e3 * self.width:g} mm",
-                    expected="at least its diameter: the whole circle is ahead of the edge",
-                    hint="a circle that the edge cuts is a notch with shape: round.",
-                )
+            refuse_key_if(
+                self.length < self.width,
+                ("length",),
+                got=f"{1e3 * self.length:g} mm for a hole of {1e3 * self.width:g} mm",
+                expected="at least its diameter: the whole circle is ahead of the edge",
+                hint="a circle that the edge cuts is a notch with shape: round.",
+            )
         elif self.depth is None:
             raise CaseProblem(
                 (),

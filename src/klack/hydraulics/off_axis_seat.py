@@ -34,7 +34,7 @@ from typing import Any, Literal, Protocol, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from klack.errors import InputError, require_positive
+from klack.errors import refuse_if, require_positive
 
 __all__ = [
     "SeatFace",
@@ -84,13 +84,13 @@ class SeatFace:
     def __post_init__(self) -> None:
         require_positive("SeatFace.radius", self.radius, "m")
         flat = self.shape == "flat"
-        if flat != (self.angle == 0.5 * pi) or not 0.0 < self.angle <= 0.5 * pi:
-            raise InputError(
-                "SeatFace.angle",
-                got=f"{self.angle:g} rad for the shape {self.shape}",
-                expected="above 0 and below pi/2 for cone and ball, pi/2 for a flat face",
-                hint="acos(r/R) for a ball of radius R, half of the angle of a drawing for a cone.",
-            )
+        refuse_if(
+            flat != (self.angle == 0.5 * pi) or not 0.0 < self.angle <= 0.5 * pi,
+            "SeatFace.angle",
+            got=f"{self.angle:g} rad for the shape {self.shape}",
+            expected="above 0 and below pi/2 for cone and ball, pi/2 for a flat face",
+            hint="acos(r/R) for a ball of radius R, half of the angle of a drawing for a cone.",
+        )
 
     @classmethod
     def of(cls, seat: _Seat) -> Self:
@@ -191,24 +191,24 @@ def pressure_load(
 
 def _placed(placement: ArrayLike) -> Vector:
     place = np.asarray(placement, dtype=float)
-    if place.shape != (5,) or not np.all(np.isfinite(place)):
-        raise InputError(
-            "seat off-axis: placement",
-            got=f"{placement!r}",
-            expected="five numbers: lift, offset_x, offset_y [m], tilt_x, tilt_y [-]",
-            hint="[60e-6, 1e-6, 0, 0, 0] is 60 um open and 1 um off-axis.",
-        )
+    refuse_if(
+        place.shape != (5,) or not np.all(np.isfinite(place)),
+        "seat off-axis: placement",
+        got=f"{placement!r}",
+        expected="five numbers: lift, offset_x, offset_y [m], tilt_x, tilt_y [-]",
+        hint="[60e-6, 1e-6, 0, 0, 0] is 60 um open and 1 um off-axis.",
+    )
     return place
 
 
 def _angles(number: int) -> Vector:
-    if number < _FEWEST_ANGLES:
-        raise InputError(
-            "seat off-axis: angles",
-            got=f"{number}",
-            expected=f"at least {_FEWEST_ANGLES}",
-            hint="72 while nothing overlaps, some hundred where one side does.",
-        )
+    refuse_if(
+        number < _FEWEST_ANGLES,
+        "seat off-axis: angles",
+        got=f"{number}",
+        expected=f"at least {_FEWEST_ANGLES}",
+        hint="72 while nothing overlaps, some hundred where one side does.",
+    )
     return 2.0 * pi / number * np.arange(number, dtype=np.float64)
 
 

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from klack.hydraulics.network_fluid import ambient_viscosity, viscosity_law
 from klack.hydraulics.pressure_viscosity import CONSTANT, PressureViscosity, mean_viscosity_ratio
-from klack.input.problem import CaseProblem
+from klack.input.problem import refuse_key_if
 from klack.input.section import Count
 from klack.machine.compiling.constant import with_slope_of
 from klack.machine.compiling.jit import njit
@@ -214,14 +214,14 @@ class Orifice(Component):
     @model_validator(mode="after")
     def _one_size(self) -> Self:
         chosen = self._exactly_one(("diameter", "area"), "size of the hole")
-        if chosen == "diameter" and self.hydraulic_diameter is not None:
-            raise CaseProblem(
-                ("hydraulic_diameter",),
-                got="hydraulic_diameter together with diameter",
-                expected="no hydraulic_diameter: that of a circle is its diameter",
-                hint="remove it, or give the area instead of the diameter.",
-                on_key=True,
-            )
+        refuse_key_if(
+            chosen == "diameter" and self.hydraulic_diameter is not None,
+            ("hydraulic_diameter",),
+            got="hydraulic_diameter together with diameter",
+            expected="no hydraulic_diameter: that of a circle is its diameter",
+            hint="remove it, or give the area instead of the diameter.",
+            on_key=True,
+        )
         return self
 
     @property

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Self
 from pydantic import Field, model_validator
 
 from klack.hydraulics.network_fluid import fixed_viscosity
-from klack.input.problem import CaseProblem
+from klack.input.problem import refuse_key_if
 from klack.machine.compiling.jit import njit
 from klack.network.component import Component
 from klack.network.port import FLOW, Port
@@ -169,13 +169,13 @@ class PipeFriction(Component):
 
     @model_validator(mode="after")
     def _rough_but_a_pipe(self) -> Self:
-        if self.roughness > _ROUGHEST * self.diameter:
-            raise CaseProblem(
-                ("roughness",),
-                got=f"{self.roughness:g} m in a bore of {self.diameter:g} m",
-                expected=f"at most {_ROUGHEST:g} of the diameter, the end of Colebrook's law",
-                hint="check the units; a corrugated hose is a pressure-loss.",
-            )
+        refuse_key_if(
+            self.roughness > _ROUGHEST * self.diameter,
+            ("roughness",),
+            got=f"{self.roughness:g} m in a bore of {self.diameter:g} m",
+            expected=f"at most {_ROUGHEST:g} of the diameter, the end of Colebrook's law",
+            hint="check the units; a corrugated hose is a pressure-loss.",
+        )
         return self
 
     def parameters(self, viscosity: float) -> tuple[float, ...]:

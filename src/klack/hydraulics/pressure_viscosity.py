@@ -26,7 +26,7 @@ from math import exp, log, log1p
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.hydraulics.liquid import ATMOSPHERE, HIGHEST_PRESSURE
 from klack.machine.compiling.jit import njit
 
@@ -75,23 +75,23 @@ class PressureViscosity:
     @classmethod
     def roelands(cls, viscosity: float, coefficient: float) -> "PressureViscosity":
         """Law with a viscosity [Pa s] and its relative slope [1/Pa] at one atmosphere."""
-        if not log(viscosity) + _UNIT > 0.1:
-            raise InputError(
-                "PressureViscosity.roelands: viscosity",
-                got=f"viscosity_law roelands with {viscosity:g} Pa s",
-                expected="more than 0.07 mPa s, where the lines of Roelands meet",
-                hint="check the unit, or take viscosity_law: barus.",
-            )
+        refuse_if(
+            not log(viscosity) + _UNIT > 0.1,
+            "PressureViscosity.roelands: viscosity",
+            got=f"viscosity_law roelands with {viscosity:g} Pa s",
+            expected="more than 0.07 mPa s, where the lines of Roelands meet",
+            hint="check the unit, or take viscosity_law: barus.",
+        )
         exponent = log(viscosity) + _UNIT
         power = coefficient * _SCALE / exponent
-        if power > 1.0:
-            raise InputError(
-                "PressureViscosity.roelands: coefficient",
-                got=f"viscosity_law roelands with {1e9 * coefficient:.3g} per GPa and "
-                f"{1e3 * viscosity:.3g} mPa s, an exponent Z of {power:.3g}",
-                expected="an exponent Z of at most 1, as of the oils that Roelands measured",
-                hint="take viscosity_law: barus; thin and hot fuels are outside this law.",
-            )
+        refuse_if(
+            power > 1.0,
+            "PressureViscosity.roelands: coefficient",
+            got=f"viscosity_law roelands with {1e9 * coefficient:.3g} per GPa and "
+            f"{1e3 * viscosity:.3g} mPa s, an exponent Z of {power:.3g}",
+            expected="an exponent Z of at most 1, as of the oils that Roelands measured",
+            hint="take viscosity_law: barus; thin and hot fuels are outside this law.",
+        )
         return cls(exponent=exponent, power=power)
 
     @property

@@ -27,7 +27,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from klack.errors import AccuracyWarning, InputError
+from klack.errors import AccuracyWarning, InputError, refuse_if
 from klack.hydraulics.fluid_definition import FluidDefinition, FluidState
 from klack.hydraulics.liquid import (
     ATMOSPHERE,
@@ -228,13 +228,13 @@ def read_property_table(path: Path) -> PropertyTable:
     order = np.lexsort((value["pressure"], value["temperature"]))
     grid = np.stack([np.repeat(T, p.size), np.tile(p, T.size)])
     found = np.stack([value["temperature"][order], value["pressure"][order]])
-    if p.size < 2 or grid.shape != found.shape or not np.array_equal(grid, found):
-        raise InputError(
-            where,
-            got=f"{len(numbers)} rows with {T.size} temperatures and {p.size} pressures",
-            expected="every pressure once at every temperature, and at least two pressures",
-            hint="add the missing rows and remove repeated ones.",
-        )
+    refuse_if(
+        p.size < 2 or grid.shape != found.shape or not np.array_equal(grid, found),
+        where,
+        got=f"{len(numbers)} rows with {T.size} temperatures and {p.size} pressures",
+        expected="every pressure once at every temperature, and at least two pressures",
+        hint="add the missing rows and remove repeated ones.",
+    )
     columns = {name: v[order].reshape(T.size, p.size) for name, v in value.items()}
     for name, column in columns.items():
         if not np.all(column > 0.0):
@@ -245,13 +245,13 @@ def read_property_table(path: Path) -> PropertyTable:
                 hint="check the column and its unit.",
             )
     boiling = columns.get("vapour pressure")
-    if boiling is not None and np.any(np.ptp(boiling, axis=1) > 1e-3 * boiling[:, 0]):
-        raise InputError(
-            where,
-            got="a vapour pressure that changes with pressure",
-            expected="one value per temperature, repeated in its rows",
-            hint="correct the column, or leave it out: 10 Pa is then assumed.",
-        )
+    refuse_if(
+        boiling is not None and np.any(np.ptp(boiling, axis=1) > 1e-3 * boiling[:, 0]),
+        where,
+        got="a vapour pressure that changes with pressure",
+        expected="one value per temperature, repeated in its rows",
+        hint="correct the column, or leave it out: 10 Pa is then assumed.",
+    )
     rho = columns["density"]
     _require_rising(where, T, p, rho)
     return PropertyTable(
@@ -313,13 +313,13 @@ def _read(path: Path) -> tuple[list[str], Values]:
     """Names of the columns and their numbers in SI, shape (rows, columns)."""
     where = f"fluid table '{path.name}'"
     size = path.stat().st_size
-    if size > _LARGEST:
-        raise InputError(
-            where,
-            got=f"{size / 1e6:.3g} MB",
-            expected=f"at most {_LARGEST / 1e6:g} MB",
-            hint="some ten temperatures and pressures are enough; smooth curves run through them.",
-        )
+    refuse_if(
+        size > _LARGEST,
+        where,
+        got=f"{size / 1e6:.3g} MB",
+        expected=f"at most {_LARGEST / 1e6:g} MB",
+        hint="some ten temperatures and pressures are enough; smooth curves run through them.",
+    )
     try:
         text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError:

@@ -15,7 +15,7 @@ from klack.hydraulics.opening import OpeningComponent
 from klack.hydraulics.orifice import NOT_CHOKED, choked_flow
 from klack.hydraulics.pressure_viscosity import CONSTANT
 from klack.hydraulics.seat import gap_flow, gap_pass
-from klack.input.problem import CaseProblem
+from klack.input.problem import refuse_key_if
 from klack.machine.compiling.jit import inner
 from klack.network.port import ELEMENT, FLOW, Port, Role
 from klack.network.rows import Channel, Rows
@@ -176,38 +176,38 @@ class SpoolEdge(OpeningComponent):
 
     @model_validator(mode="after")
     def _notches_fit(self) -> Self:
-        if self.width == 0.0 and not self.notches:
-            raise CaseProblem(
-                ("width",),
-                got="0 mm without notches",
-                expected="an edge that opens: a width above 0, or notches",
-                hint="leave width out for the whole circumference.",
-            )
+        refuse_key_if(
+            self.width == 0.0 and not self.notches,
+            ("width",),
+            got="0 mm without notches",
+            expected="an edge that opens: a width above 0, or notches",
+            hint="leave width out for the whole circumference.",
+        )
         for k, notch in enumerate(self.notches):
             self._check_notch(k, notch)
         taken = sum(notch.count * notch.edge_width for notch in self.notches)
         around = self.slot_width or pi * self.diameter
         wide = max(taken, max((notch.count * notch.width for notch in self.notches), default=0.0))
-        if wide > around:
-            raise CaseProblem(
-                ("notches",),
-                got=f"notches of {1e3 * wide:g} mm in all",
-                expected=f"at most the {1e3 * around:g} mm of the edge",
-                hint="check count and width; width is the width of one notch.",
-            )
+        refuse_key_if(
+            wide > around,
+            ("notches",),
+            got=f"notches of {1e3 * wide:g} mm in all",
+            expected=f"at most the {1e3 * around:g} mm of the edge",
+            hint="check count and width; width is the width of one notch.",
+        )
         return self
 
     def _check_notch(self, k: int, notch: Notch) -> None:
         if notch.depth is None:
             return
-        if not self.radial_clearance < notch.depth < 0.5 * self.diameter:
-            raise CaseProblem(
-                ("notches", k, "depth"),
-                got=f"{1e3 * notch.depth:g} mm",
-                expected=f"between the clearance of {1e3 * self.radial_clearance:g} mm and the "
-                f"radius of the spool, {500 * self.diameter:g} mm",
-                hint="a notch no deeper than the clearance is part of the gap: leave it out.",
-            )
+        refuse_key_if(
+            not self.radial_clearance < notch.depth < 0.5 * self.diameter,
+            ("notches", k, "depth"),
+            got=f"{1e3 * notch.depth:g} mm",
+            expected=f"between the clearance of {1e3 * self.radial_clearance:g} mm and the "
+            f"radius of the spool, {500 * self.diameter:g} mm",
+            hint="a notch no deeper than the clearance is part of the gap: leave it out.",
+        )
 
     @property
     def land_width(self) -> float:

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.arrays import Cube, Matrix, Vector
-from klack.errors import InputError, require_nonnegative, require_positive
+from klack.errors import refuse_if, require_nonnegative, require_positive
 from klack.hydraulics.ring_system import Ring, ring_of, solve_ring
 from klack.machine.compiling.jit import FAST, inner, njit
 from klack.network.step_function import first
@@ -147,20 +147,20 @@ def sector_film(
     require_nonnegative("sector_film: inner_radius", inner_radius, "m")
     require_positive("sector_film: width", outer_radius - inner_radius, "m")
     for name, number, least in (("sectors", sectors, _FEWEST_SECTORS), ("circles", circles, 1)):
-        if number < least:
-            raise InputError(
-                f"sector_film: {name}",
-                got=f"{number}",
-                expected=f"at least {least}",
-                hint="36 sectors and 1 circle for a narrow land, 2 for a wide one.",
-            )
-    if sectors > MOST_SECTORS:
-        raise InputError(
-            "sector_film: sectors",
-            got=f"{sectors}",
-            expected=f"at most {MOST_SECTORS}",
-            hint="36 sectors are within 0.5 % of many.",
+        refuse_if(
+            number < least,
+            f"sector_film: {name}",
+            got=f"{number}",
+            expected=f"at least {least}",
+            hint="36 sectors and 1 circle for a narrow land, 2 for a wide one.",
         )
+    refuse_if(
+        sectors > MOST_SECTORS,
+        "sector_film: sectors",
+        got=f"{sectors}",
+        expected=f"at most {MOST_SECTORS}",
+        hint="36 sectors are within 0.5 % of many.",
+    )
     width, angle = outer_radius - inner_radius, 2.0 * pi / sectors
     panels = max(circles - 1, 1)
     points = _FEWER if outer_radius < 2.0 * inner_radius else _POINTS
@@ -343,13 +343,13 @@ def solved_film(
 
 
 def _require_heights(where: str, film: SectorFilm, heights: Array) -> None:
-    if heights.shape != (film.sectors, film.circles):
-        raise InputError(
-            where,
-            got=f"an array of shape {heights.shape}",
-            expected=f"heights of all sectors and circles, shape {(film.sectors, film.circles)}",
-            hint="a film with one circle takes heights[:, None].",
-        )
+    refuse_if(
+        heights.shape != (film.sectors, film.circles),
+        where,
+        got=f"an array of shape {heights.shape}",
+        expected=f"heights of all sectors and circles, shape {(film.sectors, film.circles)}",
+        hint="a film with one circle takes heights[:, None].",
+    )
     require_positive(where, float(np.min(heights)), "m")
 
 

@@ -4,28 +4,28 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from klack.input.problem import CaseProblem
+from klack.input.problem import refuse_key_if
 
 __all__ = ["check_table", "step_table", "value_at_start"]
 
 
 def check_table(time: Sequence[float], values: Sequence[float], name: str) -> None:
     """Reject times that do not rise or do not each have a value."""
-    if len(time) != len(values) or not time:
-        raise CaseProblem(
-            (name,),
-            got=f"{len(values)} values at {len(time)} times",
-            expected="one value per time, at least one",
-            hint="give one entry in each list per time.",
-        )
+    refuse_key_if(
+        len(time) != len(values) or not time,
+        (name,),
+        got=f"{len(values)} values at {len(time)} times",
+        expected="one value per time, at least one",
+        hint="give one entry in each list per time.",
+    )
     for k in range(1, len(time)):
-        if not time[k] > time[k - 1]:
-            raise CaseProblem(
-                ("time", k),
-                got=f"{time[k]:g} s after {time[k - 1]:g} s",
-                expected="times that rise",
-                hint="write a jump as a short ramp, e.g. of 1 us.",
-            )
+        refuse_key_if(
+            not time[k] > time[k - 1],
+            ("time", k),
+            got=f"{time[k]:g} s after {time[k - 1]:g} s",
+            expected="times that rise",
+            hint="write a jump as a short ramp, e.g. of 1 us.",
+        )
 
 
 def step_table(

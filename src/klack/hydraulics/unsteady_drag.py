@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 from scipy.optimize import nnls
 
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.hydraulics.network_fluid import fixed_viscosity
-from klack.input.problem import CaseProblem
+from klack.input.problem import refuse_key_if
 from klack.network.component import Component
 from klack.network.port import ELEMENT, Port
 from klack.network.relaxation import relaxed
@@ -182,20 +182,20 @@ class UnsteadyDrag(Component):
         needs = {"sphere": ("radius",), "layer": ("area", "height")}[self.shape]
         for key in ("radius", "area", "height", "typical_speed"):
             given = getattr(self, key) is not None
-            if given and key not in needs and (self.shape == "layer" or key != "typical_speed"):
-                raise CaseProblem(
-                    (key,),
-                    got=f"a value, for shape: {self.shape}",
-                    expected=f"the keys of that shape: {', '.join(needs)}",
-                    hint="leave it out, or change the shape.",
-                )
-            if not given and key in needs:
-                raise CaseProblem(
-                    (key,),
-                    got="nothing",
-                    expected=f"a value, for shape: {self.shape}",
-                    hint="write it, with its unit.",
-                )
+            refuse_key_if(
+                given and key not in needs and (self.shape == "layer" or key != "typical_speed"),
+                (key,),
+                got=f"a value, for shape: {self.shape}",
+                expected=f"the keys of that shape: {', '.join(needs)}",
+                hint="leave it out, or change the shape.",
+            )
+            refuse_key_if(
+                not given and key in needs,
+                (key,),
+                got="nothing",
+                expected=f"a value, for shape: {self.shape}",
+                hint="write it, with its unit.",
+            )
         return self
 
     def dry(self) -> None:
@@ -286,13 +286,13 @@ def _load(rows: Rows, component: str, port: int, added: float) -> None:
         if port not in row.ports or row.course is not None:
             continue
         body = row.body
-        if body.rigid_count != 1:
-            raise InputError(
-                f"component '{component}': added mass",
-                got=f"a body with {body.rigid_count} rigid motions",
-                expected="one, along the axis",
-                hint="write added_mass: 0 g, and add its mass to that of the body.",
-            )
+        refuse_if(
+            body.rigid_count != 1,
+            f"component '{component}': added mass",
+            got=f"a body with {body.rigid_count} rigid motions",
+            expected="one, along the axis",
+            hint="write added_mass: 0 g, and add its mass to that of the body.",
+        )
         scale = sqrt(body.mass / (body.mass + added))
         first = np.r_[scale, np.ones(body.mode_count - 1)][:, None]
         recovery = body.recovery

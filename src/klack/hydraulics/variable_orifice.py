@@ -7,7 +7,7 @@ from pydantic import Field, model_validator
 
 from klack.hydraulics.network_fluid import fixed_viscosity
 from klack.hydraulics.opening import OpeningComponent, opening_flow
-from klack.input.problem import CaseProblem
+from klack.input.problem import refuse_key_if
 from klack.machine.compiling.jit import inner
 from klack.network.port import ELEMENT, FLOW, Port, Role
 from klack.network.rows import Channel, Rows
@@ -123,26 +123,26 @@ class VariableOrifice(OpeningComponent):
 
 
 def _check_areas(name: str, points: Sequence[float], area: Sequence[float]) -> None:
-    if len(points) != len(area):
-        raise CaseProblem(
-            ("area",),
-            got=f"{len(area)} areas for {len(points)} values of {name}",
-            expected="one area for each of them",
-            hint="add or remove values.",
-        )
+    refuse_key_if(
+        len(points) != len(area),
+        ("area",),
+        got=f"{len(area)} areas for {len(points)} values of {name}",
+        expected="one area for each of them",
+        hint="add or remove values.",
+    )
     for k in range(1, len(points)):
-        if not points[k] > points[k - 1]:
-            raise CaseProblem(
-                (name, k),
-                got=f"{points[k]:g} after {points[k - 1]:g}",
-                expected="values that rise",
-                hint="sort them; write a jump as a short ramp.",
-            )
+        refuse_key_if(
+            not points[k] > points[k - 1],
+            (name, k),
+            got=f"{points[k]:g} after {points[k - 1]:g}",
+            expected="values that rise",
+            hint="sort them; write a jump as a short ramp.",
+        )
     for k, value in enumerate(area):
-        if value < 0.0:
-            raise CaseProblem(
-                ("area", k),
-                got=f"{value:g} m^2",
-                expected="0 or more",
-                hint="closed is an area of 0.",
-            )
+        refuse_key_if(
+            value < 0.0,
+            ("area", k),
+            got=f"{value:g} m^2",
+            expected="0 or more",
+            hint="closed is an area of 0.",
+        )

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 from klack.errors import InputError
 from klack.hydraulics.gas.gas import Gas
 from klack.hydraulics.gas.gas_library import GASES, library_gas
-from klack.input.problem import CaseProblem, one_of
+from klack.input.problem import CaseProblem, one_of, refuse_key_if
 from klack.input.section import NamedSection, Text
 from klack.units import DynamicViscosity, GasConstant, Pressure, Ratio
 
@@ -56,14 +56,14 @@ class GasChoice(NamedSection):
                 on_key=True,
             )
         for key in _NUMBERS[:3]:
-            if key not in given:
-                raise CaseProblem(
-                    (key,),
-                    got=f"no {key} of '{self.name}'",
-                    expected="gas_constant, kappa and viscosity of your own gas",
-                    hint="add it; argon has 208.1 J/kg/K, 1.667 and 22.3 uPa*s.",
-                    on_key=True,
-                )
+            refuse_key_if(
+                key not in given,
+                (key,),
+                got=f"no {key} of '{self.name}'",
+                expected="gas_constant, kappa and viscosity of your own gas",
+                hint="add it; argon has 208.1 J/kg/K, 1.667 and 22.3 uPa*s.",
+                on_key=True,
+            )
         return self
 
     def gas(self) -> Gas:
