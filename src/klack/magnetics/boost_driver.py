@@ -5,7 +5,7 @@ from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from klack.input.problem import CaseProblem
+from klack.input.problem import CaseProblem, refuse_key_if
 from klack.input.section import Section
 from klack.magnetics.driver import DriveProgram, Driver, DriveState, Switch, When
 from klack.magnetics.output_stage import Capacitor, OutputStage, StagePath
@@ -118,20 +118,20 @@ class BoostDriver(Driver):
                 expected=f"more than the battery, {self.battery:g} V",
                 hint="a driver without boost is 'two-point'.",
             )
-        if not self.hold_band < 2.0 * self.hold_current:
-            raise CaseProblem(
-                ("hold_band",),
-                got=f"{self.hold_band:g} A",
-                expected="less than twice the hold current",
-                hint="0.5 to 1 A is usual.",
-            )
-        if not self.hold_current + 0.5 * self.hold_band < self.peak_current:
-            raise CaseProblem(
-                ("peak_current",),
-                got=f"{self.peak_current:g} A",
-                expected="a current above the band of the hold",
-                hint="a driver without a peak is 'two-point'.",
-            )
+        refuse_key_if(
+            not self.hold_band < 2.0 * self.hold_current,
+            ("hold_band",),
+            got=f"{self.hold_band:g} A",
+            expected="less than twice the hold current",
+            hint="0.5 to 1 A is usual.",
+        )
+        refuse_key_if(
+            not self.hold_current + 0.5 * self.hold_band < self.peak_current,
+            ("peak_current",),
+            got=f"{self.peak_current:g} A",
+            expected="a current above the band of the hold",
+            hint="a driver without a peak is 'two-point'.",
+        )
         if self.decay == "clamp" and self.clamp_voltage is None:
             raise CaseProblem(
                 ("clamp_voltage",),
@@ -145,13 +145,13 @@ class BoostDriver(Driver):
     def _order_of_shots(self) -> Self:
         before = 0.0
         for k, shot in enumerate(self.shots):
-            if not before <= shot.start < shot.end:
-                raise CaseProblem(
-                    ("shots", k),
-                    got=f"from {shot.start:g} s to {shot.end:g} s",
-                    expected=f"a start from {before:g} s on, and an end after it",
-                    hint="list the shots in their order; they may not overlap.",
-                )
+            refuse_key_if(
+                not before <= shot.start < shot.end,
+                ("shots", k),
+                got=f"from {shot.start:g} s to {shot.end:g} s",
+                expected=f"a start from {before:g} s on, and an end after it",
+                hint="list the shots in their order; they may not overlap.",
+            )
             if self.peak_duration is not None and not shot.start + self.peak_duration < shot.end:
                 raise CaseProblem(
                     ("peak_duration",),

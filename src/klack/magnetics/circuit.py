@@ -21,7 +21,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError, require_nonnegative
+from klack.errors import InputError, refuse_if, require_nonnegative
 from klack.magnetics.hysteresis import IronStops
 from klack.magnetics.reluctance import GapReluctance, LinearReluctance, ReluctanceLaw
 
@@ -95,13 +95,13 @@ class MagneticCircuit:
         loops = np.array(self.loops, dtype=np.int64)
         object.__setattr__(self, "loops", loops)
         rows, columns = loops.shape if loops.ndim == 2 else (0, 0)
-        if rows != len(self.branches) or not 1 <= columns <= MOST_LOOPS:
-            raise InputError(
-                "MagneticCircuit.loops",
-                got=f"shape {loops.shape} for {len(self.branches)} branches",
-                expected=f"one row per branch and 1 to {MOST_LOOPS} columns",
-                hint="write +1 or -1 where a loop passes through a branch, else 0.",
-            )
+        refuse_if(
+            rows != len(self.branches) or not 1 <= columns <= MOST_LOOPS,
+            "MagneticCircuit.loops",
+            got=f"shape {loops.shape} for {len(self.branches)} branches",
+            expected=f"one row per branch and 1 to {MOST_LOOPS} columns",
+            hint="write +1 or -1 where a loop passes through a branch, else 0.",
+        )
         if np.any(np.abs(loops) > 1) or np.linalg.matrix_rank(loops) < columns:
             raise InputError(
                 "MagneticCircuit.loops",
@@ -110,20 +110,20 @@ class MagneticCircuit:
                 hint="drop the loop that is a sum of others.",
             )
         names = [branch.name for branch in self.branches]
-        if self.main not in names or len(set(names)) < len(names):
-            raise InputError(
-                "MagneticCircuit.branches",
-                got=f"the names {', '.join(names)} and the main branch '{self.main}'",
-                expected="different names, among them the main branch",
-                hint="rename a branch.",
-            )
-        if not np.any(loops.T @ self.turns):
-            raise InputError(
-                "MagneticCircuit.branches",
-                got="no loop around turns of the coil",
-                expected="at least one branch with turns in a loop",
-                hint="give the branch through the coil its number of turns.",
-            )
+        refuse_if(
+            self.main not in names or len(set(names)) < len(names),
+            "MagneticCircuit.branches",
+            got=f"the names {', '.join(names)} and the main branch '{self.main}'",
+            expected="different names, among them the main branch",
+            hint="rename a branch.",
+        )
+        refuse_if(
+            not np.any(loops.T @ self.turns),
+            "MagneticCircuit.branches",
+            got="no loop around turns of the coil",
+            expected="at least one branch with turns in a loop",
+            hint="give the branch through the coil its number of turns.",
+        )
 
     @property
     def hysteretic(self) -> bool:

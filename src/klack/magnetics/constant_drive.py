@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.input.problem import nearest, one_of
 from klack.magnetics.boost_capacitor import BoostCapacitor
 from klack.magnetics.circuit import MagneticCircuit
@@ -131,13 +131,13 @@ def driven(network: Network, currents: Mapping[str, float]) -> Network:
                 expected=f"one of: {one_of(coils)}" if coils else "a valve with a coil",
                 hint=nearest(name, coils, "name a solenoid of the case."),
             )
-        if not 0.0 <= current < np.inf:
-            raise InputError(
-                f"current of '{name}'",
-                got=format_si(current, "A"),
-                expected="0 A or more",
-                hint="the force of a coil does not depend on the sign of its current.",
-            )
+        refuse_if(
+            not 0.0 <= current < np.inf,
+            f"current of '{name}'",
+            got=format_si(current, "A"),
+            expected="0 A or more",
+            hint="the force of a coil does not depend on the sign of its current.",
+        )
     at = {(coil.component, coil.port): name for name, coil in coils.items()}
     changed: dict[str, Component] = {}
     for node in network.nodes:

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError, require_positive
+from klack.errors import InputError, refuse_if, require_positive
 from klack.magnetics.circuit import MagneticCircuit
 from klack.magnetics.driver import DriveProgram
 from klack.magnetics.flux_table import STOPS, circuit_numbers, free_loops, tubes_of
@@ -136,14 +136,14 @@ class CoupledSystem:
         :meth:`klack.magnetics.output_stage.Capacitor.numbers`.
         """
         windings = self.windings
-        if len(windings) > MOST_WINDINGS:
-            raise InputError(
-                "windings",
-                got=f"{len(windings)} windings that share magnets or a capacitor",
-                expected=f"at most {MOST_WINDINGS}",
-                hint="give some of their drivers a capacitance of their own; coils of one magnet "
-                "in series need one circuit only.",
-            )
+        refuse_if(
+            len(windings) > MOST_WINDINGS,
+            "windings",
+            got=f"{len(windings)} windings that share magnets or a capacitor",
+            expected=f"at most {MOST_WINDINGS}",
+            hint="give some of their drivers a capacitance of their own; coils of one magnet "
+            "in series need one circuit only.",
+        )
         rows_m = _HEAD
         rows_w = rows_m + MAGNET_ROW * len(self.magnets)
         rows_c = rows_w + WINDING_ROW * len(windings)

@@ -260,16 +260,16 @@ class DrawnMagnet:
         """Raise where parts touch at a working gap [m], or a mesh does not resolve the air."""
         least, moving, still = self.clearance(gap)
         where = f"DrawnMagnet at a gap of {format_si(gap, 'm')}"
-        if least <= _NARROWEST * self.extent:
-            raise InputError(
-                where,
-                got=f"'{moving}' that touches '{still}'"
-                if least <= 0.0
-                else f"{format_si(least, 'm')} of air between '{moving}' and '{still}'",
-                expected=f"more than {format_si(_NARROWEST * self.extent, 'm', 2)} of air between "
-                "what moves and what does not",
-                hint="draw the residual gap, too, or leave out that gap.",
-            )
+        refuse_if(
+            least <= _NARROWEST * self.extent,
+            where,
+            got=f"'{moving}' that touches '{still}'"
+            if least <= 0.0
+            else f"{format_si(least, 'm')} of air between '{moving}' and '{still}'",
+            expected=f"more than {format_si(_NARROWEST * self.extent, 'm', 2)} of air between "
+            "what moves and what does not",
+            hint="draw the residual gap, too, or leave out that gap.",
+        )
         if mesh_size is not None:
             require_positive("DrawnMagnet: mesh_size", mesh_size, "m")
             if mesh_size > least:

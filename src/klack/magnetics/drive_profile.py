@@ -6,7 +6,7 @@ from typing import ClassVar, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from klack.input.problem import CaseProblem
+from klack.input.problem import CaseProblem, refuse_key_if
 from klack.magnetics.driver import (
     DiodeDriver,
     DriveCourse,
@@ -68,13 +68,13 @@ class DriveProfile(DiodeDriver):
                 hint="current: [0 A, 10 A, 10 A, 0 A] with supply_voltage: 65 V.",
             )
         values = self.current if self.current is not None else self.voltage or ()
-        if len(values) != len(self.time):
-            raise CaseProblem(
-                ("time",),
-                got=f"{len(self.time)} times for {len(values)} values",
-                expected="as many times as values",
-                hint="one value for each point of time.",
-            )
+        refuse_key_if(
+            len(values) != len(self.time),
+            ("time",),
+            got=f"{len(self.time)} times for {len(values)} values",
+            expected="as many times as values",
+            hint="one value for each point of time.",
+        )
         falls = [k for k in range(1, len(self.time)) if self.time[k] < self.time[k - 1]]
         if self.time[0] < 0 or falls or not self.time[-1] > self.time[0]:
             k = falls[0] if falls else 0
@@ -91,13 +91,13 @@ class DriveProfile(DiodeDriver):
     def _supply(self) -> Self:
         if self.current is None:
             given = "supply_voltage" if self.supply_voltage is not None else "band"
-            if self.supply_voltage is not None or self.band is not None:
-                raise CaseProblem(
-                    (given,),
-                    got=f"'{given}' with a voltage over time",
-                    expected="with a current over time only",
-                    hint="remove it.",
-                )
+            refuse_key_if(
+                self.supply_voltage is not None or self.band is not None,
+                (given,),
+                got=f"'{given}' with a voltage over time",
+                expected="with a current over time only",
+                hint="remove it.",
+            )
             return self
         if self.supply_voltage is None:
             raise CaseProblem(

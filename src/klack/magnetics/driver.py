@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, model_validator
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.input.problem import CaseProblem
 from klack.magnetics.output_stage import OutputStage
 from klack.network.component import Component
@@ -89,14 +89,14 @@ class DriveCourse:
 
     def __init__(self, time: ArrayLike, value: ArrayLike) -> None:
         t, v = np.array(time, dtype=float).ravel(), np.array(value, dtype=float).ravel()
-        if t.size != v.size or t.size == 0 or np.any(np.diff(t) < 0):
-            raise InputError(
-                "DriveCourse",
-                got=f"{t.size} times and {v.size} values"
-                + (", decreasing times" if t.size == v.size > 0 else ""),
-                expected="as many times as values, at least one, not decreasing",
-                hint="sort the points by time; write a jump as the same time twice.",
-            )
+        refuse_if(
+            t.size != v.size or t.size == 0 or np.any(np.diff(t) < 0),
+            "DriveCourse",
+            got=f"{t.size} times and {v.size} values"
+            + (", decreasing times" if t.size == v.size > 0 else ""),
+            expected="as many times as values, at least one, not decreasing",
+            hint="sort the points by time; write a jump as the same time twice.",
+        )
         object.__setattr__(self, "time", t)
         object.__setattr__(self, "value", v)
 
@@ -145,13 +145,13 @@ class DriveProgram:
 
     def __post_init__(self) -> None:
         names = [state.name for state in self.states]
-        if not names or len(set(names)) < len(names):
-            raise InputError(
-                "DriveProgram.states",
-                got=f"the states {', '.join(names) or 'none'}",
-                expected="at least one state, all with different names",
-                hint="rename a state.",
-            )
+        refuse_if(
+            not names or len(set(names)) < len(names),
+            "DriveProgram.states",
+            got=f"the states {', '.join(names) or 'none'}",
+            expected="at least one state, all with different names",
+            hint="rename a state.",
+        )
         for state in self.states:
             for switch in state.switches:
                 _check(state, switch, names)
@@ -202,20 +202,20 @@ def _check(state: DriveState, switch: Switch, names: Sequence[str]) -> None:
             expected="a constant voltage with a target",
             hint="the switches of the state follow the target.",
         )
-    if switch.to not in names or (switch.to == state.name and not switch.new_cycle):
-        raise InputError(
-            where,
-            got=f"a switch to '{switch.to}'",
-            expected=f"another state: {', '.join(name for name in names if name != state.name)}",
-            hint="check the names of the states.",
-        )
-    if switch.new_cycle and (switch.when is not When.TIME or not switch.value > 0):
-        raise InputError(
-            where,
-            got=f"a new cycle by {switch.when.name} {switch.value:g}",
-            expected="When.TIME with a period above 0 s",
-            hint="let a new cycle start after its period.",
-        )
+    refuse_if(
+        switch.to not in names or (switch.to == state.name and not switch.new_cycle),
+        where,
+        got=f"a switch to '{switch.to}'",
+        expected=f"another state: {', '.join(name for name in names if name != state.name)}",
+        hint="check the names of the states.",
+    )
+    refuse_if(
+        switch.new_cycle and (switch.when is not When.TIME or not switch.value > 0),
+        where,
+        got=f"a new cycle by {switch.when.name} {switch.value:g}",
+        expected="When.TIME with a period above 0 s",
+        hint="let a new cycle start after its period.",
+    )
 
 
 def _block(state: DriveState, names: Sequence[str]) -> NDArray[np.float64]:
@@ -337,11 +337,11 @@ class TimedDriver(DiodeDriver):
 def driver_of(rows: Rows, port: str = "terminals") -> DriveProgram:
     """Program of the driver at the coil ``port`` of the present component."""
     drivers = [partner for partner in rows.partner(port) if isinstance(partner, Driver)]
-    if len(drivers) != 1:
-        raise InputError(
-            f"{rows.component}.{port}",
-            got=f"{len(drivers)} drivers",
-            expected="one driver at the terminals of a coil",
-            hint="connect the port 'terminals' of one driver (voltage-step, peak-hold, ...) to it.",
-        )
+    refuse_if(
+        len(drivers) != 1,
+        f"{rows.component}.{port}",
+        got=f"{len(drivers)} drivers",
+        expected="one driver at the terminals of a coil",
+        hint="connect the port 'terminals' of one driver (voltage-step, peak-hold, ...) to it.",
+    )
     return drivers[0].program()

@@ -34,7 +34,7 @@ from dataclasses import dataclass
 from math import pi
 from typing import Literal
 
-from klack.errors import InputError, require_positive
+from klack.errors import refuse_if, require_positive
 from klack.magnetics.iron import VACUUM_PERMEABILITY
 
 __all__ = ["MOST_TERMS", "EddyLadder", "EddyShape", "cylinder_ladder", "sheet_ladder"]
@@ -141,10 +141,10 @@ def _check(
     require_positive("eddy ladder: length", length, "m")
     require_positive("eddy ladder: radius or thickness", across, "m")
     require_positive("eddy ladder: permeability", permeability, "-")
-    if terms not in range(1, MOST_TERMS + 1):
-        raise InputError(
-            "eddy ladder: terms",
-            got=f"{terms}",
-            expected=f"1 to {MOST_TERMS}",
-            hint="1 for lift and timing, 3 or 4 for the first 50 us.",
-        )
+    refuse_if(
+        terms not in range(1, MOST_TERMS + 1),
+        "eddy ladder: terms",
+        got=f"{terms}",
+        expected=f"1 to {MOST_TERMS}",
+        hint="1 for lift and timing, 3 or 4 for the first 50 us.",
+    )

@@ -22,7 +22,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from klack.errors import AccuracyWarning, InputError
+from klack.errors import AccuracyWarning, InputError, refuse_if
 from klack.units import format_si
 
 __all__ = ["FluxMap", "ForceComparison"]
@@ -297,22 +297,22 @@ def _checked(
 ) -> tuple[Vector, Vector, Vector]:
     i, x = (np.array(v, dtype=float).ravel() for v in (current, gap))
     psi = np.array(linkage, dtype=float)
-    if psi.shape != (i.size, x.size) or i.size < 2 or x.size < 3:
-        raise InputError(
-            "FluxMap",
-            got=f"{i.size} currents, {x.size} gaps, linkages of shape {psi.shape}",
-            expected="a linkage for each of at least 2 currents (rows) and 3 gaps (columns)",
-            hint="one row of linkages per current.",
-        )
+    refuse_if(
+        psi.shape != (i.size, x.size) or i.size < 2 or x.size < 3,
+        "FluxMap",
+        got=f"{i.size} currents, {x.size} gaps, linkages of shape {psi.shape}",
+        expected="a linkage for each of at least 2 currents (rows) and 3 gaps (columns)",
+        hint="one row of linkages per current.",
+    )
     rising = np.all(np.diff(i) > 0) and np.all(np.diff(x) > 0) and np.all(np.diff(psi, axis=0) > 0)
-    if not rising or i[0] < 0.0 or (i[0] == 0.0 and np.any(psi[0] != 0.0)) or np.any(psi[0] < 0):
-        raise InputError(
-            "FluxMap",
-            got="a table that is not increasing",
-            expected="currents from 0 or above, gaps, and linkages (over the current) that increase"
-            ", no linkage at 0 A",
-            hint="sort the table; remove remanence.",
-        )
+    refuse_if(
+        not rising or i[0] < 0.0 or (i[0] == 0.0 and np.any(psi[0] != 0.0)) or np.any(psi[0] < 0),
+        "FluxMap",
+        got="a table that is not increasing",
+        expected="currents from 0 or above, gaps, and linkages (over the current) that increase"
+        ", no linkage at 0 A",
+        hint="sort the table; remove remanence.",
+    )
     if i[0] > 0.0:
         i, psi = np.concatenate(([0.0], i)), np.vstack((np.zeros(x.size), psi))
     return i, x, psi

@@ -18,7 +18,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.magnetics.circuit import MagneticBranch, MagneticCircuit
 from klack.magnetics.hysteresis import STOPS_PER_PART, IronStops
 from klack.magnetics.reluctance import GapReluctance, IronReluctance, LinearReluctance
@@ -103,13 +103,13 @@ def current_weights(circuit: MagneticCircuit) -> Vector:
         null = vectors[:, values <= _SAFE * values[-1]]
         v = null @ (null.T @ n)
         v[np.abs(v) < _SAFE * np.max(np.abs(v), initial=0.0)] = 0.0
-    if not abs(v @ n) > _SAFE * np.linalg.norm(n) * np.linalg.norm(v):
-        raise InputError(
-            "magnetic circuit",
-            got="eddy currents in every loop that the coil drives",
-            expected="a leakage path around the coil without an eddy term",
-            hint="add a leakage branch (5 to 15 % of the main permeance) in a loop of its own.",
-        )
+    refuse_if(
+        not abs(v @ n) > _SAFE * np.linalg.norm(n) * np.linalg.norm(v),
+        "magnetic circuit",
+        got="eddy currents in every loop that the coil drives",
+        expected="a leakage path around the coil without an eddy term",
+        hint="add a leakage branch (5 to 15 % of the main permeance) in a loop of its own.",
+    )
     return np.asarray(C @ v / (v @ n), dtype=float)
 
 
@@ -126,13 +126,13 @@ def circuit_numbers(circuit: MagneticCircuit) -> Vector:
     there is none.
     """
     tubes, main, sign = tubes_of(circuit)
-    if len(tubes) > MOST_TUBES:
-        raise InputError(
-            "magnetic circuit",
-            got=f"{len(tubes)} different branch fluxes",
-            expected=f"at most {MOST_TUBES}",
-            hint="put branches that carry the same flux in series in one loop.",
-        )
+    refuse_if(
+        len(tubes) > MOST_TUBES,
+        "magnetic circuit",
+        got=f"{len(tubes)} different branch fluxes",
+        expected=f"at most {MOST_TUBES}",
+        hint="put branches that carry the same flux in series in one loop.",
+    )
     stops = sum(part.share.size for tube in tubes for part in tube.stops)
     if stops > MOST_STOPS:
         raise InputError(

@@ -35,7 +35,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from klack.errors import InputError, require_positive
+from klack.errors import InputError, refuse_if, require_positive
 from klack.magnetics.iron import VACUUM_PERMEABILITY, IronCurve, measured
 
 __all__ = [
@@ -81,13 +81,13 @@ class LoopWidth:
         require_positive("hysteresis: reversal range", self.reversal, "T")
         steepest = float(np.max(np.abs(self.slope)))
         most = float(self.width[0]) / steepest if steepest > 0.0 else np.inf
-        if self.reversal > most:
-            raise InputError(
-                "hysteresis: initial_permeability",
-                got=f"a value with which the loop reverses over {self.reversal:.3g} T",
-                expected=f"a reversal within {most:.3g} T, in which its width changes little",
-                hint="lower initial_permeability, or give a smaller coercivity.",
-            )
+        refuse_if(
+            self.reversal > most,
+            "hysteresis: initial_permeability",
+            got=f"a value with which the loop reverses over {self.reversal:.3g} T",
+            expected=f"a reversal within {most:.3g} T, in which its width changes little",
+            hint="lower initial_permeability, or give a smaller coercivity.",
+        )
 
     @property
     def coercivity(self) -> float:
@@ -179,14 +179,14 @@ def falling_width(
     require_positive("hysteresis: coercivity", coercivity, "A/m")
     require_positive("hysteresis: remanence", remanence, "T")
     most, field = curve.flux_density_at(coercivity), float(curve.field(remanence))
-    if not field < coercivity:
-        raise InputError(
-            "hysteresis: remanence",
-            got=f"{remanence:g} T, where the mean curve needs {field:.4g} A/m",
-            expected=f"less than {most:.4g} T, where it needs the coercivity of {coercivity:g} A/m",
-            hint="a loop whose halves lie evenly about this curve cannot keep more: lower the "
-            "remanence, or give a steeper mean curve (not the initial one).",
-        )
+    refuse_if(
+        not field < coercivity,
+        "hysteresis: remanence",
+        got=f"{remanence:g} T, where the mean curve needs {field:.4g} A/m",
+        expected=f"less than {most:.4g} T, where it needs the coercivity of {coercivity:g} A/m",
+        hint="a loop whose halves lie evenly about this curve cannot keep more: lower the "
+        "remanence, or give a steeper mean curve (not the initial one).",
+    )
     scale = remanence / np.sqrt(np.log(coercivity / field))
 
     def law(B: Vector) -> tuple[Vector, Vector]:
@@ -240,22 +240,22 @@ def _branch(
     """Falling branch ``H(B)``, symmetric at its tips, and the flux density of the tip."""
     B, H = (np.array(v, dtype=float).ravel() for v in (flux_density, field_strength))
     where = "hysteresis loop"
-    if B.size != H.size or B.size < 5:
-        raise InputError(
-            where,
-            got=f"{B.size} flux densities and {H.size} field strengths",
-            expected="the same number of both, at least 5",
-            hint="give the falling branch from the positive tip of the loop to the negative one.",
-        )
+    refuse_if(
+        B.size != H.size or B.size < 5,
+        where,
+        got=f"{B.size} flux densities and {H.size} field strengths",
+        expected="the same number of both, at least 5",
+        hint="give the falling branch from the positive tip of the loop to the negative one.",
+    )
     if B[0] > B[-1]:
         B, H = B[::-1], H[::-1]
-    if not (np.all(np.diff(B) > 0.0) and np.all(np.diff(H) > 0.0)):
-        raise InputError(
-            where,
-            got="a branch on which flux density and field strength do not both fall",
-            expected="points of one branch, in order, each below the one before",
-            hint="take one branch only; smooth its noise and remove repeated points.",
-        )
+    refuse_if(
+        not (np.all(np.diff(B) > 0.0) and np.all(np.diff(H) > 0.0)),
+        where,
+        got="a branch on which flux density and field strength do not both fall",
+        expected="points of one branch, in order, each below the one before",
+        hint="take one branch only; smooth its noise and remove repeated points.",
+    )
     uneven = max(abs(B[0] + B[-1]) / B[-1], abs(H[0] + H[-1]) / H[-1]) if B[-1] > 0 else np.inf
     if uneven > _UNEVEN:
         raise InputError(
@@ -284,16 +284,16 @@ def _reversal(curve: IronCurve, coercivity: float, initial_permeability: float) 
     """``b`` [T], so that the slope at the origin is that of the initial permeability."""
     steep = float(curve.field_slope(0.0))
     most = 1.0 / (VACUUM_PERMEABILITY * steep)
-    if not 1.0 < initial_permeability < most:
-        raise InputError(
-            "hysteresis: initial_permeability",
-            got=f"{initial_permeability:g}",
-            expected=f"above 1 and below {most:.6g}, that of the mean curve at the origin",
-            hint="soft magnetic iron has 100 to 1000 after it was demagnetised."
-            if most > 100.0
-            else "the curve of this material begins flatter than iron does: give a curve of your "
-            "own, the mean of both branches of its loop.",
-        )
+    refuse_if(
+        not 1.0 < initial_permeability < most,
+        "hysteresis: initial_permeability",
+        got=f"{initial_permeability:g}",
+        expected=f"above 1 and below {most:.6g}, that of the mean curve at the origin",
+        hint="soft magnetic iron has 100 to 1000 after it was demagnetised."
+        if most > 100.0
+        else "the curve of this material begins flatter than iron does: give a curve of your "
+        "own, the mean of both branches of its loop.",
+    )
     return 2.0 * coercivity / (1.0 / (VACUUM_PERMEABILITY * initial_permeability) - steep)
 
 

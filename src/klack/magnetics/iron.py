@@ -28,7 +28,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from klack.errors import InputError, require_positive
+from klack.errors import InputError, refuse_if, require_positive
 from klack.magnetics.reluctance import IronReluctance
 from klack.magnetics.tabulation import hermite_grid
 
@@ -223,13 +223,13 @@ def measured(flux_density: ArrayLike, field_strength: ArrayLike) -> IronCurve:
         Increasing with it.
     """
     B, H = (np.array(v, dtype=float).ravel() for v in (flux_density, field_strength))
-    if B.size != H.size or B.size == 0:
-        raise InputError(
-            "measured magnetisation curve",
-            got=f"{B.size} flux densities and {H.size} field strengths",
-            expected="the same number of both, at least one",
-            hint="give one field strength per flux density.",
-        )
+    refuse_if(
+        B.size != H.size or B.size == 0,
+        "measured magnetisation curve",
+        got=f"{B.size} flux densities and {H.size} field strengths",
+        expected="the same number of both, at least one",
+        hint="give one field strength per flux density.",
+    )
     if B[0] != 0.0:
         B, H = np.concatenate(([0.0], B)), np.concatenate(([0.0], H))
     rising = np.all(np.diff(B) > 0.0) and np.all(np.diff(H) > 0.0)
@@ -273,10 +273,10 @@ def _tabulate(curve: Callable[[Vector], tuple[Vector, Vector]]) -> IronCurve:
 
 def _check_saturation(where: str, saturation: float, permeability: float) -> None:
     require_positive(f"{where}: saturation", saturation, "T")
-    if not permeability > 1.0:
-        raise InputError(
-            f"{where}: permeability",
-            got=f"{permeability:g}",
-            expected="a relative permeability above 1",
-            hint="soft magnetic iron has several hundred to several thousand.",
-        )
+    refuse_if(
+        not permeability > 1.0,
+        f"{where}: permeability",
+        got=f"{permeability:g}",
+        expected="a relative permeability above 1",
+        hint="soft magnetic iron has several hundred to several thousand.",
+    )

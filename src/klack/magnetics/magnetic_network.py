@@ -6,7 +6,7 @@ from typing import ClassVar, Literal, Self
 from pydantic import Field, model_validator
 
 from klack.errors import InputError
-from klack.input.problem import CaseProblem, nearest, one_of
+from klack.input.problem import CaseProblem, nearest, one_of, refuse_key_if
 from klack.input.section import Name
 from klack.magnetics.circuit import MagneticCircuit
 from klack.magnetics.coupled_table import independent_ways
@@ -90,30 +90,29 @@ class MagneticNetwork(Component):
     def _complete(self) -> Self:
         kinds = {element.kind for element in self.elements.values()}
         for kind, words in (("coil", "a coil"), (None, "a gap that moves: kind: pole or face")):
-            if kind not in kinds and (kind or not self._moving()):
-                raise CaseProblem(
-                    ("elements",),
-                    got=f"elements of the kinds {', '.join(sorted(kinds))}",
-                    expected=words,
-                    hint="add it, with the nodes that it lies between.",
-                )
-        if self.start == "remanent" and not any(
-            getattr(element, "hysteresis", None) for element in self.elements.values()
-        ):
-            raise CaseProblem(
-                ("start",),
-                got="start: remanent without hysteresis",
-                expected="an element of iron with hysteresis",
-                hint="add hysteresis to an element, or remove 'start'.",
+            refuse_key_if(
+                kind not in kinds and (kind or not self._moving()),
+                ("elements",),
+                got=f"elements of the kinds {', '.join(sorted(kinds))}",
+                expected=words,
+                hint="add it, with the nodes that it lies between.",
             )
+        refuse_key_if(
+            self.start == "remanent"
+            and not any(getattr(element, "hysteresis", None) for element in self.elements.values()),
+            ("start",),
+            got="start: remanent without hysteresis",
+            expected="an element of iron with hysteresis",
+            hint="add hysteresis to an element, or remove 'start'.",
+        )
         low, high = self.gap_range().valid
-        if not low <= self.gap <= high:
-            raise CaseProblem(
-                ("gap",),
-                got=f"{self.gap:g} m",
-                expected=f"{low:g} to {high:g} m, in which all gaps are open",
-                hint="check gap and opens_from.",
-            )
+        refuse_key_if(
+            not low <= self.gap <= high,
+            ("gap",),
+            got=f"{self.gap:g} m",
+            expected=f"{low:g} to {high:g} m, in which all gaps are open",
+            hint="check gap and opens_from.",
+        )
         self._check_circuits()
         try:
             circuit_numbers(self.circuit())
@@ -142,21 +141,21 @@ class MagneticNetwork(Component):
                     )
                 wound[circuit].append(name)
         for name, coils in wound.items():
-            if not coils:
-                raise CaseProblem(
-                    ("circuits", name) if name else ("elements",),
-                    got="no coil in it" if name else "no coil at the terminals",
-                    expected="an element of kind coil"
-                    + (f" with circuit: {name}" if name else " without 'circuit'"),
-                    hint="the resistance of the network is that of the coils without 'circuit'.",
-                )
-            if name in self.ports:
-                raise CaseProblem(
-                    ("circuits", name),
-                    got=f"the name '{name}', which is another port",
-                    expected=f"a name other than {', '.join(self.ports)}",
-                    hint="name it after its purpose: holding, closing, sensing.",
-                )
+            refuse_key_if(
+                not coils,
+                ("circuits", name) if name else ("elements",),
+                got="no coil in it" if name else "no coil at the terminals",
+                expected="an element of kind coil"
+                + (f" with circuit: {name}" if name else " without 'circuit'"),
+                hint="the resistance of the network is that of the coils without 'circuit'.",
+            )
+            refuse_key_if(
+                name in self.ports,
+                ("circuits", name),
+                got=f"the name '{name}', which is another port",
+                expected=f"a name other than {', '.join(self.ports)}",
+                hint="name it after its purpose: holding, closing, sensing.",
+            )
 
     def circuit(self) -> MagneticCircuit:
         """Magnetic circuit; its ``x`` is the working gap without residual gaps."""

@@ -7,8 +7,8 @@ from typing import Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from klack.errors import InputError
-from klack.input.problem import CaseProblem
+from klack.errors import InputError, refuse_if
+from klack.input.problem import CaseProblem, refuse_key_if
 from klack.input.section import Count, InputPath, Number, Section, Text
 from klack.magnetics.map_file import MapTable, read_map, read_matrix
 from klack.units import Length, format_si
@@ -73,20 +73,20 @@ class MapFile(Section):
 
     @model_validator(mode="after")
     def _readable(self) -> Self:
-        if self.linkage_factor == 0.0:
-            raise CaseProblem(
-                ("linkage_factor",),
-                got="0",
-                expected="a factor other than 0",
-                hint="leave it out for a whole model.",
-            )
-        if self.force_file is not None and self.layout != "matrix":
-            raise CaseProblem(
-                ("force_file",),
-                got="a file of the force with layout: rows",
-                expected="layout: matrix",
-                hint="with layout: rows the force is a column of 'file'.",
-            )
+        refuse_key_if(
+            self.linkage_factor == 0.0,
+            ("linkage_factor",),
+            got="0",
+            expected="a factor other than 0",
+            hint="leave it out for a whole model.",
+        )
+        refuse_key_if(
+            self.force_file is not None and self.layout != "matrix",
+            ("force_file",),
+            got="a file of the force with layout: rows",
+            expected="layout: matrix",
+            hint="with layout: rows the force is a column of 'file'.",
+        )
         try:
             self.table()
         except InputError as error:
@@ -146,20 +146,20 @@ def _same(a: np.ndarray, b: np.ndarray) -> bool:
 def _require_coil(where: str, table: MapTable) -> None:
     """Reject what no coil does, naming the point."""
     i, x, psi = table.current, table.gap, table.linkage
-    if i.size < 2 or x.size < 3:
-        raise InputError(
-            where,
-            got=f"{i.size} currents and {x.size} gaps",
-            expected="at least 2 currents and 3 gaps",
-            hint="compute more points; ten of each are usual.",
-        )
-    if i[0] < 0.0:
-        raise InputError(
-            where,
-            got=f"a current of {format_si(i[0], 'A')}",
-            expected="currents from 0",
-            hint="leave out the rows with negative currents: linkage and force follow by symmetry.",
-        )
+    refuse_if(
+        i.size < 2 or x.size < 3,
+        where,
+        got=f"{i.size} currents and {x.size} gaps",
+        expected="at least 2 currents and 3 gaps",
+        hint="compute more points; ten of each are usual.",
+    )
+    refuse_if(
+        i[0] < 0.0,
+        where,
+        got=f"a current of {format_si(i[0], 'A')}",
+        expected="currents from 0",
+        hint="leave out the rows with negative currents: linkage and force follow by symmetry.",
+    )
     if i[0] == 0.0 and np.any(psi[0] != 0.0):
         j = int(np.argmax(np.abs(psi[0])))
         raise InputError(

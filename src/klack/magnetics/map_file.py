@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.magnetics.map_text import KINDS, CellTable, read_cells, read_number, read_unit
 from klack.units import QuantityError, format_si, parse_quantity
 
@@ -277,17 +277,15 @@ def _families(cells: CellTable, found: Mapping[int, _Column]) -> dict[str, Vecto
     places = sorted({place for place, _ in varied})
     names = {name for name, _ in places}
     values = sorted({quantity for _, quantity in varied})
-    if (
+    refuse_if(
         len(names) > 1
         or len(own) != 1
-        or len(varied) != sum(c.varied is not None for c in found.values())
-    ):
-        raise InputError(
-            cells.where,
-            got="heads that vary " + " and ".join(sorted(names)),
-            expected="one of current and gap in the first column, the other in the heads",
-            hint="export one row per point instead.",
-        )
+        or len(varied) != sum(c.varied is not None for c in found.values()),
+        cells.where,
+        got="heads that vary " + " and ".join(sorted(names)),
+        expected="one of current and gap in the first column, the other in the heads",
+        hint="export one row per point instead.",
+    )
     points: dict[str, list[float]] = {name: [] for name in (*own, *names, *values)}
     (first, at), (other,) = next(iter(own.items())), names
     for place in places:

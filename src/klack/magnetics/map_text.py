@@ -10,7 +10,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.units import CURRENT, FLUX, FORCE, LENGTH, QuantityError, parse_quantity
 
 __all__ = ["KINDS", "CellTable", "read_cells", "read_number", "read_unit"]
@@ -56,13 +56,13 @@ def read_cells(path: Path, where: str) -> CellTable:
         If it is too large, is not text, or has no row of numbers.
     """
     size = path.stat().st_size
-    if size > LARGEST:
-        raise InputError(
-            where,
-            got=f"{size / 1e6:.3g} MB",
-            expected=f"at most {LARGEST / 1e6:g} MB",
-            hint="some ten currents and gaps are enough; smooth curves run through them.",
-        )
+    refuse_if(
+        size > LARGEST,
+        where,
+        got=f"{size / 1e6:.3g} MB",
+        expected=f"at most {LARGEST / 1e6:g} MB",
+        hint="some ten currents and gaps are enough; smooth curves run through them.",
+    )
     lines = [
         (number, line)
         for number, line in enumerate(_text(path.read_bytes(), where).splitlines(), 1)
@@ -115,13 +115,13 @@ def _head(lines: list[str], separator: str) -> list[str]:
 
 def _text(data: bytes, where: str) -> str:
     wide = data[:2] in (b"\xff\xfe", b"\xfe\xff")
-    if not wide and b"\0" in data:
-        raise InputError(
-            where,
-            got="bytes that are not text",
-            expected="a text file",
-            hint="export the table as CSV, not as a workbook.",
-        )
+    refuse_if(
+        not wide and b"\0" in data,
+        where,
+        got="bytes that are not text",
+        expected="a text file",
+        hint="export the table as CSV, not as a workbook.",
+    )
     for encoding in ("utf-16",) if wide else ("utf-8-sig", "latin-1"):
         try:
             return data.decode(encoding)
@@ -164,13 +164,13 @@ def _table(
             cells.pop()
         if not rows and not head:
             head = [""] * len(cells)
-        if len(cells) != len(head):
-            raise InputError(
-                f"{where}, line {number}",
-                got=f"{len(cells)} cells",
-                expected=f"{len(head)}, as many as in the head",
-                hint="give every row a cell for each column; a decimal comma needs semicolons or "
-                "tabs between the columns.",
-            )
+        refuse_if(
+            len(cells) != len(head),
+            f"{where}, line {number}",
+            got=f"{len(cells)} cells",
+            expected=f"{len(head)}, as many as in the head",
+            hint="give every row a cell for each column; a decimal comma needs semicolons or "
+            "tabs between the columns.",
+        )
         rows.append((number, tuple(cells)))
     return CellTable(where, tuple(head), tuple(rows))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from klack.input.problem import CaseProblem
+from klack.input.problem import refuse_key_if
 from klack.input.section import Name, Number, Section
 from klack.magnetics.circuit import MagneticBranch
 from klack.magnetics.iron import VACUUM_PERMEABILITY
@@ -49,13 +49,13 @@ class _Element(Section):
 
     @model_validator(mode="after")
     def _two_nodes(self) -> Self:
-        if self.between[0] == self.between[1]:
-            raise CaseProblem(
-                ("between",),
-                got=f"'{self.between[0]}' twice",
-                expected="two different nodes",
-                hint="every element joins two nodes.",
-            )
+        refuse_key_if(
+            self.between[0] == self.between[1],
+            ("between",),
+            got=f"'{self.between[0]}' twice",
+            expected="two different nodes",
+            hint="every element joins two nodes.",
+        )
         return self
 
     def tubes(self, name: str, gaps: WorkingGaps) -> tuple[Tube, ...]:
@@ -160,13 +160,13 @@ class PoleElement(PoleGap, MovingGap):
 
     @model_validator(mode="after")
     def _axial(self) -> Self:
-        if self.tilts:
-            raise CaseProblem(
-                ("tilts",),
-                got="a pole that tilts its armature",
-                expected="tilts: false",
-                hint="moments across the axis are a matter of the component 'solenoid'.",
-            )
+        refuse_key_if(
+            self.tilts,
+            ("tilts",),
+            got="a pole that tilts its armature",
+            expected="tilts: false",
+            hint="moments across the axis are a matter of the component 'solenoid'.",
+        )
         return self
 
     @property
@@ -254,10 +254,13 @@ class CoilElement(_Element):
 
     @model_validator(mode="after")
     def _wound(self) -> Self:
-        if self.turns == 0.0:
-            raise CaseProblem(
-                ("turns",), got="0", expected="turns", hint="remove the coil, or give its turns."
-            )
+        refuse_key_if(
+            self.turns == 0.0,
+            ("turns",),
+            got="0",
+            expected="turns",
+            hint="remove the coil, or give its turns.",
+        )
         return self
 
     def tubes(self, name: str, gaps: WorkingGaps) -> tuple[Tube, ...]:

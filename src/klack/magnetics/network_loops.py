@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.magnetics.circuit import MOST_LOOPS, MagneticBranch, MagneticCircuit
 
 __all__ = ["Tube", "circuit_of_network", "loop_names"]
@@ -60,13 +60,13 @@ def circuit_of_network(tubes: Sequence[Tube], main: str, gap: float) -> Magnetic
         for other, sign in _way(tubes, tree, tubes[k].end, tubes[k].start):
             loops[other, column] = sign
     idle = [tube.branch.name for tube, row in zip(tubes, loops, strict=True) if not np.any(row)]
-    if idle:
-        raise InputError(
-            "magnetic network",
-            got=f"no flux through {', '.join(idle)}: nothing leads back from there",
-            expected="every element in a closed path",
-            hint="check the names of the nodes in 'between'; a node needs two elements at least.",
-        )
+    refuse_if(
+        idle,
+        "magnetic network",
+        got=f"no flux through {', '.join(idle)}: nothing leads back from there",
+        expected="every element in a closed path",
+        hint="check the names of the nodes in 'between'; a node needs two elements at least.",
+    )
     circuit = MagneticCircuit(branches=tuple(tube.branch for tube in tubes), loops=loops, main=main)
     _require_reluctance(circuit, gap)
     return circuit

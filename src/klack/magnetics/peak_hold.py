@@ -4,7 +4,7 @@ from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from klack.input.problem import CaseProblem
+from klack.input.problem import CaseProblem, refuse_key_if
 from klack.magnetics.driver import DriveProgram, DriveState, Switch, TimedDriver, When
 from klack.units import Current, Time, Voltage
 
@@ -46,20 +46,20 @@ class PeakHold(TimedDriver):
 
     @model_validator(mode="after")
     def _order_of_currents(self) -> Self:
-        if not self.hold_band < 2.0 * self.hold_current:
-            raise CaseProblem(
-                ("hold_band",),
-                got=f"{self.hold_band:g} A",
-                expected="less than twice the hold current",
-                hint="0.5 to 1 A is usual.",
-            )
-        if not self.hold_current + 0.5 * self.hold_band < self.peak_current:
-            raise CaseProblem(
-                ("peak_current",),
-                got=f"{self.peak_current:g} A",
-                expected="a current above the band of the hold",
-                hint="a driver without a peak is 'two-point'.",
-            )
+        refuse_key_if(
+            not self.hold_band < 2.0 * self.hold_current,
+            ("hold_band",),
+            got=f"{self.hold_band:g} A",
+            expected="less than twice the hold current",
+            hint="0.5 to 1 A is usual.",
+        )
+        refuse_key_if(
+            not self.hold_current + 0.5 * self.hold_band < self.peak_current,
+            ("peak_current",),
+            got=f"{self.peak_current:g} A",
+            expected="a current above the band of the hold",
+            hint="a driver without a peak is 'two-point'.",
+        )
         inside = self.peak_until is None or (
             self.start < self.peak_until and (self.end is None or self.peak_until < self.end)
         )

@@ -30,7 +30,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from klack.errors import InputError, require_nonnegative
+from klack.errors import InputError, refuse_if, require_nonnegative
 
 __all__ = ["GapReluctance", "IronReluctance", "LinearReluctance", "ReluctanceLaw"]
 
@@ -100,13 +100,13 @@ class GapReluctance:
 
     def __init__(self, points: ArrayLike, reluctance: ArrayLike, slope: ArrayLike) -> None:
         x, R, dR = (np.array(v, dtype=float).ravel() for v in (points, reluctance, slope))
-        if not (x.size == R.size == dR.size and x.size >= 2 and np.all(np.diff(x) > 0)):
-            raise InputError(
-                "GapReluctance",
-                got=f"{x.size} gaps, {R.size} reluctances, {dR.size} slopes",
-                expected="the same number of each, at least two, the gaps increasing",
-                hint="sort the gaps and remove repeated ones.",
-            )
+        refuse_if(
+            not (x.size == R.size == dR.size and x.size >= 2 and np.all(np.diff(x) > 0)),
+            "GapReluctance",
+            got=f"{x.size} gaps, {R.size} reluctances, {dR.size} slopes",
+            expected="the same number of each, at least two, the gaps increasing",
+            hint="sort the gaps and remove repeated ones.",
+        )
         if not np.all(R > 0):
             raise InputError(
                 "GapReluctance",
@@ -171,20 +171,20 @@ class IronReluctance:
 
     def __init__(self, points: ArrayLike, mmf: ArrayLike, slope: ArrayLike) -> None:
         phi, F, dF = (np.array(v, dtype=float).ravel() for v in (points, mmf, slope))
-        if not (phi.size == F.size == dF.size and phi.size >= 2 and phi[0] == 0.0 == F[0]):
-            raise InputError(
-                "IronReluctance",
-                got=f"{phi.size} fluxes, {F.size} mmfs, {dF.size} slopes",
-                expected="the same number of each, at least two, starting at (0 Wb, 0 A)",
-                hint="begin the table at the origin.",
-            )
-        if not (np.all(np.diff(phi) > 0) and np.all(np.diff(F) > 0) and np.all(dF > 0)):
-            raise InputError(
-                "IronReluctance",
-                got="a magnetisation curve that is not increasing",
-                expected="mmf and slope that increase with the flux",
-                hint="sort the points by flux; smooth measured curves first.",
-            )
+        refuse_if(
+            not (phi.size == F.size == dF.size and phi.size >= 2 and phi[0] == 0.0 == F[0]),
+            "IronReluctance",
+            got=f"{phi.size} fluxes, {F.size} mmfs, {dF.size} slopes",
+            expected="the same number of each, at least two, starting at (0 Wb, 0 A)",
+            hint="begin the table at the origin.",
+        )
+        refuse_if(
+            not (np.all(np.diff(phi) > 0) and np.all(np.diff(F) > 0) and np.all(dF > 0)),
+            "IronReluctance",
+            got="a magnetisation curve that is not increasing",
+            expected="mmf and slope that increase with the flux",
+            hint="sort the points by flux; smooth measured curves first.",
+        )
         object.__setattr__(self, "rows", _one_sided_rows(phi, F, dF))
 
     def mmf(self, flux: ArrayLike, gap: ArrayLike) -> Vector:

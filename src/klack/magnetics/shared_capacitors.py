@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.magnetics.coupled_rows import PlacedMagnet, coupled_rows
 from klack.magnetics.output_stage import Capacitor
 from klack.network.rows import Rows
@@ -60,14 +60,14 @@ class SharedCapacitors:
                     continue
                 name, capacitor = self.capacitors[self.drawing[node]]
                 battery = max(path.battery for path in winding.driver.stage.paths.values())
-                if not battery < capacitor.nominal:
-                    raise InputError(
-                        f"components.{name}.voltage",
-                        got=format_si(capacitor.nominal, "V"),
-                        expected=f"more than the battery of the driver of '{part.component}', "
-                        f"{format_si(battery, 'V')}",
-                        hint="a driver without boost is 'two-point'.",
-                    )
+                refuse_if(
+                    not battery < capacitor.nominal,
+                    f"components.{name}.voltage",
+                    got=format_si(capacitor.nominal, "V"),
+                    expected=f"more than the battery of the driver of '{part.component}', "
+                    f"{format_si(battery, 'V')}",
+                    hint="a driver without boost is 'two-point'.",
+                )
 
 
 def shared_capacitors(rows: Rows) -> SharedCapacitors:

@@ -9,8 +9,8 @@ from typing import Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from klack.errors import InputError
-from klack.input.problem import CaseProblem
+from klack.errors import refuse_if
+from klack.input.problem import refuse_key_if
 from klack.input.section import Number
 from klack.magnetics.circuit import MOST_LOOPS, MagneticBranch, MagneticCircuit
 from klack.magnetics.gap_range import GapRange
@@ -132,35 +132,35 @@ class Solenoid(Component):
         solid = [part.eddy.terms for part in self.iron if part.eddy is not None]
         terms = [*(part.terms for part in self.eddy), *solid]
         loops = 2 + sum(count - 1 for count in terms)
-        if loops > MOST_LOOPS:
-            raise CaseProblem(
-                ("iron",) if solid else ("eddy",),
-                got=f"eddy currents of {' + '.join(map(str, terms))} terms",
-                expected=f"at most {MOST_LOOPS - 2} terms beyond the first of each part",
-                hint="give more terms to the part with the largest section, one to the others.",
-            )
+        refuse_key_if(
+            loops > MOST_LOOPS,
+            ("iron",) if solid else ("eddy",),
+            got=f"eddy currents of {' + '.join(map(str, terms))} terms",
+            expected=f"at most {MOST_LOOPS - 2} terms beyond the first of each part",
+            hint="give more terms to the part with the largest section, one to the others.",
+        )
         return self
 
     @model_validator(mode="after")
     def _something_remanent(self) -> Self:
-        if self.start == "remanent" and not any(part.hysteresis for part in self.iron):
-            raise CaseProblem(
-                ("start",),
-                got="start: remanent without hysteresis",
-                expected="a part of iron with hysteresis",
-                hint="add hysteresis to a part, or remove 'start'.",
-            )
+        refuse_key_if(
+            self.start == "remanent" and not any(part.hysteresis for part in self.iron),
+            ("start",),
+            got="start: remanent without hysteresis",
+            expected="a part of iron with hysteresis",
+            hint="add hysteresis to a part, or remove 'start'.",
+        )
         return self
 
     @model_validator(mode="after")
     def _one_remanence(self) -> Self:
-        if self.residual_flux > 0.0 and any(part.hysteresis for part in self.iron):
-            raise CaseProblem(
-                ("residual_flux",),
-                got="a residual flux beside iron with hysteresis",
-                expected="one of them: the iron has its own remanence",
-                hint="remove residual_flux, or the sections 'hysteresis'.",
-            )
+        refuse_key_if(
+            self.residual_flux > 0.0 and any(part.hysteresis for part in self.iron),
+            ("residual_flux",),
+            got="a residual flux beside iron with hysteresis",
+            expected="one of them: the iron has its own remanence",
+            hint="remove residual_flux, or the sections 'hysteresis'.",
+        )
         return self
 
     def circuit(self) -> MagneticCircuit:
@@ -180,13 +180,13 @@ class Solenoid(Component):
             remanent=self.start == "remanent",
         )
         if self.off_axis_parts():
-            if not alone:
-                raise InputError(
-                    f"components.{rows.component}",
-                    got="off_axis or tilts with a driver that shares its boost capacitor",
-                    expected="forces across the axis of a magnet solved by itself",
-                    hint="give the driver a capacitance of its own.",
-                )
+            refuse_if(
+                not alone,
+                f"components.{rows.component}",
+                got="off_axis or tilts with a driver that shares its boost capacitor",
+                expected="forces across the axis of a magnet solved by itself",
+                hint="give the driver a capacitance of its own.",
+            )
             rows.side_of_element(self._side_pull(circuit.loops.shape[1]))
 
     def off_axis_parts(self) -> tuple[OffAxisPart, ...]:

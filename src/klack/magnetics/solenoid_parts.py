@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from klack.errors import InputError
-from klack.input.problem import CaseProblem
+from klack.input.problem import CaseProblem, refuse_key_if
 from klack.input.section import Count, Number, Section
 from klack.magnetics.air_gap import (
     edge_on_plane,
@@ -87,13 +87,13 @@ class PoleGap(Section):
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
-        if self.inner_radius >= self.outer_radius:
-            raise CaseProblem(
-                ("inner_radius",),
-                got=f"{self.inner_radius:g} m beside an outer radius of {self.outer_radius:g} m",
-                expected="an inner radius below the outer radius",
-                hint="swap the two radii.",
-            )
+        refuse_key_if(
+            self.inner_radius >= self.outer_radius,
+            ("inner_radius",),
+            got=f"{self.inner_radius:g} m beside an outer radius of {self.outer_radius:g} m",
+            expected="an inner radius below the outer radius",
+            hint="swap the two radii.",
+        )
         needed = {"none": None, "equal": "shoulder", "plane": "shoulder", "wall": "wall"}
         key = needed[self.fringing]
         for name in ("shoulder", "wall"):
@@ -275,13 +275,13 @@ class IronPart(Section):
                 )
         else:
             for name in ("coercivity", "remanence"):
-                if getattr(given, name) is not None:
-                    raise CaseProblem(
-                        ("hysteresis", name),
-                        got=f"{name} beside material: loop",
-                        expected="one of them",
-                        hint=f"remove {name}; the loop holds it.",
-                    )
+                refuse_key_if(
+                    getattr(given, name) is not None,
+                    ("hysteresis", name),
+                    got=f"{name} beside material: loop",
+                    expected="one of them",
+                    hint=f"remove {name}; the loop holds it.",
+                )
         try:
             self.width()
         except InputError as error:

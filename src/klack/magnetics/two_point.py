@@ -4,7 +4,7 @@ from typing import ClassVar, Self
 
 from pydantic import Field, model_validator
 
-from klack.input.problem import CaseProblem
+from klack.input.problem import refuse_key_if
 from klack.magnetics.driver import DriveProgram, DriveState, Switch, TimedDriver, When
 from klack.units import Current, Voltage
 
@@ -26,13 +26,13 @@ class TwoPoint(TimedDriver):
 
     @model_validator(mode="after")
     def _band(self) -> Self:
-        if not self.lower < self.upper:
-            raise CaseProblem(
-                ("lower",),
-                got=f"{self.lower:g} A",
-                expected=f"a current below the upper one, {self.upper:g} A",
-                hint="0.5 to 1 A apart is usual.",
-            )
+        refuse_key_if(
+            not self.lower < self.upper,
+            ("lower",),
+            got=f"{self.lower:g} A",
+            expected=f"a current below the upper one, {self.upper:g} A",
+            hint="0.5 to 1 A apart is usual.",
+        )
         return self
 
     def program(self) -> DriveProgram:

@@ -4,7 +4,7 @@ from typing import ClassVar, Self
 
 from pydantic import Field, model_validator
 
-from klack.input.problem import CaseProblem
+from klack.input.problem import refuse_key_if
 from klack.magnetics.driver import DriveCourse, DriveProgram, Driver, DriveState
 from klack.units import Time, Voltage
 
@@ -26,15 +26,15 @@ class VoltageTable(Driver):
     @model_validator(mode="after")
     def _rising_pairs(self) -> Self:
         falling = any(b < a for a, b in zip(self.time, self.time[1:], strict=False))
-        if len(self.time) != len(self.voltage) or falling:
-            raise CaseProblem(
-                ("time",),
-                got="decreasing times"
-                if falling
-                else f"{len(self.time)} times for {len(self.voltage)} voltages",
-                expected="as many times as voltages, in order",
-                hint="write a jump as the same time twice.",
-            )
+        refuse_key_if(
+            len(self.time) != len(self.voltage) or falling,
+            ("time",),
+            got="decreasing times"
+            if falling
+            else f"{len(self.time)} times for {len(self.voltage)} voltages",
+            expected="as many times as voltages, in order",
+            hint="write a jump as the same time twice.",
+        )
         return self
 
     def program(self) -> DriveProgram:

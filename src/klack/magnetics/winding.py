@@ -5,7 +5,7 @@ from typing import Annotated
 from pydantic import AfterValidator
 
 from klack.errors import require_positive
-from klack.input.problem import CaseProblem
+from klack.input.problem import refuse_key_if
 from klack.units import Temperature
 
 __all__ = [
@@ -25,14 +25,14 @@ _COLDEST, _MELTS = 73.15, 1357.77  # [K] copper follows its coefficient; ITS-90
 
 
 def _of_copper(temperature: float) -> float:
-    if not _COLDEST <= temperature <= _MELTS:
-        raise CaseProblem(
-            (),
-            got=f"{temperature - 273.15:.4g} degC",
-            expected="-200 degC, below which copper does not follow its coefficient, to 1085 degC, "
-            "where it melts",
-            hint="check the sign and the unit.",
-        )
+    refuse_key_if(
+        not _COLDEST <= temperature <= _MELTS,
+        (),
+        got=f"{temperature - 273.15:.4g} degC",
+        expected="-200 degC, below which copper does not follow its coefficient, to 1085 degC, "
+        "where it melts",
+        hint="check the sign and the unit.",
+    )
     return temperature
 
 
