@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from klack.control.memory import Memory, remembered
-from klack.input.problem import CaseProblem
+from klack.input.problem import refuse_key_if
 from klack.input.section import Name, Number, Section
 
 __all__ = ["HysteresisController", "RunningHysteresis"]
@@ -28,13 +28,13 @@ class HysteresisController(Section):
 
     @model_validator(mode="after")
     def _band(self) -> Self:
-        if not self.lower < self.upper:
-            raise CaseProblem(
-                ("lower",),
-                got=f"{self.lower:g}",
-                expected=f"a signal below the upper one, {self.upper:g}",
-                hint="a band that is wider than noise and quantisation.",
-            )
+        refuse_key_if(
+            not self.lower < self.upper,
+            ("lower",),
+            got=f"{self.lower:g}",
+            expected=f"a signal below the upper one, {self.upper:g}",
+            hint="a band that is wider than noise and quantisation.",
+        )
         return self
 
     def used(self) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from klack.control.memory import Memory, remembered
-from klack.input.problem import CaseProblem
+from klack.input.problem import refuse_key_if
 from klack.input.section import Name, Number, Section
 from klack.units import Time
 
@@ -23,13 +23,13 @@ class Setpoint(Section):
 
     @model_validator(mode="after")
     def _pairs(self) -> Self:
-        if len(self.time) != len(self.value) or np.any(np.diff(self.time) < 0):
-            raise CaseProblem(
-                ("time",),
-                got=f"{len(self.time)} times for {len(self.value)} values, or falling times",
-                expected="one value for each time, in order",
-                hint="write a jump as the same time twice.",
-            )
+        refuse_key_if(
+            len(self.time) != len(self.value) or np.any(np.diff(self.time) < 0),
+            ("time",),
+            got=f"{len(self.time)} times for {len(self.value)} values, or falling times",
+            expected="one value for each time, in order",
+            hint="write a jump as the same time twice.",
+        )
         return self
 
     def at(self, time: float) -> float:
@@ -71,13 +71,13 @@ class PidController(Section):
 
     @model_validator(mode="after")
     def _limits(self) -> Self:
-        if not self.lower < self.upper:
-            raise CaseProblem(
-                ("lower",),
-                got=f"{self.lower:g}",
-                expected=f"below the upper limit, {self.upper:g}",
-                hint="a coil at a half bridge: lower: 0 and the supply as upper.",
-            )
+        refuse_key_if(
+            not self.lower < self.upper,
+            ("lower",),
+            got=f"{self.lower:g}",
+            expected=f"below the upper limit, {self.upper:g}",
+            hint="a coil at a half bridge: lower: 0 and the supply as upper.",
+        )
         return self
 
     def used(self) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from klack.control.memory import Memory, remembered
-from klack.input.problem import CaseProblem, nearest
+from klack.input.problem import CaseProblem, nearest, refuse_key_if
 from klack.input.section import Name, Number, Section
 from klack.units import Time
 
@@ -56,13 +56,13 @@ class StateMachine(Section):
     @model_validator(mode="after")
     def _known_states(self) -> Self:
         names = [state.name for state in self.states]
-        if len(set(names)) < len(names):
-            raise CaseProblem(
-                ("states",),
-                got=", ".join(names),
-                expected="states with different names",
-                hint="rename one.",
-            )
+        refuse_key_if(
+            len(set(names)) < len(names),
+            ("states",),
+            got=", ".join(names),
+            expected="states with different names",
+            hint="rename one.",
+        )
         for i, state in enumerate(self.states):
             for j, way in enumerate(state.transitions):
                 if way.to not in names or way.to == state.name:

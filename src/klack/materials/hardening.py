@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from klack.errors import InputError, require_positive
+from klack.errors import InputError, refuse_if, require_positive
 
 __all__ = [
     "HARDNESS_SPREAD",
@@ -76,13 +76,13 @@ def vickers_of_rockwell(hrc: float) -> float:
     >>> vickers_of_rockwell(60.0)
     697.0
     """
-    if not _ROCKWELL[0] <= hrc <= _ROCKWELL[-1]:
-        raise InputError(
-            "hardness: HRC",
-            got=f"{hrc:g}",
-            expected="20 to 68, where Rockwell C is defined",
-            hint="give the hardness as HV.",
-        )
+    refuse_if(
+        not _ROCKWELL[0] <= hrc <= _ROCKWELL[-1],
+        "hardness: HRC",
+        got=f"{hrc:g}",
+        expected="20 to 68, where Rockwell C is defined",
+        hint="give the hardness as HV.",
+    )
     return float(np.interp(hrc, _ROCKWELL, _VICKERS))
 
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from math import sqrt
 
-from klack.errors import InputError, require_positive
+from klack.errors import InputError, refuse_if, require_positive
 from klack.materials.hardening import LARGEST_YIELD, Hardening
 
 __all__ = ["Material"]
@@ -34,13 +34,13 @@ class Material:
     def __post_init__(self) -> None:
         require_positive(f"material '{self.name}': young", self.young, "Pa")
         require_positive(f"material '{self.name}': density", self.density, "kg/m^3")
-        if not -1.0 < self.poisson < 0.5:
-            raise InputError(
-                f"material '{self.name}': poisson",
-                got=f"{self.poisson:g}",
-                expected="a value between -1 and 0.5 (both excluded)",
-                hint="metals lie between 0.25 and 0.35; 0.5 would be incompressible.",
-            )
+        refuse_if(
+            not -1.0 < self.poisson < 0.5,
+            f"material '{self.name}': poisson",
+            got=f"{self.poisson:g}",
+            expected="a value between -1 and 0.5 (both excluded)",
+            hint="metals lie between 0.25 and 0.35; 0.5 would be incompressible.",
+        )
 
         limit = LARGEST_YIELD * self.young
         if self.hardening is not None and self.hardening.yield_stress > limit:

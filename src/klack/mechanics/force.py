@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field, model_validator
 
-from klack.input.problem import CaseProblem
+from klack.input.problem import refuse_key_if
 from klack.network.component import Component
 from klack.network.port import ELEMENT, Port
 from klack.network.rows import Book, Rows
@@ -98,20 +98,20 @@ class ForceOverTime(Component):
 
     @model_validator(mode="after")
     def _table(self) -> "ForceOverTime":
-        if len(self.time) != len(self.force):
-            raise CaseProblem(
-                ("force",),
-                got=f"{len(self.force)} forces for {len(self.time)} times",
-                expected="one force for each time",
-                hint="add or remove values.",
-            )
-        if not np.all(np.diff(self.time) > 0):
-            raise CaseProblem(
-                ("time",),
-                got="times that do not increase",
-                expected="each later than the previous one",
-                hint="sort them; write a jump as two times 1 ns apart.",
-            )
+        refuse_key_if(
+            len(self.time) != len(self.force),
+            ("force",),
+            got=f"{len(self.force)} forces for {len(self.time)} times",
+            expected="one force for each time",
+            hint="add or remove values.",
+        )
+        refuse_key_if(
+            not np.all(np.diff(self.time) > 0),
+            ("time",),
+            got="times that do not increase",
+            expected="each later than the previous one",
+            hint="sort them; write a jump as two times 1 ns apart.",
+        )
         return self
 
     def at_start(self) -> Component:

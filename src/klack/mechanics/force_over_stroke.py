@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field, model_validator
 
-from klack.input.problem import CaseProblem
+from klack.input.problem import refuse_key_if
 from klack.network.component import Component
 from klack.network.port import ELEMENT, Port
 from klack.network.rows import Book, Rows
@@ -92,20 +92,20 @@ class ForceOverStroke(Component):
 
     @model_validator(mode="after")
     def _table(self) -> "ForceOverStroke":
-        if len(self.stroke) != len(self.force):
-            raise CaseProblem(
-                ("force",),
-                got=f"{len(self.force)} forces for {len(self.stroke)} displacements",
-                expected="one force for each displacement",
-                hint="add or remove values.",
-            )
-        if not np.all(np.diff(self.stroke) > 0):
-            raise CaseProblem(
-                ("stroke",),
-                got="displacements that do not increase",
-                expected="each larger than the previous one",
-                hint="sort them.",
-            )
+        refuse_key_if(
+            len(self.stroke) != len(self.force),
+            ("force",),
+            got=f"{len(self.force)} forces for {len(self.stroke)} displacements",
+            expected="one force for each displacement",
+            hint="add or remove values.",
+        )
+        refuse_key_if(
+            not np.all(np.diff(self.stroke) > 0),
+            ("stroke",),
+            got="displacements that do not increase",
+            expected="each larger than the previous one",
+            hint="sort them.",
+        )
         return self
 
     def work(self) -> np.ndarray:

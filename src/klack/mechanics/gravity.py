@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 from pydantic import Field
 
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.network.component import Component
 from klack.network.port import ELEMENT, Port
 from klack.network.rows import Book, Rows
@@ -50,13 +50,13 @@ class Gravity(Component):
     def add_rows(self, rows: Rows) -> None:
         """Add the weight of the body at the port."""
         masses = [body.mass for body in rows.partner("body") if hasattr(body, "mass")]
-        if len(masses) != 1:
-            raise InputError(
-                f"component '{rows.component}'",
-                got="no body with a mass at its port",
-                expected="a rigid mass or a flexible body",
-                hint="connect it to its body.",
-            )
+        refuse_if(
+            len(masses) != 1,
+            f"component '{rows.component}'",
+            got="no body with a mass at its port",
+            expected="a rigid mass or a flexible body",
+            hint="connect it to its body.",
+        )
         weight = masses[0] * self.acceleration * cos(self.inclination)
         rows.element(
             gravity_step,

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from klack.bodies.reduction.reduced_body import ReducedBody
-from klack.input.problem import CaseProblem
+from klack.input.problem import refuse_key_if
 from klack.input.section import Name
 from klack.network.component import Component
 from klack.network.port import MOTION, Port
@@ -53,28 +53,28 @@ class Lever(Component):
 
     @model_validator(mode="after")
     def _it_turns(self) -> Self:
-        if len(self.arms) < 1 or any(arm == 0.0 for arm in self.arms.values()):
-            raise CaseProblem(
-                ("arms",),
-                got="an arm of 0 m" if self.arms else "no arms",
-                expected="at least one port, each at some distance from the pivot",
-                hint="a port on the pivot does not move: join it to ground.",
-            )
+        refuse_key_if(
+            len(self.arms) < 1 or any(arm == 0.0 for arm in self.arms.values()),
+            ("arms",),
+            got="an arm of 0 m" if self.arms else "no arms",
+            expected="at least one port, each at some distance from the pivot",
+            hint="a port on the pivot does not move: join it to ground.",
+        )
         for name in self.carried:
-            if name not in self.arms:
-                raise CaseProblem(
-                    ("carried", name),
-                    got=f"a mass at '{name}'",
-                    expected=f"one of the arms: {', '.join(self.arms)}",
-                    hint="name the arm that carries it.",
-                )
-        if not self.moment > 0.0 or any(mass < 0.0 for mass in self.carried.values()):
-            raise CaseProblem(
-                ("effective_mass",),
-                got=f"a moment of inertia of {self.moment:g} kg m^2 with the carried masses",
-                expected="above 0 kg m^2, and no negative mass",
-                hint="without inertia a force would move it at once.",
+            refuse_key_if(
+                name not in self.arms,
+                ("carried", name),
+                got=f"a mass at '{name}'",
+                expected=f"one of the arms: {', '.join(self.arms)}",
+                hint="name the arm that carries it.",
             )
+        refuse_key_if(
+            not self.moment > 0.0 or any(mass < 0.0 for mass in self.carried.values()),
+            ("effective_mass",),
+            got=f"a moment of inertia of {self.moment:g} kg m^2 with the carried masses",
+            expected="above 0 kg m^2, and no negative mass",
+            hint="without inertia a force would move it at once.",
+        )
         return self
 
     @property

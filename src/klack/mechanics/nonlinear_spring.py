@@ -9,7 +9,7 @@ import scipy
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from klack.input.problem import CaseProblem
+from klack.input.problem import CaseProblem, refuse_key_if
 from klack.input.section import Number
 from klack.machine.compiling.jit import inner
 from klack.network.component import Component
@@ -224,20 +224,20 @@ class NonlinearSpring(Component):
                 expected="terms of the polynomial together with 'reference', or none of both",
                 hint="reference: 1 mm makes higher: [0.2] add 20 % at a deflection of 1 mm.",
             )
-        if len(self.deflection) != len(self.force) or len(self.deflection) == 1:
-            raise CaseProblem(
-                ("force",),
-                got=f"{len(self.force)} forces for {len(self.deflection)} deflections",
-                expected="one force for each deflection, at least two",
-                hint="add or remove values.",
-            )
-        if any(not after > before for before, after in pairwise(self.deflection)):
-            raise CaseProblem(
-                ("deflection",),
-                got="deflections that do not increase",
-                expected="each larger than the previous one",
-                hint="sort them.",
-            )
+        refuse_key_if(
+            len(self.deflection) != len(self.force) or len(self.deflection) == 1,
+            ("force",),
+            got=f"{len(self.force)} forces for {len(self.deflection)} deflections",
+            expected="one force for each deflection, at least two",
+            hint="add or remove values.",
+        )
+        refuse_key_if(
+            any(not after > before for before, after in pairwise(self.deflection)),
+            ("deflection",),
+            got="deflections that do not increase",
+            expected="each larger than the previous one",
+            hint="sort them.",
+        )
         return self
 
     def curve(self) -> NDArray[np.float64]:

@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.errors import InputError
-from klack.input.problem import CaseProblem
+from klack.input.problem import CaseProblem, refuse_key_if
 from klack.input.section import InputPath, Name, Text
 from klack.network.component import Component
 from klack.network.port import MOTION, Port
@@ -74,13 +74,13 @@ class PrescribedMotion(Component):
                 expected="'time' and 'displacement', or 'file' with the units of its columns",
                 hint="file: lift.csv, time_unit: ms, displacement_unit: um.",
             )
-        if len(set(self.points)) < len(self.points):
-            raise CaseProblem(
-                ("points",),
-                got=", ".join(self.points),
-                expected="every name once",
-                hint="one point can have any number of springs, faces and seats.",
-            )
+        refuse_key_if(
+            len(set(self.points)) < len(self.points),
+            ("points",),
+            got=", ".join(self.points),
+            expected="every name once",
+            hint="one point can have any number of springs, faces and seats.",
+        )
         self.course()
         return self
 
@@ -95,14 +95,14 @@ class PrescribedMotion(Component):
             time, place = np.array(self.time), np.array(self.displacement)
         else:
             time, place = self._columns(self.file)
-        if len(time) != len(place) or len(time) < 2 or not np.all(np.diff(time) > 0.0):
-            raise CaseProblem(
-                (key,),
-                got=f"{len(place)} displacements at {len(time)} times"
-                + (", not rising" if len(time) == len(place) > 1 else ""),
-                expected="one displacement for each time, at least two, rising in time",
-                hint="sort the points; write a jump as a short ramp, e.g. of 1 us.",
-            )
+        refuse_key_if(
+            len(time) != len(place) or len(time) < 2 or not np.all(np.diff(time) > 0.0),
+            (key,),
+            got=f"{len(place)} displacements at {len(time)} times"
+            + (", not rising" if len(time) == len(place) > 1 else ""),
+            expected="one displacement for each time, at least two, rising in time",
+            hint="sort the points; write a jump as a short ramp, e.g. of 1 us.",
+        )
         if self.between == "smooth" and len(time) > 2:
             after = before = np.asarray(
                 scipy.interpolate.PchipInterpolator(time, place).derivative()(time)
@@ -135,13 +135,13 @@ class PrescribedMotion(Component):
 
     def _columns(self, path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         size = path.stat().st_size
-        if size > _LARGEST:
-            raise CaseProblem(
-                ("file",),
-                got=f"{size / 1e6:.0f} MB",
-                expected=f"at most {_LARGEST / 1e6:.0f} MB",
-                hint="keep two columns, and fewer points.",
-            )
+        refuse_key_if(
+            size > _LARGEST,
+            ("file",),
+            got=f"{size / 1e6:.0f} MB",
+            expected=f"at most {_LARGEST / 1e6:.0f} MB",
+            hint="keep two columns, and fewer points.",
+        )
         found = []
         for number, line in enumerate(path.read_text("utf-8", errors="replace").splitlines(), 1):
             cells = line.replace(";", ",").replace("\t", ",").split(",")
@@ -156,13 +156,13 @@ class PrescribedMotion(Component):
                         hint="a comma, semicolon or tab between columns, a point in numbers.",
                     ) from None
         table = np.array(found).reshape(-1, 2)
-        if not np.all(np.isfinite(table)):
-            raise CaseProblem(
-                ("file",),
-                got="a value that is not finite",
-                expected="finite numbers",
-                hint="remove such lines.",
-            )
+        refuse_key_if(
+            not np.all(np.isfinite(table)),
+            ("file",),
+            got="a value that is not finite",
+            expected="finite numbers",
+            hint="remove such lines.",
+        )
         sizes = []
         for key, unit, kind in (
             ("time_unit", self.time_unit, TIME),

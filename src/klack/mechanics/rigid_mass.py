@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from klack.bodies.reduction.reduced_body import ReducedBody
-from klack.input.problem import CaseProblem
+from klack.input.problem import refuse_key_if
 from klack.input.section import Name
 from klack.network.component import Component
 from klack.network.port import MOTION, Port
@@ -37,13 +37,13 @@ class RigidMass(Component):
 
     @model_validator(mode="after")
     def _different_points(self) -> "RigidMass":
-        if len(set(self.points)) < len(self.points):
-            raise CaseProblem(
-                ("points",),
-                got=f"{', '.join(self.points)}",
-                expected="every name once",
-                hint="one point can have any number of springs, stops and forces.",
-            )
+        refuse_key_if(
+            len(set(self.points)) < len(self.points),
+            ("points",),
+            got=f"{', '.join(self.points)}",
+            expected="every name once",
+            hint="one point can have any number of springs, stops and forces.",
+        )
         return self
 
     def port_kinds(self) -> Mapping[str, Port]:

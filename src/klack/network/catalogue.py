@@ -13,8 +13,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from klack.errors import InputError, KlackError
-from klack.input.problem import CaseProblem, nearest, one_of
+from klack.errors import InputError, KlackError, refuse_if
+from klack.input.problem import CaseProblem, nearest, one_of, refuse_key_if
 from klack.input.section import Section
 from klack.network.component import Component
 
@@ -135,14 +135,14 @@ def component_class(word: str, own: Mapping[str, type[Component]] = _NONE) -> ty
     if word in known:
         found: type[Component] = _registered(known[word])
         return found
-    if ":" in word:
-        raise CaseProblem(
-            ("type",),
-            got=f"'{word}', a class that is not part of klack",
-            expected=f"one of: {one_of([*own, *known])}",
-            hint=f"a case file runs no code; if you trust that class: --component {word}, "
-            "or components=[...] where Python reads the case.",
-        )
+    refuse_key_if(
+        ":" in word,
+        ("type",),
+        got=f"'{word}', a class that is not part of klack",
+        expected=f"one of: {one_of([*own, *known])}",
+        hint=f"a case file runs no code; if you trust that class: --component {word}, "
+        "or components=[...] where Python reads the case.",
+    )
     raise CaseProblem(
         ("type",),
         got=f"'{word}'",
@@ -194,13 +194,13 @@ def import_component(word: str) -> type[Component]:
         For a word of another form, or a class that cannot be imported or is no component.
     """
     module, colon, name = word.partition(":")
-    if not (module and colon and name):
-        raise InputError(
-            _OPTION,
-            got=f"'{word}'",
-            expected="package.module:Class",
-            hint="write e.g. --component eddy_brake:EddyBrake.",
-        )
+    refuse_if(
+        not (module and colon and name),
+        _OPTION,
+        got=f"'{word}'",
+        expected="package.module:Class",
+        hint="write e.g. --component eddy_brake:EddyBrake.",
+    )
     try:
         found = getattr(import_module(module), name)
     except KlackError:

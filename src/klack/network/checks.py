@@ -3,8 +3,8 @@
 import warnings
 from collections.abc import Iterable, Mapping
 
-from klack.errors import InputError
-from klack.input.problem import CaseProblem
+from klack.errors import refuse_if
+from klack.input.problem import CaseProblem, refuse_key_if
 from klack.network.component import Component
 from klack.network.nodes import Joint, Node
 from klack.network.port import Role
@@ -97,14 +97,13 @@ def _check_motion(components: Mapping[str, Component], node: Node) -> None:
             expected="one body and the components that act on it",
             hint="put an end stop or a spring between the bodies, or make them one body.",
         )
-    if not node.word and not bodies:
-        raise CaseProblem(
-            ("connections", node.index),
-            got=f"{node}: nothing there has a mass",
-            expected="a port of one body, or the ground",
-            hint="add the body that they act on to this list; springs in series need one in "
-            "between.",
-        )
+    refuse_key_if(
+        not node.word and not bodies,
+        ("connections", node.index),
+        got=f"{node}: nothing there has a mass",
+        expected="a port of one body, or the ground",
+        hint="add the body that they act on to this list; springs in series need one in between.",
+    )
 
 
 def _check_pressure(components: Mapping[str, Component], node: Node) -> None:
@@ -133,13 +132,13 @@ def _check_pressure(components: Mapping[str, Component], node: Node) -> None:
 
 def _refuse_forced_flow(components: Mapping[str, Component], node: Node, pressure: str) -> None:
     for joint in node.joints:
-        if _is_flow_source(components, joint):
-            raise CaseProblem(
-                ("connections", node.index),
-                got=f"{joint}, which forces a flow, at the prescribed pressure {pressure}",
-                expected="a flow into a volume, whose pressure can respond",
-                hint="connect it to a chamber; at a prescribed pressure it has no effect.",
-            )
+        refuse_key_if(
+            _is_flow_source(components, joint),
+            ("connections", node.index),
+            got=f"{joint}, which forces a flow, at the prescribed pressure {pressure}",
+            expected="a flow into a volume, whose pressure can respond",
+            hint="connect it to a chamber; at a prescribed pressure it has no effect.",
+        )
 
 
 def _is_flow_source(components: Mapping[str, Component], joint: Joint) -> bool:
@@ -245,21 +244,21 @@ def check_rows(rows: Rows) -> None:
         For no body at all, an interface closed at the start, a node without a row, or a stroke
         that leaves the range of a law (:mod:`klack.network.ranges`).
     """
-    if not rows.bodies:
-        raise InputError(
-            "network",
-            got="no body that moves",
-            expected="at least one, of the type rigid-mass or flexible-body",
-            hint="add the needle as a component.",
-        )
+    refuse_if(
+        not rows.bodies,
+        "network",
+        got="no body that moves",
+        expected="at least one, of the type rigid-mass or flexible-body",
+        hint="add the needle as a component.",
+    )
     for interface in rows.interfaces:
-        if interface.gap < -_TOUCHING:
-            raise CaseProblem(
-                ("components", interface.component),
-                got=f"a gap of {format_si(interface.gap, 'm')} at the start: closed already",
-                expected="a gap of 0 or more",
-                hint="start in contact (gap 0): a preload then compresses the stop.",
-            )
+        refuse_key_if(
+            interface.gap < -_TOUCHING,
+            ("components", interface.component),
+            got=f"a gap of {format_si(interface.gap, 'm')} at the start: closed already",
+            expected="a gap of 0 or more",
+            hint="start in contact (gap 0): a preload then compresses the stop.",
+        )
     _check_driven(rows)
     _check_node_rows(rows)
     _check_junctions(rows)
@@ -274,13 +273,13 @@ def _check_driven(rows: Rows) -> None:
     joined = [(row.component, {row.upper, row.lower}) for row in rows.interfaces]
     joined += [(row.component, {row.upper, row.lower}) for row in rows.sliders]
     for component, sides in joined:
-        if driven & sides and sides <= fixed:
-            raise CaseProblem(
-                ("components", component),
-                got="a prescribed motion on one side, and nothing that gives way on the other",
-                expected="a body that its force can move",
-                hint="leave it out, or give the other side a mass on a spring.",
-            )
+        refuse_key_if(
+            driven & sides and sides <= fixed,
+            ("components", component),
+            got="a prescribed motion on one side, and nothing that gives way on the other",
+            expected="a body that its force can move",
+            hint="leave it out, or give the other side a mass on a spring.",
+        )
 
 
 def _check_node_rows(rows: Rows) -> None:
@@ -289,13 +288,13 @@ def _check_node_rows(rows: Rows) -> None:
     used += [(node, row.component) for row in rows.lines for node in (row.a, row.b)]
     used += [(node, row.component) for row in rows.waves for node in (row.a, row.b)]
     for node, component in used:
-        if node not in rows.nodes:
-            raise CaseProblem(
-                ("components", component),
-                got="a flow or wall at a node that has no pressure",
-                expected="a chamber, a prescribed pressure or ambient there",
-                hint="a component with a port of the role COMPLIANCE must call rows.chamber.",
-            )
+        refuse_key_if(
+            node not in rows.nodes,
+            ("components", component),
+            got="a flow or wall at a node that has no pressure",
+            expected="a chamber, a prescribed pressure or ambient there",
+            hint="a component with a port of the role COMPLIANCE must call rows.chamber.",
+        )
 
 
 def _check_junctions(rows: Rows) -> None:
@@ -305,13 +304,13 @@ def _check_junctions(rows: Rows) -> None:
     for node, row in rows.nodes.items():
         if not row.junction:
             continue
-        if node not in lines:
-            raise CaseProblem(
-                ("components", row.component),
-                got="a junction without the end of a line",
-                expected="at least one line there: its impedance sets the pressure",
-                hint="make it a chamber of the volume of the crossing (a few mm^3).",
-            )
+        refuse_key_if(
+            node not in lines,
+            ("components", row.component),
+            got="a junction without the end of a line",
+            expected="at least one line there: its impedance sets the pressure",
+            hint="make it a chamber of the volume of the crossing (a few mm^3).",
+        )
         moving = [w.component for w in rows.walls if w.node == node and w.port != GROUND]
         if moving:
             raise CaseProblem(

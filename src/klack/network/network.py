@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Self
 
 from klack.errors import ConvergenceError
-from klack.input.problem import CaseProblem
+from klack.input.problem import refuse_key_if
 from klack.network.checks import check_nodes, check_rows
 from klack.network.component import Component
 from klack.network.nodes import RESERVED, Node, join
@@ -67,14 +67,14 @@ class Network:
         connections = tuple(tuple(connection) for connection in self.connections)
         object.__setattr__(self, "connections", connections)
         for name in self.components:
-            if name in RESERVED or "." in name:
-                raise CaseProblem(
-                    ("components", name),
-                    got=f"the name '{name}'",
-                    expected="a name without point, other than ground and ambient",
-                    hint="rename the component.",
-                    on_key=True,
-                )
+            refuse_key_if(
+                name in RESERVED or "." in name,
+                ("components", name),
+                got=f"the name '{name}'",
+                expected="a name without point, other than ground and ambient",
+                hint="rename the component.",
+                on_key=True,
+            )
         object.__setattr__(self, "nodes", join(self.components, self.connections))
         if not self.is_draft:
             self._require_complete()
@@ -83,22 +83,22 @@ class Network:
         check_nodes(self.components, self.nodes)
         if self.fluid is None:
             for name, component in self.components.items():
-                if _has_port_of(component, "hydraulic"):
-                    raise CaseProblem(
-                        (),
-                        got=f"no fluid, but the hydraulic component '{name}'",
-                        expected="fluid: the fluid of the valve",
-                        hint="add e.g. 'fluid: {name: n-heptane}'.",
-                    )
+                refuse_key_if(
+                    _has_port_of(component, "hydraulic"),
+                    (),
+                    got=f"no fluid, but the hydraulic component '{name}'",
+                    expected="fluid: the fluid of the valve",
+                    hint="add e.g. 'fluid: {name: n-heptane}'.",
+                )
         if self.gas is None:
             for name, component in self.components.items():
-                if _has_port_of(component, "pneumatic"):
-                    raise CaseProblem(
-                        (),
-                        got=f"no gas, but the pneumatic component '{name}'",
-                        expected="gas: the gas of the valve",
-                        hint="add e.g. 'gas: air'.",
-                    )
+                refuse_key_if(
+                    _has_port_of(component, "pneumatic"),
+                    (),
+                    got=f"no gas, but the pneumatic component '{name}'",
+                    expected="gas: the gas of the valve",
+                    hint="add e.g. 'gas: air'.",
+                )
 
     def rows(self) -> Rows:
         """Translate into what the solver runs, after the checks of :mod:`klack.network.checks`.

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from klack.input.problem import CaseProblem, nearest, one_of
+from klack.input.problem import CaseProblem, nearest, one_of, refuse_key_if
 from klack.network.component import Component
 from klack.network.port import Port, Role
 
@@ -109,13 +109,13 @@ def _node(
             expected="ports of one domain",
             hint="a component of two domains has a port in each: connect them one by one.",
         )
-    if not joints:
-        raise CaseProblem(
-            ("connections", index),
-            got=f"no port beside {one_of(words)}",
-            expected="at least one port of a component",
-            hint="remove the connection, or add the missing port.",
-        )
+    refuse_key_if(
+        not joints,
+        ("connections", index),
+        got=f"no port beside {one_of(words)}",
+        expected="at least one port of a component",
+        hint="remove the connection, or add the missing port.",
+    )
     domain = next(iter(domains.values()))
     return Node(index, domain, tuple(joints), words[0] if words else "")
 
