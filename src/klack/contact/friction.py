@@ -20,7 +20,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError, require_nonnegative
+from klack.errors import refuse_if, require_nonnegative
 
 __all__ = ["MOST_FRICTION", "Friction"]
 
@@ -49,13 +49,13 @@ class Friction:
     def __post_init__(self) -> None:
         require_nonnegative("friction: kinetic", self.kinetic, "")
         require_nonnegative("friction: speed", self.speed, "m/s")
-        if not self.static >= self.kinetic:
-            raise InputError(
-                "friction: static",
-                got=f"{self.static:g}, below the kinetic coefficient {self.kinetic:g}",
-                expected="a static coefficient of at least the kinetic one",
-                hint="give the kinetic coefficient alone where only one is known.",
-            )
+        refuse_if(
+            not self.static >= self.kinetic,
+            "friction: static",
+            got=f"{self.static:g}, below the kinetic coefficient {self.kinetic:g}",
+            expected="a static coefficient of at least the kinetic one",
+            hint="give the kinetic coefficient alone where only one is known.",
+        )
 
     @classmethod
     def coulomb(cls, coefficient: float) -> Self:
@@ -71,13 +71,13 @@ class Friction:
             return self
         if self.is_constant:
             return Friction(kinetic=kinetic, static=kinetic, speed=self.speed)
-        if self.kinetic == 0.0:
-            raise InputError(
-                "friction: kinetic",
-                got=f"0, below a static coefficient of {self.static:g}",
-                expected="a ratio of both coefficients",
-                hint="give the kinetic coefficient of these faces.",
-            )
+        refuse_if(
+            self.kinetic == 0.0,
+            "friction: kinetic",
+            got=f"0, below a static coefficient of {self.static:g}",
+            expected="a ratio of both coefficients",
+            hint="give the kinetic coefficient of these faces.",
+        )
         return Friction(
             kinetic=kinetic, static=kinetic * (self.static / self.kinetic), speed=self.speed
         )

@@ -39,7 +39,7 @@ from klack.contact.face_form import FaceForm
 from klack.contact.mortar import COVERED, ContactSpace, HatQuadrature, hat_quadrature
 from klack.contact.pairing import curved_faces, in_space
 from klack.contact.ray_cutting import CurvedFaces, cut_listed, cut_nearest, list_near
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.mesh.mesh import Mesh, Surface
 from klack.mesh.rigid import rotation_matrix
 
@@ -281,13 +281,13 @@ class RigidGaps:
 
         Rejects axisymmetric bodies, which cannot leave their axis.
         """
-        if space.dimension != 3:
-            raise InputError(
-                "contact: gaps after a rigid motion",
-                got="axisymmetric bodies",
-                expected="solids",
-                hint="a motion along the axis is ContactSpace.shifted; take 'model: swept' else.",
-            )
+        refuse_if(
+            space.dimension != 3,
+            "contact: gaps after a rigid motion",
+            got="axisymmetric bodies",
+            expected="solids",
+            hint="a motion along the axis is ContactSpace.shifted; take 'model: swept' else.",
+        )
         slave, master, away = slave_and_master(space, (mesh_a, surface_a), (mesh_b, surface_b))
         hats = hat_quadrature(space, *slave)
         lines = (hats.position, hats.normal)

@@ -17,7 +17,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from klack.contact.step_constants import LAW_HERTZ, LAW_LINEAR, LAW_TABLE
-from klack.errors import InputError, require_nonnegative, require_positive
+from klack.errors import InputError, refuse_if, require_nonnegative, require_positive
 
 __all__ = [
     "ContactLaw",
@@ -102,13 +102,13 @@ class HertzLaw:
 
     def __post_init__(self) -> None:
         require_positive("HertzLaw.coefficient", self.coefficient, "N/m^n")
-        if not self.exponent >= 1.0:
-            raise InputError(
-                "HertzLaw.exponent",
-                got=f"{self.exponent:g}",
-                expected="1 or more",
-                hint="use 1.5 for smooth curved bodies, or LinearLaw for flat faces.",
-            )
+        refuse_if(
+            not self.exponent >= 1.0,
+            "HertzLaw.exponent",
+            got=f"{self.exponent:g}",
+            expected="1 or more",
+            hint="use 1.5 for smooth curved bodies, or LinearLaw for flat faces.",
+        )
 
     def force(self, indentation: ArrayLike) -> NDArray[np.float64]:
         """Force [N] at an indentation [m]."""
@@ -280,13 +280,13 @@ def gonthier_coefficient(restitution: float) -> float:
     (0.1665, 0.0)
     """
     e = restitution
-    if not 0.0 < e <= 1.0:
-        raise InputError(
-            "gonthier_coefficient: restitution",
-            got=f"{e:g}",
-            expected="a value above 0, up to 1",
-            hint="a restitution of 0.3 to 0.95 is usual for dry steel.",
-        )
+    refuse_if(
+        not 0.0 < e <= 1.0,
+        "gonthier_coefficient: restitution",
+        got=f"{e:g}",
+        expected="a value above 0, up to 1",
+        hint="a restitution of 0.3 to 0.95 is usual for dry steel.",
+    )
     if e == 1.0:
         return 0.0
 
@@ -311,13 +311,13 @@ def _with_origin(
     d: NDArray[np.float64], f: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Prepend a missing (0, 0) and reject what is no monotone curve."""
-    if d.size != f.size or d.size == 0:
-        raise InputError(
-            "TableLaw",
-            got=f"{d.size} indentations and {f.size} forces",
-            expected="the same number of both, at least one",
-            hint="give one force per indentation.",
-        )
+    refuse_if(
+        d.size != f.size or d.size == 0,
+        "TableLaw",
+        got=f"{d.size} indentations and {f.size} forces",
+        expected="the same number of both, at least one",
+        hint="give one force per indentation.",
+    )
     if d[0] != 0.0:
         d, f = np.concatenate(([0.0], d)), np.concatenate(([0.0], f))
     increasing = np.all(np.diff(d) > 0.0) and np.all(np.diff(f) > 0.0)

@@ -43,7 +43,7 @@ from klack.contact.pairing import (
     face_thickness,
     project_to_surface,
 )
-from klack.errors import ConvergenceError, InputError
+from klack.errors import ConvergenceError, InputError, refuse_if
 from klack.mesh.mesh import FaceBlock, Mesh, Surface
 
 __all__ = [
@@ -145,13 +145,13 @@ class ContactSpace:
     def touch(self) -> float:
         """Distance [m] that a moves rigidly to -z until the first weighted gap closes."""
         facing = self.axial > 1e-6
-        if not np.any(facing):
-            raise InputError(
-                "contact space: touch",
-                got="contact points whose gap does not change with the axial position",
-                expected="surfaces that face each other along the axis of motion z",
-                hint="check the orientation of the geometry; the axis of motion is z.",
-            )
+        refuse_if(
+            not np.any(facing),
+            "contact space: touch",
+            got="contact points whose gap does not change with the axial position",
+            expected="surfaces that face each other along the axis of motion z",
+            hint="check the orientation of the geometry; the axis of motion is z.",
+        )
         return float(np.min(self.gap[facing] / self.axial[facing]))
 
     def shifted(self, distance: float) -> Self:
@@ -235,21 +235,21 @@ def _check_pair(
     mesh_a: Mesh, surface_a: Surface, mesh_b: Mesh, surface_b: Surface, reach: float | None
 ) -> None:
     where = f"contact of surface '{surface_a.name}' with surface '{surface_b.name}'"
-    if mesh_a.dimension != mesh_b.dimension:
-        raise InputError(
-            where,
-            got=f"a mesh of dimension {mesh_a.dimension} against one of {mesh_b.dimension}",
-            expected="two solids or two axisymmetric bodies",
-            hint="model both bodies in the same way.",
-        )
+    refuse_if(
+        mesh_a.dimension != mesh_b.dimension,
+        where,
+        got=f"a mesh of dimension {mesh_a.dimension} against one of {mesh_b.dimension}",
+        expected="two solids or two axisymmetric bodies",
+        hint="model both bodies in the same way.",
+    )
     for surface in (surface_a, surface_b):
-        if surface.face_count == 0:
-            raise InputError(
-                where,
-                got=f"surface '{surface.name}' without faces",
-                expected="at least one face",
-                hint="name the faces of the contact in the geometry.",
-            )
+        refuse_if(
+            surface.face_count == 0,
+            where,
+            got=f"surface '{surface.name}' without faces",
+            expected="at least one face",
+            hint="name the faces of the contact in the geometry.",
+        )
     if reach is not None and not reach > 0:
         raise InputError(
             f"{where}: reach",

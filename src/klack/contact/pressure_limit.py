@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 
 from klack.arrays import Floats
-from klack.errors import InputError
+from klack.errors import refuse_if
 
 __all__ = ["PressureLimit"]
 
@@ -38,13 +38,13 @@ class PressureLimit:
 
     def __post_init__(self) -> None:
         rises = np.all(np.diff(self.set) > 0.0) and np.all(np.diff(self.pressure) > 0.0)
-        if len(self.set) < 2 or self.set[0] != 0.0 or not rises or not self.pressure[0] > 0.0:
-            raise InputError(
-                "pressure limit",
-                got=f"{len(self.set)} sets and pressures that do not both rise, from 0 and above 0",
-                expected="at least two, both increasing",
-                hint="give a hardening above 0.",
-            )
+        refuse_if(
+            len(self.set) < 2 or self.set[0] != 0.0 or not rises or not self.pressure[0] > 0.0,
+            "pressure limit",
+            got=f"{len(self.set)} sets and pressures that do not both rise, from 0 and above 0",
+            expected="at least two, both increasing",
+            hint="give a hardening above 0.",
+        )
 
     @property
     def deepest(self) -> float:

@@ -22,7 +22,7 @@ import scipy
 from numpy.typing import NDArray
 
 from klack.contact.history import ImpactHistory
-from klack.errors import InputError
+from klack.errors import refuse_if
 
 __all__ = ["ContactPhase", "Deviation", "ImpactMeasures", "find_contacts", "measure_impact"]
 
@@ -180,13 +180,13 @@ def find_contacts(history: ImpactHistory, *, threshold: float = 5e-3) -> tuple[C
 def measure_impact(history: ImpactHistory, *, threshold: float = 5e-3) -> ImpactMeasures:
     """Measures of the first impact in a history; ``threshold`` as of :func:`find_contacts`."""
     phases = find_contacts(history, threshold=threshold)
-    if not phases:
-        raise InputError(
-            "measure_impact: history",
-            got=f"no contact force in {history.force.size} records",
-            expected="at least one contact",
-            hint="simulate longer: the gap takes gap / speed seconds to close.",
-        )
+    refuse_if(
+        not phases,
+        "measure_impact: history",
+        got=f"no contact force in {history.force.size} records",
+        expected="at least one contact",
+        hint="simulate longer: the gap takes gap / speed seconds to close.",
+    )
     clusters = _clusters(phases, history.longest_period)
     cluster = clusters[0]
     first, last = cluster[0].first, cluster[-1].last

@@ -37,7 +37,7 @@ from numpy.typing import ArrayLike
 from klack.arrays import Vector
 from klack.contact.laws import FlatLaw
 from klack.contact.step_constants import LAW_RUBBING
-from klack.errors import InputError, require_positive
+from klack.errors import InputError, refuse_if, require_positive
 
 __all__ = ["RubbingLaw"]
 
@@ -87,13 +87,13 @@ class RubbingLaw:
                 hint="sort the springs by their onset.",
             )
         # straight between the onsets, so that the slopes tell
-        if not np.all(np.cumsum(self.normal - self.strength) > 0.0):
-            raise InputError(
-                "law with friction",
-                got="a force that does not fall while the contact opens (self-locking)",
-                expected="a friction below the slope of the faces",
-                hint="lower the coefficient of friction.",
-            )
+        refuse_if(
+            not np.all(np.cumsum(self.normal - self.strength) > 0.0),
+            "law with friction",
+            got="a force that does not fall while the contact opens (self-locking)",
+            expected="a friction below the slope of the faces",
+            hint="lower the coefficient of friction.",
+        )
 
     def force(self, indentation: ArrayLike) -> Vector:
         """Force [N], closing from first touch."""

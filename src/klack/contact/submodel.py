@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from klack.bodies.elasticity.body import ElasticBody
 from klack.bodies.elasticity.statics import Flexibility
 from klack.contact.statics import StaticContact, contact_compliance, static_contact
-from klack.errors import InputError, require_positive
+from klack.errors import InputError, refuse_if, require_positive
 from klack.machine.cache.result_cache import ResultCache
 
 __all__ = ["LocalStiffness", "local_stiffness"]
@@ -67,13 +67,13 @@ def local_stiffness(
     """
     require_positive("contact submodel: size", size, "m")
     low, high = fit_share
-    if not 0 <= low < high <= 1:
-        raise InputError(
-            "contact submodel: fit_share",
-            got=f"{low:g} to {high:g}",
-            expected="two shares between 0 and 1, the lower one first",
-            hint="0.5 to 1 fits the upper half of the force range.",
-        )
+    refuse_if(
+        not 0 <= low < high <= 1,
+        "contact submodel: fit_share",
+        got=f"{low:g} to {high:g}",
+        expected="two shares between 0 and 1, the lower one first",
+        hint="0.5 to 1 fits the upper half of the force range.",
+    )
     space = static.space
     carrying = space.points[static.pressures[-1] > 0]
     with (
@@ -108,14 +108,14 @@ def _region(body: ElasticBody, carrying: NDArray[np.float64], size: float) -> El
     distance, _ = scipy.spatial.cKDTree(carrying).query(body.mesh.points)
     beyond = np.flatnonzero(distance > size)
     free = body.mesh.node_count - len(beyond)
-    if not len(beyond) or free < 10:
-        raise InputError(
-            "contact submodel: size",
-            got=f"{size * 1e3:.4g} mm, which lets {free} of {body.mesh.node_count} nodes of "
-            f"'{body.name}' deform",
-            expected="a region larger than a few elements and smaller than the body",
-            hint="some half widths of the contact are usual, for example 0.2 to 1 mm.",
-        )
+    refuse_if(
+        not len(beyond) or free < 10,
+        "contact submodel: size",
+        got=f"{size * 1e3:.4g} mm, which lets {free} of {body.mesh.node_count} nodes of "
+        f"'{body.name}' deform",
+        expected="a region larger than a few elements and smaller than the body",
+        hint="some half widths of the contact are usual, for example 0.2 to 1 mm.",
+    )
     d = body.mesh.dimension
     held = (d * beyond[:, None] + np.arange(d)).ravel()
     return replace(body, fixed=np.union1d(body.fixed, held))

@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike
 from klack.arrays import Floats
 from klack.contact.laws import FlatLaw
 from klack.contact.step_constants import LAW_YIELDING
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 
 __all__ = ["YieldingLaw"]
 
@@ -64,20 +64,20 @@ class YieldingLaw:
             object.__setattr__(self, name, np.array(getattr(self, name), dtype=float))
         falls = float(np.min(np.diff(self.loss), initial=0.0))
         rising = all(np.all(np.diff(a) > 0) for a in (self.largest, self.closing))
-        if not (rising and np.all(self.set < self.largest)):
-            raise InputError(
-                "law of faces that yield",
-                got="a force that falls as faces are pressed further, or faces that do not part",
-                expected="a force that rises, and a set below the indentation",
-                hint="a finer mesh at the contact, or fewer modes.",
-            )
-        if falls < _LEAST_LOSS * self.taken[-1]:
-            raise InputError(
-                "law of faces that yield",
-                got=f"a loss that falls by {-falls:.2g} J of {self.taken[-1]:.2g} J",
-                expected="a loss that rises with the indentation",
-                hint="a finer mesh at the contact, or fewer modes.",
-            )
+        refuse_if(
+            not (rising and np.all(self.set < self.largest)),
+            "law of faces that yield",
+            got="a force that falls as faces are pressed further, or faces that do not part",
+            expected="a force that rises, and a set below the indentation",
+            hint="a finer mesh at the contact, or fewer modes.",
+        )
+        refuse_if(
+            falls < _LEAST_LOSS * self.taken[-1],
+            "law of faces that yield",
+            got=f"a loss that falls by {-falls:.2g} J of {self.taken[-1]:.2g} J",
+            expected="a loss that rises with the indentation",
+            hint="a finer mesh at the contact, or fewer modes.",
+        )
 
     @property
     def places(self) -> Floats:

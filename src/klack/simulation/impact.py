@@ -23,7 +23,7 @@ from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
 from klack.contact.step_constants import LAW_YIELDING
 from klack.contact.yielding_law import YieldingLaw
-from klack.errors import ConvergenceError, InputError, require_positive
+from klack.errors import ConvergenceError, InputError, refuse_if, require_positive
 from klack.network.protocols import InterfaceLaw
 from klack.simulation import energy_balance
 from klack.simulation.contact_step import law_potential
@@ -407,21 +407,21 @@ def simulate(
     require_positive("simulate: duration", duration, "s")
     require_positive("simulate: steps_per_record", steps_per_record, "steps")
     for name in velocities:
-        if system.body(name).rigid_count == 0:
-            raise InputError(
-                f"simulate: velocity of '{name}'",
-                got="a supported body",
-                expected="a free body",
-                hint="only unsupported bodies can move as a whole.",
-            )
-    flat = flatten(system, velocities, step)
-    if flat.v.size == 0:
-        raise InputError(
-            "simulate: system",
-            got="bodies without a single mode",
-            expected="at least one body that can move",
-            hint="a wall needs a needle that hits it.",
+        refuse_if(
+            system.body(name).rigid_count == 0,
+            f"simulate: velocity of '{name}'",
+            got="a supported body",
+            expected="a free body",
+            hint="only unsupported bodies can move as a whole.",
         )
+    flat = flatten(system, velocities, step)
+    refuse_if(
+        flat.v.size == 0,
+        "simulate: system",
+        got="bodies without a single mode",
+        expected="at least one body that can move",
+        hint="a wall needs a needle that hits it.",
+    )
     records = int(np.ceil(duration / (step * steps_per_record) * (1.0 - 1e-12)))
     contacts = len(system.contacts)
     q, v = flat.q.copy(), flat.v.copy()

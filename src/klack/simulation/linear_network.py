@@ -18,7 +18,7 @@ import numpy as np
 
 from klack.arrays import Matrix, Vector
 from klack.contact.step_constants import LAW_RUBBING, LAW_YIELDING, NO_LAW
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.network.gas_rows import PASSED
 from klack.network.rows import BranchRow, ElementRow, LineRow, Rows
 from klack.simulation.linear_rows import LinearRow, RowPoint, linear_row
@@ -106,14 +106,14 @@ class _Assembly:
                 expected="properties: fixed, whose waves are linear",
                 hint="give the line properties: fixed and the pressure of the operating point.",
             )
-        if nodes.slow_gas:
-            raise InputError(
-                "linearisation: fluid with release_time and absorption_time",
-                got="gas that leaves and enters the liquid over time",
-                expected="a fluid whose density follows from the pressure alone",
-                hint="leave both times out: for fast changes the gas is free, or, with "
-                "release_pressure and saturation_pressure alone, in equilibrium.",
-            )
+        refuse_if(
+            nodes.slow_gas,
+            "linearisation: fluid with release_time and absorption_time",
+            got="gas that leaves and enters the liquid over time",
+            expected="a fluid whose density follows from the pressure alone",
+            hint="leave both times out: for fast changes the gas is free, or, with "
+            "release_pressure and saturation_pressure alone, in equilibrium.",
+        )
         self.p = network.node_state.p.copy()
         self.fluid = fluids_at(nodes.fluid, self.p) if self.p.size else np.zeros((0, 3))
         self.node_names = [self.rows.nodes[k].component for k in network.node_order]
@@ -168,14 +168,14 @@ class _Assembly:
         self.stiffness, self.damping = np.zeros(gap.size), np.zeros(gap.size)
         for c, row in enumerate(self.rows.interfaces):
             name = row.component
-            if at.kind[c] != NO_LAW and abs(gap[c]) <= _TOUCHING:
-                raise InputError(
-                    f"linearisation: components.{name}",
-                    got="faces that just touch without a force",
-                    expected="a contact that is closed by a force, or open",
-                    hint="hold the body at another lift (--lift), or change a load a little: about "
-                    "such a point stiffness and damping jump.",
-                )
+            refuse_if(
+                at.kind[c] != NO_LAW and abs(gap[c]) <= _TOUCHING,
+                f"linearisation: components.{name}",
+                got="faces that just touch without a force",
+                expected="a contact that is closed by a force, or open",
+                hint="hold the body at another lift (--lift), or change a load a little: about "
+                "such a point stiffness and damping jump.",
+            )
             if force[c] > 0.0:
                 pressed = -float(slope[c])
                 self.stiffness[c] = pressed / (1.0 - at.series[c] * pressed)

@@ -25,7 +25,7 @@ import scipy
 from numba.core.errors import NumbaError
 
 from klack.arrays import Matrix, Vector
-from klack.errors import ConvergenceError, InputError
+from klack.errors import ConvergenceError, InputError, refuse_if
 from klack.machine.compiling.jit import njit
 from klack.network.rows import BranchRow, ElementRow
 from klack.network.step_function import address_of, call, first, is_step_function
@@ -126,13 +126,13 @@ def linear_row(at: RowPoint, h: float) -> LinearRow:
     ConvergenceError
         If the row refuses the step.
     """
-    if not is_step_function(at.row.step):
-        raise InputError(
-            f"components.{at.row.component}",
-            got="a component that runs outside of compiled code (Python, or an FMU)",
-            expected="components with derivatives, for a linearisation",
-            hint="replace it by springs, masses and forces of klack about this point.",
-        )
+    refuse_if(
+        not is_step_function(at.row.step),
+        f"components.{at.row.component}",
+        got="a component that runs outside of compiled code (Python, or an FMU)",
+        expected="components with derivatives, for a linearisation",
+        hint="replace it by springs, masses and forces of klack about this point.",
+    )
     sides = []
     for step in (h, 0.5 * h):
         here = _warm(at, step)

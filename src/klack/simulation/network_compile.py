@@ -10,7 +10,7 @@ import numpy as np
 from klack.arrays import Cube, Index, Vector
 from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.contact.step_constants import LAW_YIELDING, NO_LAW
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.hydraulics.fluid import Fluid
 from klack.hydraulics.fluid_table import fluid_at, fluid_table
 from klack.hydraulics.gas_release import NO_RELEASE, release_numbers
@@ -134,21 +134,21 @@ class CompiledNetwork:
 
 def compile_network(rows: Rows, sizes: StepSizes) -> CompiledNetwork:
     """Lay out a network for these steps."""
-    if not rows.bodies:
-        raise InputError(
-            "network",
-            got="no body",
-            expected="at least one body that moves",
-            hint="add a rigid-mass or a flexible-body component.",
-        )
+    refuse_if(
+        not rows.bodies,
+        "network",
+        got="no body",
+        expected="at least one body that moves",
+        hint="add a rigid-mass or a flexible-body component.",
+    )
     port_of, names = _number_ports(rows.bodies)
-    if len(names) >= PORTS:
-        raise InputError(
-            "network",
-            got=f"{len(names)} mechanical ports",
-            expected=f"fewer than {PORTS}",
-            hint="leave out unconnected ports of bodies.",
-        )
+    refuse_if(
+        len(names) >= PORTS,
+        "network",
+        got=f"{len(names)} mechanical ports",
+        expected=f"fewer than {PORTS}",
+        hint="leave out unconnected ports of bodies.",
+    )
     propagators = _propagators(rows.bodies, sizes.seconds)
     answers = _Answers.of(rows.bodies, propagators)
     bodies, blocks = _compile_bodies(rows.bodies, propagators, answers)

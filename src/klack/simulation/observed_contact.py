@@ -19,7 +19,7 @@ import numpy as np
 from klack.arrays import Floats
 from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.contact.laws import LinearLaw
-from klack.errors import InputError, require_positive
+from klack.errors import refuse_if, require_positive
 from klack.simulation.contact_step import solve_step
 from klack.simulation.propagator import modal_propagator
 
@@ -86,13 +86,13 @@ def observed_impact(
     read = np.concatenate([outputs[0], -outputs[1]])
     modes = modal_propagator(omega, np.zeros(omega.size), step)
     opened = float(read @ (modes.B1 * load))  # by a unit force during a step
-    if not opened > 0.0:
-        raise InputError(
-            "contact with a node as output",
-            got=f"a gap that closes by {-opened:.3g} m when 1 N pushes the bodies apart for a step",
-            expected="a node that moves with the load",
-            hint="take a node at the contact surface.",
-        )
+    refuse_if(
+        not opened > 0.0,
+        "contact with a node as output",
+        got=f"a gap that closes by {-opened:.3g} m when 1 N pushes the bodies apart for a step",
+        expected="a node that moves with the load",
+        hint="take a node at the contact surface.",
+    )
     q, v = np.zeros(omega.size), np.zeros(omega.size)
     v[: upper.rigid_count] = -speed * upper.rigid_axial
     before = 0.5 * float(v @ v)

@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 from klack.arrays import Index, Matrix, Vector
 from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.contact.step_constants import LAW_RUBBING, LAW_YIELDING
-from klack.errors import AccuracyWarning, ConvergenceError, InputError
+from klack.errors import AccuracyWarning, ConvergenceError, InputError, refuse_if
 from klack.hydraulics.fluid_table import fluid_at
 from klack.network.ranges import Travel, range_text, value_text
 from klack.network.rows import BranchRow, LimitRow, LineRow, WaveRow
@@ -903,15 +903,15 @@ class _Balance:
                 continue
             factors = Travel.factors(rows, ((row.upper, 1.0), (row.lower, -1.0)))
             way = row.gap + Travel.of(rows).highest(factors)[0]
-            if depth > _DEEP * way > 0.0:
-                raise InputError(
-                    f"static equilibrium: components.{row.component}",
-                    got=f"bodies pressed {format_si(float(depth), 'm', 3)} into each other",
-                    expected=f"less than {_DEEP:g} times {format_si(way, 'm', 3)}, the whole "
-                    "clearance between the stops",
-                    hint="check the stiffness of the stop and the forces at time zero, with their "
-                    "units.",
-                )
+            refuse_if(
+                depth > _DEEP * way > 0.0,
+                f"static equilibrium: components.{row.component}",
+                got=f"bodies pressed {format_si(float(depth), 'm', 3)} into each other",
+                expected=f"less than {_DEEP:g} times {format_si(way, 'm', 3)}, the whole "
+                "clearance between the stops",
+                hint="check the stiffness of the stop and the forces at time zero, with their "
+                "units.",
+            )
 
     def _put_bodies(self, state: _State) -> None:
         network = self.network

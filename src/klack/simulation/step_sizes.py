@@ -6,7 +6,7 @@ from math import inf, sqrt
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.network.accuracy import ACCURACIES, Accuracy, fine_step
 from klack.network.rows import LineRow, Rows
 from klack.simulation.network_arrays import PARTS
@@ -88,13 +88,13 @@ def scaled(rows: Rows, sizes: StepSizes, factor: float) -> StepSizes:
     """
     macro = sizes.coarse * sizes.step
     for interval in _intervals(rows):
-        if _is_whole(interval / macro) and not _is_whole(interval / (factor * macro)):
-            raise InputError(
-                "steps twice as long",
-                got=f"an exchange every {format_si(interval, 's')}",
-                expected=f"whole steps of {format_si(factor * macro, 's')} in it",
-                hint="choose run.coarse so that an even number of macro steps makes the interval.",
-            )
+        refuse_if(
+            _is_whole(interval / macro) and not _is_whole(interval / (factor * macro)),
+            "steps twice as long",
+            got=f"an exchange every {format_si(interval, 's')}",
+            expected=f"whole steps of {format_si(factor * macro, 's')} in it",
+            hint="choose run.coarse so that an even number of macro steps makes the interval.",
+        )
     return replace(sizes, step=factor * sizes.step, middle=1 if factor > 1.0 else sizes.middle)
 
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.contact.rubbing_law import RubbingLaw
 from klack.contact.yielding_law import YieldingLaw
-from klack.errors import InputError, require_nonnegative
+from klack.errors import InputError, refuse_if, require_nonnegative
 from klack.network.protocols import InterfaceLaw
 
 __all__ = ["AxialForce", "ContactPair", "ReducedSystem", "ReturnSpring"]
@@ -53,21 +53,21 @@ class ContactPair:
         require_nonnegative(f"{where}: gap", self.gap, "m")
         require_nonnegative(f"{where}: series_compliance", self.series_compliance, "m/N")
         require_nonnegative(f"{where}: preload", self.preload, "N")
-        if self.preload > 0.0 and (self.gap > 0.0 or self.series_compliance > 0.0):
-            raise InputError(
-                where,
-                got=f"a preload of {self.preload:g} N beside a gap or a series compliance",
-                expected="a contact that is closed at the start, all of whose compliance is in "
-                "modes and law",
-                hint="leave one of them out.",
-            )
-        if self.body_a == self.body_b:
-            raise InputError(
-                where,
-                got="the same body twice",
-                expected="two bodies",
-                hint="contacts join two different bodies.",
-            )
+        refuse_if(
+            self.preload > 0.0 and (self.gap > 0.0 or self.series_compliance > 0.0),
+            where,
+            got=f"a preload of {self.preload:g} N beside a gap or a series compliance",
+            expected="a contact that is closed at the start, all of whose compliance is in "
+            "modes and law",
+            hint="leave one of them out.",
+        )
+        refuse_if(
+            self.body_a == self.body_b,
+            where,
+            got="the same body twice",
+            expected="two bodies",
+            hint="contacts join two different bodies.",
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -117,13 +117,13 @@ class ReducedSystem:
 
     def __post_init__(self) -> None:
         names = [body.name for body in self.bodies]
-        if len(set(names)) != len(names) or not self.contacts:
-            raise InputError(
-                "ReducedSystem",
-                got=f"bodies {', '.join(names)} and {len(self.contacts)} contacts",
-                expected="distinct names and at least one contact",
-                hint="rename a body or add a ContactPair.",
-            )
+        refuse_if(
+            len(set(names)) != len(names) or not self.contacts,
+            "ReducedSystem",
+            got=f"bodies {', '.join(names)} and {len(self.contacts)} contacts",
+            expected="distinct names and at least one contact",
+            hint="rename a body or add a ContactPair.",
+        )
         self._check_memory()
         for contact in self.contacts:
             self._check_axial(contact.body_a, contact.port_a)

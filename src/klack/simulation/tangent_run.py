@@ -26,7 +26,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import ConvergenceError, InputError
+from klack.errors import ConvergenceError, InputError, refuse_if
 from klack.machine.memory import require_memory
 from klack.network.accuracy import Accuracy
 from klack.network.rows import Rows
@@ -296,13 +296,13 @@ def run_tangents(
         For a component that calls Python or an FMU, and for a direction in which the numbers of
         the network do not change smoothly.
     """
-    if has_python_steps(rows):
-        raise InputError(
-            "sensitivities",
-            got="a component that calls Python or an FMU",
-            expected="compiled components only",
-            hint="klack study with a few values of each parameter asks the program as it is.",
-        )
+    refuse_if(
+        has_python_steps(rows),
+        "sensitivities",
+        got="a component that calls Python or an FMU",
+        expected="compiled components only",
+        hint="klack study with a few values of each parameter asks the program as it is.",
+    )
     sizes = sizes or step_sizes(rows, accuracy, step=step, coarse=coarse)
     begin = process_time()
     running = _Running(rows, directions, sizes, duration, record, start)

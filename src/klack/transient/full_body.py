@@ -40,7 +40,7 @@ from klack.bodies.elasticity.factorization import (
     chosen_backend,
     factorize,
 )
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.transient.body_damping import BodyDamping, DampingMatrix, LowRankSolve, sparse_damping
 from klack.transient.interface_solve import InterfaceSolve, interface_solve
 
@@ -68,13 +68,13 @@ def scalar_mass(M: csr_array, dimension: int) -> csr_array:
     """
     m = csr_array(M[::dimension, ::dimension])
     difference = abs(M - kron(m, eye_array(dimension), format="csr"))
-    if difference.nnz and difference.max() > 1e-9 * abs(m).max():
-        raise InputError(
-            "mass matrix",
-            got="a mass that differs between directions or couples them",
-            expected="the same mass matrix in every direction, as displacement elements have it",
-            hint="leave point masses and rotary inertias out of a full-order impact.",
-        )
+    refuse_if(
+        difference.nnz and difference.max() > 1e-9 * abs(m).max(),
+        "mass matrix",
+        got="a mass that differs between directions or couples them",
+        expected="the same mass matrix in every direction, as displacement elements have it",
+        hint="leave point masses and rotary inertias out of a full-order impact.",
+    )
     return m
 
 

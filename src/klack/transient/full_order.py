@@ -59,7 +59,7 @@ from klack.contact.face_friction import FaceFriction
 from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
 from klack.contact.mortar import ContactSpace
 from klack.contact.statics import ReachError
-from klack.errors import ConvergenceError, InputError, require_nonnegative, require_positive
+from klack.errors import ConvergenceError, refuse_if, require_nonnegative, require_positive
 from klack.machine.cores import share_of
 from klack.machine.progress import SoFar, drawn
 from klack.simulation import energy_balance
@@ -217,20 +217,20 @@ def simulate_full_order(
         require_nonnegative(
             "simulate_full_order: stop_after_separation", stop_after_separation, "s"
         )
-    if scheme not in ("contact-stabilised-newmark", "massless"):
-        raise InputError(
-            "simulate_full_order: scheme",
-            got=f"'{scheme}'",
-            expected="'contact-stabilised-newmark' or 'massless'",
-            hint="use the first one; the second is for comparison.",
-        )
-    if layer is not None and (friction is not None or scheme == "massless"):
-        raise InputError(
-            "simulate_full_order: layer",
-            got="a layer of asperities with friction, or with the massless scheme",
-            expected="smooth faces, or no friction and the contact-stabilised scheme",
-            hint="leave one of them out.",
-        )
+    refuse_if(
+        scheme not in ("contact-stabilised-newmark", "massless"),
+        "simulate_full_order: scheme",
+        got=f"'{scheme}'",
+        expected="'contact-stabilised-newmark' or 'massless'",
+        hint="use the first one; the second is for comparison.",
+    )
+    refuse_if(
+        layer is not None and (friction is not None or scheme == "massless"),
+        "simulate_full_order: layer",
+        got="a layer of asperities with friction, or with the massless scheme",
+        expected="smooth faces, or no friction and the contact-stabilised scheme",
+        hint="leave one of them out.",
+    )
     begin = perf_counter()
     with ExitStack() as stack:
         if friction is not None and friction.law.is_none:
@@ -239,13 +239,13 @@ def simulate_full_order(
         bodies = [FullBody(body_a, space.G_a, "a", damping[0], spring_stiffness, T_a)]
         if body_b is not None:
             bodies.append(FullBody(body_b, space.G_b, "b", damping[1], T=T_b))
-        if bodies[0].supported:
-            raise InputError(
-                f"simulate_full_order: body '{bodies[0].name}'",
-                got="a body a that is fixed along z",
-                expected="a body that is free to move along z",
-                hint="fix only radial degrees of freedom of the needle, or swap the bodies.",
-            )
+        refuse_if(
+            bodies[0].supported,
+            f"simulate_full_order: body '{bodies[0].name}'",
+            got="a body a that is fixed along z",
+            expected="a body that is free to move along z",
+            hint="fix only radial degrees of freedom of the needle, or swap the bodies.",
+        )
         for body in bodies:
             stack.callback(body.close)
         pool = None
@@ -348,13 +348,13 @@ class _Run:
         """Place a just before the first touch; returns the time flown and the retraction."""
         needle, axial = self.bodies[0], self.space.axial
         facing = axial > 1e-6
-        if not np.any(facing):
-            raise InputError(
-                "simulate_full_order: contact space",
-                got="contact points whose gap does not change with the axial position of a",
-                expected="surfaces that face each other along z",
-                hint="check the orientation of the geometry; the axis of motion is z.",
-            )
+        refuse_if(
+            not np.any(facing),
+            "simulate_full_order: contact space",
+            got="contact points whose gap does not change with the axial position of a",
+            expected="surfaces that face each other along z",
+            hint="check the orientation of the geometry; the axis of motion is z.",
+        )
         touch = float(np.min(self.space.gap[facing] / axial[facing]))
         retraction = max(0.0, -touch)
         if retraction > 0:

@@ -28,7 +28,7 @@ from scipy.sparse import csr_array
 from klack.bodies.elasticity.body import ElasticBody
 from klack.bodies.elasticity.ring_points import RingSections
 from klack.bodies.elasticity.statics import Flexibility
-from klack.errors import InputError, require_nonnegative, require_positive
+from klack.errors import InputError, refuse_if, require_nonnegative, require_positive
 from klack.mesh.mesh import Mesh
 from klack.transient.interface_arrays import Guide
 from klack.transient.interface_model import InterfaceModel
@@ -95,13 +95,13 @@ def guide_of_shaft(
         For a height without nodes, a surface that is not round, a body of revolution, or a contact
         without any compliance.
     """
-    if body.dimension != 3:
-        raise InputError(
-            f"guide of body '{body.name}'",
-            got="a body of revolution in its motion along the axis",
-            expected="a solid body",
-            hint="model the bodies as swept or solid.",
-        )
+    refuse_if(
+        body.dimension != 3,
+        f"guide of body '{body.name}'",
+        got="a body of revolution in its motion along the axis",
+        expected="a solid body",
+        hint="model the bodies as swept or solid.",
+    )
     return guide_at_sections(
         model,
         body.name,
@@ -234,14 +234,14 @@ def _coordinates(model: InterfaceModel, name: str, section: ShaftSection) -> NDA
 
 def require_within(body: str, surface: str, height: float, z: NDArray[np.float64]) -> None:
     """Reject a height where a surface with these nodes is not."""
-    if not z.min() - 1e-6 <= height <= z.max() + 1e-6:
-        raise InputError(
-            f"guide of body '{body}': heights",
-            got=f"z = {height * 1e3:.4g} mm",
-            expected=f"between {z.min() * 1e3:.4g} and {z.max() * 1e3:.4g} mm, where surface "
-            f"'{surface}' is",
-            hint="give heights in the placed body.",
-        )
+    refuse_if(
+        not z.min() - 1e-6 <= height <= z.max() + 1e-6,
+        f"guide of body '{body}': heights",
+        got=f"z = {height * 1e3:.4g} mm",
+        expected=f"between {z.min() * 1e3:.4g} and {z.max() * 1e3:.4g} mm, where surface "
+        f"'{surface}' is",
+        hint="give heights in the placed body.",
+    )
 
 
 class _Section(NamedTuple):
@@ -305,13 +305,13 @@ def _axis(where: str, places: NDArray[np.float64]) -> NDArray[np.float64]:
     terms = np.column_stack([2 * x, 2 * y, 2 * x * z, 2 * y * z, np.ones(len(x)), z, z**2])
     solution, *_ = np.linalg.lstsq(terms, x**2 + y**2, rcond=1e-10)
     miss = float(np.max(np.abs(terms @ solution - x**2 - y**2)))
-    if len(x) < 5 or not miss < _ROUND:
-        raise InputError(
-            where,
-            got=f"a surface that is off the nearest round one by {miss * size * 1e6:.3g} um",
-            expected="a cylinder around the axis of the body",
-            hint="name only the cylindrical part of the shaft, or refine the mesh around it.",
-        )
+    refuse_if(
+        len(x) < 5 or not miss < _ROUND,
+        where,
+        got=f"a surface that is off the nearest round one by {miss * size * 1e6:.3g} um",
+        expected="a cylinder around the axis of the body",
+        hint="name only the cylindrical part of the shaft, or refine the mesh around it.",
+    )
     return np.asarray(middle + size * solution[:2])
 
 

@@ -40,7 +40,7 @@ from klack.contact.friction import Friction
 from klack.contact.mortar import ContactSpace
 from klack.contact.pressure_limit import PressureLimit
 from klack.contact.statics import contact_compliance
-from klack.errors import ConvergenceError, InputError
+from klack.errors import ConvergenceError, refuse_if
 
 __all__ = [
     "InterfaceBody",
@@ -444,13 +444,13 @@ def model_at_points(
         As of :func:`interface_model`.
     """
     moving = bodies[0]
-    if not moving.mass < inf:
-        raise InputError(
-            f"interface model: body '{moving.name}'",
-            got="a supported moving body",
-            expected="a body that is free along z",
-            hint="give the needle first and remove its supports.",
-        )
+    refuse_if(
+        not moving.mass < inf,
+        f"interface model: body '{moving.name}'",
+        got="a supported moving body",
+        expected="a body that is free along z",
+        hint="give the needle first and remove its supports.",
+    )
     rows = [len(contact.gap) for contact in contacts]
     last = np.cumsum(rows)
     count = int(last[-1])
@@ -579,13 +579,13 @@ def _observed_static(
 
 def _common_ways(contacts: Sequence[InterfaceContact]) -> int:
     ways = {contact.ways for contact in contacts}
-    if len(ways) > 1:
-        raise InputError(
-            "interface model: contacts",
-            got="tangential directions at one contact and none at another",
-            expected="tangential directions at all contacts, or none",
-            hint="give every contact faces; their friction may be 0.",
-        )
+    refuse_if(
+        len(ways) > 1,
+        "interface model: contacts",
+        got="tangential directions at one contact and none at another",
+        expected="tangential directions at all contacts, or none",
+        hint="give every contact faces; their friction may be 0.",
+    )
     return ways.pop()
 
 
@@ -649,13 +649,13 @@ def _static_compliance(
     total = np.zeros((sum(len(place) for place in places),) * 2)
     for contact in contacts:
         for name in (contact.upper, contact.lower):
-            if name not in names:
-                raise InputError(
-                    f"interface model: contact '{contact.name}'",
-                    got=f"body '{name}'",
-                    expected=f"one of: {', '.join(names)}",
-                    hint="give every body of the contacts.",
-                )
+            refuse_if(
+                name not in names,
+                f"interface model: contact '{contact.name}'",
+                got=f"body '{name}'",
+                expected=f"one of: {', '.join(names)}",
+                hint="give every body of the contacts.",
+            )
     for contact, place in zip(contacts, places, strict=True):
         C = contact.compliance
         if C is None:

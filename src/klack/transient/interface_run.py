@@ -16,7 +16,7 @@ from threadpoolctl import threadpool_limits
 
 from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
 from klack.contact.statics import ReachError
-from klack.errors import ConvergenceError, InputError, require_nonnegative, require_positive
+from klack.errors import ConvergenceError, refuse_if, require_nonnegative, require_positive
 from klack.simulation import energy_balance
 from klack.simulation.finite import require_finite
 from klack.simulation.propagator import damping_loss, modal_propagator
@@ -261,13 +261,13 @@ def _require_layer_alone(model: InterfaceModel) -> None:
         "a second contact": len(model.contacts) > 1,
     }
     beside = next((name for name, is_there in others.items() if is_there), None)
-    if model.layer is not None and beside is not None:
-        raise InputError(
-            "interface level: layer",
-            got=f"a layer of asperities and {beside}",
-            expected="one of them",
-            hint="set the layer of the model to None, or leave the other out.",
-        )
+    refuse_if(
+        model.layer is not None and beside is not None,
+        "interface level: layer",
+        got=f"a layer of asperities and {beside}",
+        expected="one of them",
+        hint="set the layer of the model to None, or leave the other out.",
+    )
 
 
 def _layer(model: InterfaceModel) -> Layer | None:
@@ -408,13 +408,13 @@ class _Run:
     def coordinates(self, rigid: NDArray[np.float64]) -> NDArray[np.float64]:
         R = self.model.rigid[:, : self.rigid_count]
         q = rigid_coordinates(R, rigid)
-        if np.max(np.abs(R @ q - rigid) / SCALE) > 1e-9 * max(1.0, np.max(np.abs(rigid / SCALE))):
-            raise InputError(
-                "simulate_interface: offset or velocity",
-                got="a motion across the axis, or a rotation",
-                expected="motion along z only, for bodies of revolution",
-                hint="model the bodies as swept or solid to tilt or shift them.",
-            )
+        refuse_if(
+            np.max(np.abs(R @ q - rigid) / SCALE) > 1e-9 * max(1.0, np.max(np.abs(rigid / SCALE))),
+            "simulate_interface: offset or velocity",
+            got="a motion across the axis, or a rotation",
+            expected="motion along z only, for bodies of revolution",
+            hint="model the bodies as swept or solid to tilt or shift them.",
+        )
         return q
 
     def rigid_state(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

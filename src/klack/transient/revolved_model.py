@@ -33,7 +33,7 @@ from klack.bodies.elasticity.ring_points import (
 from klack.bodies.elasticity.statics import Flexibility
 from klack.contact.face_friction import lifted_offset
 from klack.contact.rings import RingFriction, RingSpace
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.machine.cache.result_cache import ResultCache
 from klack.machine.memory import require_memory
 from klack.transient.interface_model import (
@@ -365,13 +365,13 @@ def reduced_bodies(
     All contacts have the same number of angles.
     """
     ways = {contact.ways for contact in contacts}
-    if len(ways) > 1:
-        raise InputError(
-            "interface model: contacts on rings",
-            got="friction at one contact and none at another",
-            expected="faces at all contacts, or none",
-            hint="give every contact faces; their friction may be 0.",
-        )
+    refuse_if(
+        len(ways) > 1,
+        "interface model: contacts on rings",
+        got="friction at one contact and none at another",
+        expected="faces at all contacts, or none",
+        hint="give every contact faces; their friction may be 0.",
+    )
     counts = [len(contact.space.gap) for contact in contacts]
     places = row_places(counts, ways.pop())
     total = sum(len(place) for place in places)

@@ -41,7 +41,7 @@ from numpy.typing import NDArray
 from klack.arrays import Ints, Matrix, Vector
 from klack.contact.face_friction import with_still_directions
 from klack.contact.friction import Friction
-from klack.errors import ConvergenceError, InputError
+from klack.errors import ConvergenceError, refuse_if
 from klack.machine.compiling.jit import FAST, inner, njit
 from klack.simulation.phase import phase
 from klack.transient.closed_points import (
@@ -699,13 +699,13 @@ class RubbingPoints:
         own = np.diag(even).reshape(self._ways + 1, -1)
         self._own = own[0]
         fixed = np.flatnonzero((own[1:].max(axis=0) <= _RIGID * own[0]) & ~self._still[points])
-        if len(fixed):
-            raise InputError(
-                "friction of the faces",
-                got=f"{len(fixed)} contact points that nothing can move across their normal",
-                expected="faces of which one can move across",
-                hint="leave friction out, or do not fix the radial motion of both bodies.",
-            )
+        refuse_if(
+            len(fixed),
+            "friction of the faces",
+            got=f"{len(fixed)} contact points that nothing can move across their normal",
+            expected="faces of which one can move across",
+            hint="leave friction out, or do not fix the radial motion of both bodies.",
+        )
 
     def solve(
         self, q: NDArray[np.float64], guess: NDArray[np.float64]

@@ -17,7 +17,7 @@ from threadpoolctl import threadpool_limits
 from klack.arrays import Index, Vector
 from klack.contact.gap_update import ABOVE, BELOW, Pairing
 from klack.contact.step_constants import NO_LAW
-from klack.errors import AccuracyWarning, ConvergenceError, InputError
+from klack.errors import AccuracyWarning, ConvergenceError, refuse_if
 from klack.machine.compiling.jit import of_one_kind
 from klack.simulation.modal_step import ROW, ROW_Q, ROW_V
 from klack.simulation.network_arrays import (
@@ -1032,10 +1032,10 @@ def _check(valve: SpatialValve, network: CompiledNetwork) -> None:
         problem = f"a film at '{min(lands)}' that has no land"
     elif model.limit is not None or model.layer is not None:
         problem = "faces that yield, or with a layer of asperities"
-    if problem:
-        raise InputError(
-            "motion in three dimensions",
-            got=problem,
-            expected="the same bodies and end stops, a guide instead of friction, smooth faces",
-            hint="leave it out, or let the needle move along its axis.",
-        )
+    refuse_if(
+        problem,
+        "motion in three dimensions",
+        got=problem,
+        expected="the same bodies and end stops, a guide instead of friction, smooth faces",
+        hint="leave it out, or let the needle move along its axis.",
+    )

@@ -38,7 +38,7 @@ from klack.bodies.elasticity.factorization import factorize
 from klack.bodies.elasticity.quadrature import quadrature
 from klack.bodies.elasticity.shape_functions import shape_functions
 from klack.bodies.elasticity.stress import stress_points
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.materials.material import Material
 from klack.mesh.mesh import Mesh
 
@@ -118,13 +118,13 @@ def strain_points(
         at += len(block.connectivity)
         if not here.any():
             continue
-        if block.family not in _LINEAR:
-            raise InputError(
-                f"plasticity of body '{name}'",
-                got=f"elements '{block.family}' where the body yields",
-                expected=" or ".join(_LINEAR),
-                hint="give a mesh of second order; elements of first order lock.",
-            )
+        refuse_if(
+            block.family not in _LINEAR,
+            f"plasticity of body '{name}'",
+            got=f"elements '{block.family}' where the body yields",
+            expected=" or ".join(_LINEAR),
+            hint="give a mesh of second order; elements of first order lock.",
+        )
         nodes, material = block.connectivity[here], materials[block.solid]
         found.append(_strain_points(mesh, block.family, nodes, material, elements))
     return found
