@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.signals.sampled import Spectrum
 
 __all__ = ["CumulativeEnergy", "cumulative_energy"]
@@ -32,13 +32,13 @@ class CumulativeEnergy:
 
     def frequency_below(self, share: float) -> float:
         """Frequency [Hz] below which a share (0 to 1) of the energy lies."""
-        if not 0.0 < share < 1.0:
-            raise InputError(
-                "CumulativeEnergy.frequency_below",
-                got=f"a share of {share:g}",
-                expected="a value above 0 and below 1",
-                hint="0.5, 0.9 and 0.99 are usual.",
-            )
+        refuse_if(
+            not 0.0 < share < 1.0,
+            "CumulativeEnergy.frequency_below",
+            got=f"a share of {share:g}",
+            expected="a value above 0 and below 1",
+            hint="0.5, 0.9 and 0.99 are usual.",
+        )
         i = int(np.searchsorted(self.share, share))
         low, high = self.share[i - 1], self.share[i]
         part = (share - low) / (high - low)
@@ -57,23 +57,23 @@ def cumulative_energy(density: Spectrum, *, low: float, high: float) -> Cumulati
         0 Hz on.
     """
     frequency, values = density.frequency, np.real(density.values)
-    if not 0.0 <= low < high <= frequency[-1] * (1.0 + 1e-12):
-        raise InputError(
-            f"cumulative_energy of '{density.name}'",
-            got=f"{low:g} to {high:g} Hz",
-            expected=f"limits in rising order within 0 and {frequency[-1]:g} Hz",
-            hint="20 Hz to 200 kHz covers valves.",
-        )
+    refuse_if(
+        not 0.0 <= low < high <= frequency[-1] * (1.0 + 1e-12),
+        f"cumulative_energy of '{density.name}'",
+        got=f"{low:g} to {high:g} Hz",
+        expected=f"limits in rising order within 0 and {frequency[-1]:g} Hz",
+        hint="20 Hz to 200 kHz covers valves.",
+    )
     inner = (frequency > low) & (frequency < high)
     f = np.concatenate(([low], frequency[inner], [high]))
     e = np.interp(f, frequency, values)
     gathered = np.concatenate(([0.0], np.cumsum(0.5 * (e[1:] + e[:-1]) * np.diff(f))))
     total = float(gathered[-1])
-    if not total > 0.0:
-        raise InputError(
-            f"cumulative_energy of '{density.name}'",
-            got="a density without energy",
-            expected="some energy between the limits",
-            hint="is there an impact in the record?",
-        )
+    refuse_if(
+        not total > 0.0,
+        f"cumulative_energy of '{density.name}'",
+        got="a density without energy",
+        expected="some energy between the limits",
+        hint="is there an impact in the record?",
+    )
     return CumulativeEnergy(frequency=f, share=gathered / total, total=total)

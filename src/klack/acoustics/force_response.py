@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.bodies.reduction.structure import Structure
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.machine.compiling.jit import njit
 from klack.signals.sampled import TimeSeries
 from klack.simulation.propagator import damping_loss, modal_propagator
@@ -63,13 +63,13 @@ def aligned_forces(
     structure: Structure, forces: Mapping[str, TimeSeries]
 ) -> tuple[TimeSeries, NDArray[np.float64]]:
     """One force, for its time axis, and the forces at all ports (n, p) [N], on one grid."""
-    if not forces:
-        raise InputError(
-            f"forces on '{structure.name}'",
-            got="none",
-            expected=f"a force at one or more of: {', '.join(structure.port_names)}",
-            hint="port_forces makes them from the forces of the stops.",
-        )
+    refuse_if(
+        not forces,
+        f"forces on '{structure.name}'",
+        got="none",
+        expected=f"a force at one or more of: {', '.join(structure.port_names)}",
+        hint="port_forces makes them from the forces of the stops.",
+    )
     first = next(iter(forces.values()))
     result = np.zeros((first.values.size, len(structure.port_names)))
     for name, force in forces.items():
@@ -78,13 +78,13 @@ def aligned_forces(
             and abs(force.step / first.step - 1.0) < 1e-9
             and abs(force.start - first.start) < 1e-6 * first.step
         )
-        if not same:
-            raise InputError(
-                f"forces on '{structure.name}': '{name}'",
-                got=f"{force.values.size} values every {force.step:g} s from {force.start:g} s",
-                expected=f"{first.values.size} every {first.step:g} s from {first.start:g} s",
-                hint="bring all forces onto one grid.",
-            )
+        refuse_if(
+            not same,
+            f"forces on '{structure.name}': '{name}'",
+            got=f"{force.values.size} values every {force.step:g} s from {force.start:g} s",
+            expected=f"{first.values.size} every {first.step:g} s from {first.start:g} s",
+            hint="bring all forces onto one grid.",
+        )
         result[:, structure.port_index(name)] = force.values
     return first, result
 

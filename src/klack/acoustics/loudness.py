@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.acoustics.nonlinear_decay import nonlinear_decay
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.signals.sampled import TimeSeries
 
 __all__ = ["Loudness", "loudness_level", "time_varying_loudness"]
@@ -59,13 +59,13 @@ def time_varying_loudness(pressure: TimeSeries) -> Loudness:
 
     The filters start from silence: a sudden sound needs 0.3 s to its final loudness.
     """
-    if abs(pressure.rate / _RATE - 1.0) > 1e-6:
-        raise InputError(
-            f"time_varying_loudness of '{pressure.name}'",
-            got=f"a rate of {pressure.rate:.6g} Hz",
-            expected=f"{_RATE} Hz, which the filters of ISO 532-1 are made for",
-            hint="make the sound with click_pressure(..., rate=48000).",
-        )
+    refuse_if(
+        abs(pressure.rate / _RATE - 1.0) > 1e-6,
+        f"time_varying_loudness of '{pressure.name}'",
+        got=f"a rate of {pressure.rate:.6g} Hz",
+        expected=f"{_RATE} Hz, which the filters of ISO 532-1 are made for",
+        hint="make the sound with click_pressure(..., rate=48000).",
+    )
     total, specific = _zwicker(pressure.values)
     count = max(round(pressure.values.size * pressure.step / _STEP), 1)
     total, specific = total[:count], specific[:, :count]

@@ -16,7 +16,7 @@ import scipy
 from numpy.typing import NDArray
 
 from klack.acoustics.spectrum import change_spectrum
-from klack.errors import InputError, require_positive
+from klack.errors import InputError, refuse_if, require_positive
 from klack.signals.sampled import TimeSeries
 
 __all__ = ["audio_band", "click_pressure", "minimum_phase_filter", "pressure_transfer"]
@@ -190,20 +190,20 @@ def _interpolated(
 
 def _require_transfer(frequency: NDArray[np.float64], transfer: NDArray[np.float64]) -> None:
     where = "click_pressure: frequency and transfer"
-    if frequency.ndim != 1 or frequency.shape != transfer.shape or not np.any(frequency > 0.0):
-        raise InputError(
-            where,
-            got=f"arrays of shapes {frequency.shape} and {transfer.shape}",
-            expected="two of the same length, with at least one frequency above 0",
-            hint="give the transfer at each frequency.",
-        )
-    if np.any(np.diff(frequency) <= 0.0) or frequency[0] < 0.0:
-        raise InputError(
-            where,
-            got="frequencies out of order",
-            expected="increasing frequencies from 0 Hz up",
-            hint="sort both arrays by frequency.",
-        )
+    refuse_if(
+        frequency.ndim != 1 or frequency.shape != transfer.shape or not np.any(frequency > 0.0),
+        where,
+        got=f"arrays of shapes {frequency.shape} and {transfer.shape}",
+        expected="two of the same length, with at least one frequency above 0",
+        hint="give the transfer at each frequency.",
+    )
+    refuse_if(
+        np.any(np.diff(frequency) <= 0.0) or frequency[0] < 0.0,
+        where,
+        got="frequencies out of order",
+        expected="increasing frequencies from 0 Hz up",
+        hint="sort both arrays by frequency.",
+    )
     if not np.all(transfer >= 0.0) or not np.any(transfer[frequency > 0.0] > 0.0):
         raise InputError(
             where,

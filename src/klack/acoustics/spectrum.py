@@ -19,7 +19,7 @@ import scipy
 from numpy.typing import NDArray
 
 from klack.contact.history import ImpactHistory
-from klack.errors import InputError, require_positive
+from klack.errors import InputError, refuse_if, require_positive
 from klack.signals.sampled import Spectrum, TimeSeries
 
 __all__ = [
@@ -62,13 +62,13 @@ def force_series(history: ImpactHistory) -> TimeSeries:
 def half_cosine_tail(series: TimeSeries, *, length: float) -> TimeSeries:
     """Fade the last ``length`` [s] of a series to zero with half a cosine."""
     count = round(length / series.step)
-    if not 0 < count <= series.values.size:
-        raise InputError(
-            "half_cosine_tail: length",
-            got=f"{length:g} s for a series of {series.values.size * series.step:g} s",
-            expected="at least one step, at most the whole series",
-            hint="a tenth of the series is usual.",
-        )
+    refuse_if(
+        not 0 < count <= series.values.size,
+        "half_cosine_tail: length",
+        got=f"{length:g} s for a series of {series.values.size * series.step:g} s",
+        expected="at least one step, at most the whole series",
+        hint="a tenth of the series is usual.",
+    )
     fade = 0.5 * (1.0 + np.cos(np.pi * (np.arange(count) + 1.0) / count))
     values = series.values.copy()
     values[-count:] *= fade

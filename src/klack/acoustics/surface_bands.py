@@ -24,7 +24,7 @@ from klack.acoustics.radiation import PLATE, Efficiency, surface_efficiency
 from klack.acoustics.spectrum import force_spectrum
 from klack.arrays import Vector
 from klack.bodies.reduction.structure import Structure
-from klack.errors import InputError, require_positive
+from klack.errors import InputError, refuse_if, require_positive
 from klack.signals.sampled import TimeSeries
 
 __all__ = [
@@ -333,13 +333,13 @@ def _edges(bands: Floats, forces: Mapping[str, TimeSeries]) -> Floats:
     edges = np.atleast_2d(np.asarray(bands, dtype=float))
     highest = 0.5 / next(iter(forces.values())).step
     shaped = edges.ndim == 2 and edges.shape[1] == 2
-    if not shaped or not np.all((edges[:, 0] > 0.0) & (edges[:, 0] < edges[:, 1])):
-        raise InputError(
-            "bands",
-            got=f"an array of shape {edges.shape}",
-            expected="a lower and a higher edge above 0 Hz for each band",
-            hint="numpy.column_stack(band_edges(band_numbers(17.0, 224e3))) gives third octaves.",
-        )
+    refuse_if(
+        not shaped or not np.all((edges[:, 0] > 0.0) & (edges[:, 0] < edges[:, 1])),
+        "bands",
+        got=f"an array of shape {edges.shape}",
+        expected="a lower and a higher edge above 0 Hz for each band",
+        hint="numpy.column_stack(band_edges(band_numbers(17.0, 224e3))) gives third octaves.",
+    )
     if edges[-1, 1] > highest or np.any(np.diff(edges[:, 0]) <= 0.0):
         raise InputError(
             "bands",

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.signals.sampled import Spectrum
 
 __all__ = [
@@ -76,13 +76,13 @@ def band_edges(number: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[
 
 def band_numbers(low: float, high: float) -> NDArray[np.int64]:
     """Bands within ``low`` to ``high`` [Hz], edges included."""
-    if not 0.0 < low < high:
-        raise InputError(
-            "band_numbers",
-            got=f"{low:g} to {high:g} Hz",
-            expected="0 < low < high",
-            hint="20 Hz to 200 kHz covers valves.",
-        )
+    refuse_if(
+        not 0.0 < low < high,
+        "band_numbers",
+        got=f"{low:g} to {high:g} Hz",
+        expected="0 < low < high",
+        hint="20 Hz to 200 kHz covers valves.",
+    )
     tolerance = 1e-9  # in band numbers: an edge given as a limit counts as inside
     first = np.ceil(10.0 * np.log10(low / 1000.0) + 0.5 - tolerance)
     last = np.floor(10.0 * np.log10(high / 1000.0) - 0.5 + tolerance)
@@ -113,13 +113,13 @@ def band_energies(density: Spectrum, *, low: float, high: float) -> ThirdOctaves
         See :func:`band_numbers`; at most the last frequency.
     """
     frequency, values = density.frequency, np.real(density.values)
-    if high > frequency[-1]:
-        raise InputError(
-            "band_energies: high",
-            got=f"{high:g} Hz",
-            expected=f"at most {frequency[-1]:g} Hz, half the sampling rate",
-            hint="take a smaller time step or a lower limit.",
-        )
+    refuse_if(
+        high > frequency[-1],
+        "band_energies: high",
+        got=f"{high:g} Hz",
+        expected=f"at most {frequency[-1]:g} Hz, half the sampling rate",
+        hint="take a smaller time step or a lower limit.",
+    )
     number = band_numbers(low, high)
     edge_low, edge_high = band_edges(number)
     steps = 0.5 * (values[1:] + values[:-1]) * np.diff(frequency)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from klack.errors import InputError, require_positive
+from klack.errors import refuse_if, require_positive
 from klack.signals.sampled import TimeSeries
 
 __all__ = ["full_scale_of", "level_statement", "wav_bytes", "write_wav"]
@@ -66,13 +66,13 @@ def wav_bytes(pressure: TimeSeries, *, full_scale: float) -> bytes:
     require_positive("write_wav: full_scale", full_scale, "Pa")
     _require_rate(pressure)
     peak = float(np.max(np.abs(pressure.values)))
-    if peak > full_scale:
-        raise InputError(
-            f"write_wav: '{pressure.name}'",
-            got=f"a peak of {peak:.4g} Pa",
-            expected=f"at most the full scale of {full_scale:.4g} Pa",
-            hint="take full_scale_of all sounds that are to be compared.",
-        )
+    refuse_if(
+        peak > full_scale,
+        f"write_wav: '{pressure.name}'",
+        got=f"a peak of {peak:.4g} Pa",
+        expected=f"at most the full scale of {full_scale:.4g} Pa",
+        hint="take full_scale_of all sounds that are to be compared.",
+    )
     buffer = BytesIO()
     with soundfile.SoundFile(
         buffer, "w", samplerate=_RATE, channels=1, subtype=_SUBTYPE, format="WAV"
@@ -84,10 +84,10 @@ def wav_bytes(pressure: TimeSeries, *, full_scale: float) -> bytes:
 
 
 def _require_rate(pressure: TimeSeries) -> None:
-    if abs(pressure.rate / _RATE - 1.0) > 1e-6:
-        raise InputError(
-            f"write_wav: '{pressure.name}'",
-            got=f"a rate of {pressure.rate:.6g} Hz",
-            expected=f"{_RATE} Hz",
-            hint="make the sound with click_pressure(..., rate=48000).",
-        )
+    refuse_if(
+        abs(pressure.rate / _RATE - 1.0) > 1e-6,
+        f"write_wav: '{pressure.name}'",
+        got=f"a rate of {pressure.rate:.6g} Hz",
+        expected=f"{_RATE} Hz",
+        hint="make the sound with click_pressure(..., rate=48000).",
+    )

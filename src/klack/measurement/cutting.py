@@ -13,7 +13,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.measurement.channels import Role, Trigger
 from klack.signals.sampled import TimeSeries
 
@@ -79,13 +79,13 @@ def trigger_level(windows: Iterable[Window], trigger: Trigger) -> float:
         sampled.append(values[:: max(1, values.size // _SAMPLED)])
     all_values = np.concatenate(sampled) if sampled else np.empty(0)
     low = float(all_values.min(initial=np.inf))
-    if not high > low:
-        raise InputError(
-            f"measurement.trigger: channel '{trigger.channel}'",
-            got=f"a channel that stays at {low:g} (SI)",
-            expected="a channel that moves with every stroke",
-            hint="choose another channel for the trigger.",
-        )
+    refuse_if(
+        not high > low,
+        f"measurement.trigger: channel '{trigger.channel}'",
+        got=f"a channel that stays at {low:g} (SI)",
+        expected="a channel that moves with every stroke",
+        hint="choose another channel for the trigger.",
+    )
     rest = float(np.median(all_values[all_values <= low + _LOW * (high - low)]))
     return rest + trigger.share_of_way * (high - rest)
 
@@ -200,13 +200,13 @@ def common_axis(pieces: Sequence[Piece], first: float, last: float) -> Vector:
     begin = max(first, float(np.median([piece.start for piece in pieces])))
     end = min(last, float(np.median([piece.end for piece in pieces])))
     a, b = int(np.ceil(begin / step - 1e-6)), int(np.floor(end / step + 1e-6))
-    if b - a < 2:
-        raise InputError(
-            "strokes",
-            got=f"{len(pieces)} pieces with no common time around their trigger",
-            expected="strokes with samples before and after it",
-            hint="check the trigger: channel, level, 'before' and 'after'.",
-        )
+    refuse_if(
+        b - a < 2,
+        "strokes",
+        got=f"{len(pieces)} pieces with no common time around their trigger",
+        expected="strokes with samples before and after it",
+        hint="check the trigger: channel, level, 'before' and 'after'.",
+    )
     return np.asarray(step * np.arange(a, b + 1), dtype=np.float64)
 
 

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.measurement.channels import LIFT_ALONE, ROLES, Channels, Role, Trigger
 from klack.measurement.cutting import (
     Piece,
@@ -179,14 +179,14 @@ def load_stroke_set(
                 cuts.extend(_cuts(recording, one, trigger, several=len(found) > 1))
     progress(1.0)
     source = ", ".join(Path(path).name for path in paths)
-    if not cuts:
-        raise InputError(
-            source or "measurement",
-            got="no stroke",
-            expected="a channel that crosses the trigger level",
-            hint="check measurement.trigger: channel, level or share, and slope; scale: -1 turns a "
-            "channel round.",
-        )
+    refuse_if(
+        not cuts,
+        source or "measurement",
+        got="no stroke",
+        expected="a channel that crosses the trigger level",
+        hint="check measurement.trigger: channel, level or share, and slope; scale: -1 turns a "
+        "channel round.",
+    )
     zero = measurement is not None and measurement.zero == "start"
     return _aligned(source, cuts, trigger, zero=zero or measurement is None, notes=notes)
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import AccuracyWarning, InputError
+from klack.errors import AccuracyWarning, InputError, refuse_if
 from klack.measurement.channels import ROLES, Role
 from klack.measurement.find_channels import FoundChannel
 from klack.measurement.recording import Recording
@@ -144,13 +144,13 @@ def windows(
     clock = common_time(recording, found)
     size = max(round(length / clock.step), 2)
     shared = round(overlap / clock.step)
-    if shared >= size:
-        raise InputError(
-            "windows: overlap",
-            got=f"{overlap:g} s of {length:g} s",
-            expected="less than the length of a window",
-            hint="use longer windows.",
-        )
+    refuse_if(
+        shared >= size,
+        "windows: overlap",
+        got=f"{overlap:g} s of {length:g} s",
+        expected="less than the length of a window",
+        hint="use longer windows.",
+    )
     first = 0
     while first < clock.count:
         last = min(first + size, clock.count)

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.files.closing import Closing
 from klack.measurement.time_base import TimeBase, survey_time
 
@@ -79,13 +79,13 @@ class Recording(Closing):
         self.path, self.channels, self.notes = path, channels, notes
         self._time_bases: dict[tuple[str, int], TimeBase] = {}
         self._by_name = {channel.name: channel for channel in channels}
-        if not channels:
-            raise InputError(
-                str(path),
-                got="no channel of numbers over time" + "".join(f"; {note}" for note in notes),
-                expected="at least one channel",
-                hint="check that it was exported completely, and the range of the instrument.",
-            )
+        refuse_if(
+            not channels,
+            str(path),
+            got="no channel of numbers over time" + "".join(f"; {note}" for note in notes),
+            expected="at least one channel",
+            hint="check that it was exported completely, and the range of the instrument.",
+        )
 
     def channel(self, name: str) -> ChannelInfo:
         """Channel of a name."""
@@ -146,13 +146,13 @@ class Recording(Closing):
     def _window(self, channel: ChannelInfo, first: int, last: int | None) -> tuple[int, int]:
         end = channel.count if last is None else min(last, channel.count)
         begin = min(max(first, 0), end)
-        if end - begin > _LARGEST_WINDOW:
-            raise InputError(
-                f"{self.path.name}: channel '{channel.name}'",
-                got=f"{end - begin} samples at once",
-                expected=f"at most {_LARGEST_WINDOW}",
-                hint="read it piecewise: give a trigger in the section 'measurement'.",
-            )
+        refuse_if(
+            end - begin > _LARGEST_WINDOW,
+            f"{self.path.name}: channel '{channel.name}'",
+            got=f"{end - begin} samples at once",
+            expected=f"at most {_LARGEST_WINDOW}",
+            hint="read it piecewise: give a trigger in the section 'measurement'.",
+        )
         return begin, end
 
     def _known(self, channel: ChannelInfo, first: int, last: int) -> Vector:

@@ -25,7 +25,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.measurement.channels import LiftSensor
 from klack.measurement.impacts import fit_flights, read_flights
 from klack.measurement.stroke_measures import (
@@ -160,13 +160,13 @@ class SetMeasures:
 
     def column(self, stop: Stop, quantity: str) -> Column:
         """One of :data:`QUANTITIES` of the first impact on a stop."""
-        if quantity not in QUANTITIES:
-            raise InputError(
-                "quantity",
-                got=f"'{quantity}'",
-                expected=f"one of: {', '.join(QUANTITIES)}",
-                hint="speeds, restitution, height, time and period of the first impact.",
-            )
+        refuse_if(
+            quantity not in QUANTITIES,
+            "quantity",
+            got=f"'{quantity}'",
+            expected=f"one of: {', '.join(QUANTITIES)}",
+            hint="speeds, restitution, height, time and period of the first impact.",
+        )
         return first_impact_column(stop, quantity, [stroke.first(stop) for stroke in self.strokes])
 
     def bounces(self, stop: Stop) -> NDArray[np.int64]:
@@ -206,13 +206,13 @@ def measure_set(
     ``seat`` [m], ``opening`` [m] and ``sensor`` as of
     :func:`klack.measurement.impacts.measure_stroke`.
     """
-    if "lift" not in strokes.roles:
-        raise InputError(
-            strokes.source,
-            got=f"channels {', '.join(strokes.roles) or 'of no kind'}",
-            expected="a lift",
-            hint="name its channel in measurement.channels.lift.",
-        )
+    refuse_if(
+        "lift" not in strokes.roles,
+        strokes.source,
+        got=f"channels {', '.join(strokes.roles) or 'of no kind'}",
+        expected="a lift",
+        hint="name its channel in measurement.channels.lift.",
+    )
     lifts = strokes.matrix("lift")
 
     fitted = [
@@ -245,13 +245,13 @@ def expected_maximum(count: int) -> float:
 def highest_rebound(column: Column) -> HighestRebound:
     """Highest rebound (height or restitution) of a set, and its bias."""
     known = column.known
-    if not known.size:
-        raise InputError(
-            f"{column.quantity} on the {column.stop}",
-            got="no stroke with this number",
-            expected="at least one measured rebound",
-            hint="check the notes of the strokes.",
-        )
+    refuse_if(
+        not known.size,
+        f"{column.quantity} on the {column.stop}",
+        got="no stroke with this number",
+        expected="at least one measured rebound",
+        hint="check the notes of the strokes.",
+    )
     index = int(np.nanargmax(column.values))
     n = known.size
     s = column.scatter if n > 1 else 0.0

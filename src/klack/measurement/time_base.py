@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 
 __all__ = ["TimeBase", "survey_time", "uniform_step"]
 
@@ -82,13 +82,13 @@ def survey_time(
     place
         A sample in words.
     """
-    if count < 2:
-        raise InputError(
-            where,
-            got=f"{count} sample",
-            expected="at least two",
-            hint="check that the file was exported completely.",
-        )
+    refuse_if(
+        count < 2,
+        where,
+        got=f"{count} sample",
+        expected="at least two",
+        hint="check that the file was exported completely.",
+    )
     start, end = float(read(0, 1)[0]), float(read(count - 1, count)[0])
     step = (end - start) / (count - 1)
     marks, lengths = [], set[float]()

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError, require_positive
+from klack.errors import refuse_if, require_positive
 
 __all__ = ["Spectrum", "TimeSeries"]
 
@@ -32,13 +32,13 @@ class TimeSeries:
 
     def __post_init__(self) -> None:
         require_positive(f"TimeSeries '{self.name}': step", self.step, "s")
-        if self.values.ndim != 1 or self.values.size == 0:
-            raise InputError(
-                f"TimeSeries '{self.name}': values",
-                got=f"an array of shape {self.values.shape}",
-                expected="one axis with at least one value",
-                hint="give one channel at a time.",
-            )
+        refuse_if(
+            self.values.ndim != 1 or self.values.size == 0,
+            f"TimeSeries '{self.name}': values",
+            got=f"an array of shape {self.values.shape}",
+            expected="one axis with at least one value",
+            hint="give one channel at a time.",
+        )
 
     @property
     def time(self) -> NDArray:
@@ -71,13 +71,13 @@ class Spectrum:
     name: str = ""
 
     def __post_init__(self) -> None:
-        if self.frequency.shape != self.values.shape or self.frequency.size < 2:
-            raise InputError(
-                f"Spectrum '{self.name}'",
-                got=f"{self.frequency.size} frequencies and {self.values.size} values",
-                expected="the same number of both, at least two",
-                hint="use klack.acoustics.spectrum to make spectra from time series.",
-            )
+        refuse_if(
+            self.frequency.shape != self.values.shape or self.frequency.size < 2,
+            f"Spectrum '{self.name}'",
+            got=f"{self.frequency.size} frequencies and {self.values.size} values",
+            expected="the same number of both, at least two",
+            hint="use klack.acoustics.spectrum to make spectra from time series.",
+        )
 
     @property
     def resolution(self) -> float:

@@ -8,7 +8,7 @@ from klack.analyses.catalogue import load_result
 from klack.analyses.ending import is_result
 from klack.case.any_case import load_any_case
 from klack.case.valve import ValveCase
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.machine.progress import Progress, silent
 from klack.mesh.files.catalogue import MESH_FORMATS, STEP_ENDINGS
 from klack.network.component import Component
@@ -46,13 +46,13 @@ def view_of_source(
 
         model = read_mesh_file(source, unit_length, solids_only=True)
         return view_of_mesh(model.mesh, source.name, inspect_file(source, unit_length))
-    if unit_length is not None:
-        raise InputError(
-            "--unit",
-            got=f"a unit for {source}",
-            expected="--unit with a mesh file only",
-            hint="leave it out: cases, results and STEP files have their units.",
-        )
+    refuse_if(
+        unit_length is not None,
+        "--unit",
+        got=f"a unit for {source}",
+        expected="--unit with a mesh file only",
+        hint="leave it out: cases, results and STEP files have their units.",
+    )
     if is_result(source):
         return view_of_result(load_result(source), source, tuple(components), progress)
     return view_of_case(load_any_case(source, components), progress)

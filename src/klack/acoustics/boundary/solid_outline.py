@@ -14,7 +14,7 @@ from klack.acoustics.boundary.outline import REST, Outline, not_closed
 from klack.acoustics.boundary.triangles import Triangles
 from klack.arrays import Floats, Ints, Matrix, Vector
 from klack.bodies.reduction.structure import Structure
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 
 __all__ = ["solid_outline"]
 
@@ -40,13 +40,13 @@ def solid_outline(structures: Sequence[Structure]) -> Outline:
     loops = _loops(named)
     covers = [_cover(named.points[loop]) for loop in loops]
     whole = _with_covers(named, loops, covers)
-    if len(whole.corners) > _MOST:
-        raise InputError(
-            "noise.radiation: elements",
-            got=f"{len(whole.corners)} faces on the outside",
-            expected=f"{_MOST} at most",
-            hint="mesh the outside of the body more coarsely, or take radiation: piston.",
-        )
+    refuse_if(
+        len(whole.corners) > _MOST,
+        "noise.radiation: elements",
+        got=f"{len(whole.corners)} faces on the outside",
+        expected=f"{_MOST} at most",
+        hint="mesh the outside of the body more coarsely, or take radiation: piston.",
+    )
     try:
         mesh = Triangles(points=whole.points, corners=whole.corners)
     except InputError as error:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError, foreign_reading, optional_package
+from klack.errors import InputError, foreign_reading, optional_package, refuse_if
 from klack.measurement.files.clock import no_clock, unique_names
 from klack.measurement.recording import ChannelInfo, Recording, left_out
 from klack.measurement.unit_text import no_unit, plain_unit, unit_factor
@@ -124,13 +124,13 @@ class MdfFile(Recording):
         self._second[g] = 1.0 if no_unit(unit) else unit_factor(unit, TIME, where).factor
         first = self._master(g, 0, 1)
         last = self._master(g, count - 1, count)
-        if first.size != 1 or last.size != 1:
-            raise InputError(
-                where,
-                got=f"less than the {count} records declared in the file",
-                expected="a complete file",
-                hint="the recording was truncated; repair it with the program that wrote it.",
-            )
+        refuse_if(
+            first.size != 1 or last.size != 1,
+            where,
+            got=f"less than the {count} records declared in the file",
+            expected="a complete file",
+            hint="the recording was truncated; repair it with the program that wrote it.",
+        )
         return float(first[0]), float(last[0] - first[0]) / (count - 1), f"{name} of group {g + 1}"
 
     def _info(self, name: str, g: int, c: int, time: tuple[float, float, str]) -> ChannelInfo:
@@ -173,13 +173,13 @@ class MdfFile(Recording):
             values = np.array(samples, dtype=np.float64)
         if invalid is not None:
             values[np.asarray(invalid, dtype=bool)] = np.nan
-        if values.size != last - first:
-            raise InputError(
-                f"{self.path.name}: channel '{channel.name}'",
-                got=f"{values.size} values from sample {first + 1} on",
-                expected=f"{last - first}",
-                hint="the recording was truncated; repair it with the program that wrote it.",
-            )
+        refuse_if(
+            values.size != last - first,
+            f"{self.path.name}: channel '{channel.name}'",
+            got=f"{values.size} values from sample {first + 1} on",
+            expected=f"{last - first}",
+            hint="the recording was truncated; repair it with the program that wrote it.",
+        )
         return values
 
     def close(self) -> None:

@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.input.section import refuse_lfs_pointer
 from klack.measurement.recording import Recording
 
@@ -41,13 +41,13 @@ def open_recording(path: str | Path, *, time_step: float | None = None) -> Recor
             expected="a measured file",
             hint="check the path and the permissions of the file.",
         ) from error
-    if not head:
-        raise InputError(
-            str(path),
-            got="an empty file",
-            expected="a measured file",
-            hint="export the measurement again.",
-        )
+    refuse_if(
+        not head,
+        str(path),
+        got="an empty file",
+        expected="a measured file",
+        hint="export the measurement again.",
+    )
     refuse_lfs_pointer(path)
     return _open(path, head, time_step)
 

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.bodies.model_files.mat5 import MatValue, read_mat5
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.measurement.files.clock import (
     PACKED,
     clock_factor,
@@ -399,13 +399,13 @@ def _step(file: str, name: str, about: Mapping[str, str | float]) -> float | Non
             value = about.get(key)
             if not isinstance(value, float):
                 continue
-            if not (0 < value < np.inf):
-                raise InputError(
-                    f"{file}: '{name}': {key}",
-                    got=f"{value:g}",
-                    expected="a value above 0",
-                    hint="correct it in the file.",
-                )
+            refuse_if(
+                not (0 < value < np.inf),
+                f"{file}: '{name}': {key}",
+                got=f"{value:g}",
+                expected="a value above 0",
+                hint="correct it in the file.",
+            )
             return 1.0 / value if is_rate else value
     return None
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError, foreign_reading, optional_package
+from klack.errors import InputError, foreign_reading, optional_package, refuse_if
 from klack.measurement.files.clock import unique_names
 from klack.measurement.files.csv_dialect import split_label
 from klack.measurement.recording import ChannelInfo, Recording, left_out
@@ -74,13 +74,13 @@ class UffFile(Recording):
             times = self._data(number)["x"]
             start, clock = float(times[0]), f"set {number + 1}"
             step = float(times[-1] - times[0]) / max(len(times) - 1, 1)
-        if count < 2 or not step > 0:
-            raise InputError(
-                f"{path.name}: set {number + 1} ({name})",
-                got=f"{count} values with steps of {step:g} s",
-                expected="at least two, and steps above 0",
-                hint="remove this set from the file.",
-            )
+        refuse_if(
+            count < 2 or not step > 0,
+            f"{path.name}: set {number + 1} ({name})",
+            got=f"{count} values with steps of {step:g} s",
+            expected="at least two, and steps above 0",
+            hint="remove this set from the file.",
+        )
         return ChannelInfo(
             name=name,
             unit=plain_unit(unit),
@@ -100,24 +100,24 @@ class UffFile(Recording):
 
     def _values(self, channel: ChannelInfo, first: int, last: int) -> Vector:
         values = np.asarray(self._data(self._set[channel.name])["data"])
-        if values.size < channel.count or np.iscomplexobj(values):
-            raise InputError(
-                f"{self.path.name}: channel '{channel.name}'",
-                got=f"{values.size} values of type {values.dtype}",
-                expected=f"{channel.count} real values",
-                hint="the file was truncated; export it again.",
-            )
+        refuse_if(
+            values.size < channel.count or np.iscomplexobj(values),
+            f"{self.path.name}: channel '{channel.name}'",
+            got=f"{values.size} values of type {values.dtype}",
+            expected=f"{channel.count} real values",
+            hint="the file was truncated; export it again.",
+        )
         return values[first:last].astype(np.float64)
 
     def _clock_time(self, channel: ChannelInfo, first: int, last: int) -> Vector:
         data = self._data(self._set[channel.name])
-        if len(data["x"]) < channel.count:
-            raise InputError(
-                f"{self.path.name}: channel '{channel.name}'",
-                got=f"{len(data['x'])} times",
-                expected=f"{channel.count}",
-                hint="the file was truncated; export it again.",
-            )
+        refuse_if(
+            len(data["x"]) < channel.count,
+            f"{self.path.name}: channel '{channel.name}'",
+            got=f"{len(data['x'])} times",
+            expected=f"{channel.count}",
+            hint="the file was truncated; export it again.",
+        )
         return _second(self.path, data) * np.asarray(data["x"][first:last], dtype=np.float64)
 
 
