@@ -16,11 +16,10 @@ from klack.network.network import Network
 from klack.thermal.conductance import Conductance
 from klack.thermal.convection import Convection
 from klack.thermal.fixed_temperature import FixedTemperature
-from klack.thermal.grounded_inverse import grounded_inverse
 from klack.thermal.heat_capacity import HeatCapacity
 from klack.thermal.heat_network import HeatNetwork, heat_network
 from klack.thermal.heat_source import HeatSource, HeatTable
-from klack.thermal.heat_step import heat_step, steady_temperature
+from klack.thermal.heat_step import grounded_inverse, heat_step, steady_temperature
 from klack.thermal.radiation import Radiation
 from klack.thermal.slow_warm_up import SlowSettings, warm_up
 
