@@ -5,7 +5,7 @@ from typing import ClassVar, Self
 
 from pydantic import Field, model_validator
 
-from klack.errors import refuse_if
+from klack.errors import InputError
 from klack.hydraulics.gas.gas_step import ISOTHERMAL
 from klack.hydraulics.gas.network_gas import network_gas
 from klack.network.component import Component
@@ -76,13 +76,13 @@ class GasChamber(Component):
         network_gas(rows)
         node = rows.port("gas")
         before = rows.gas_rows.chambers.get(node)
-        refuse_if(
-            before is not None,
-            f"components.{rows.component}",
-            got=f"a second gas chamber at the node of '{before.component}'",
-            expected="one gas chamber at one node",
-            hint="add both volumes, or put a gas-orifice between them.",
-        )
+        if before is not None:
+            raise InputError(
+                f"components.{rows.component}",
+                got=f"a second gas chamber at the node of '{before.component}'",
+                expected="one gas chamber at one node",
+                hint="add both volumes, or put a gas-orifice between them.",
+            )
         wall = self.wall_temperature or rows.ambient.temperature
         rows.gas_rows.chambers[node] = GasChamberRow(
             component=rows.component,
