@@ -17,7 +17,7 @@ from klack.hydraulics.orifice import (
 )
 from klack.hydraulics.pressure_viscosity import CONSTANT, PressureViscosity, mean_viscosity_ratio
 from klack.hydraulics.seat_across import SeatAcross, SeatPlace
-from klack.input.problem import CaseProblem
+from klack.input.problem import CaseProblem, refuse_key_if
 from klack.machine.compiling.jit import inner, njit
 from klack.network.across import OffAxisPart
 from klack.network.component import Component
@@ -251,13 +251,13 @@ class Seat(Component):
     def _shape_has_its_numbers(self) -> Self:
         wanted = {"flat": None, "cone": "half_angle", "ball": "ball_diameter"}[self.shape]
         for name in ("half_angle", "ball_diameter"):
-            if name == wanted and getattr(self, name) is None:
-                raise CaseProblem(
-                    (),
-                    got=f"no key '{name}'",
-                    expected=f"{name}, since the shape is {self.shape}",
-                    hint=f"add {name}, or choose another shape.",
-                )
+            refuse_key_if(
+                name == wanted and getattr(self, name) is None,
+                (),
+                got=f"no key '{name}'",
+                expected=f"{name}, since the shape is {self.shape}",
+                hint=f"add {name}, or choose another shape.",
+            )
             if name != wanted:
                 self._refuse_with((name,), f"shape {self.shape}", "it has none")
         if self.half_angle is not None and self.half_angle >= pi / 2:

@@ -132,13 +132,13 @@ class BoostDriver(Driver):
             expected="a current above the band of the hold",
             hint="a driver without a peak is 'two-point'.",
         )
-        if self.decay == "clamp" and self.clamp_voltage is None:
-            raise CaseProblem(
-                ("clamp_voltage",),
-                got="none, with decay: clamp",
-                expected="the Zener or avalanche voltage of the clamp",
-                hint="add it, or decay: capacitor.",
-            )
+        refuse_key_if(
+            self.decay == "clamp" and self.clamp_voltage is None,
+            ("clamp_voltage",),
+            got="none, with decay: clamp",
+            expected="the Zener or avalanche voltage of the clamp",
+            hint="add it, or decay: capacitor.",
+        )
         return self
 
     @model_validator(mode="after")

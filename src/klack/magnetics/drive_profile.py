@@ -99,13 +99,13 @@ class DriveProfile(DiodeDriver):
                 hint="remove it.",
             )
             return self
-        if self.supply_voltage is None:
-            raise CaseProblem(
-                ("supply_voltage",),
-                got="a current over time without a supply",
-                expected="the voltage that the current is raised with",
-                hint="supply_voltage: 65 V, from a boost capacitor, or 14 V from the battery.",
-            )
+        refuse_key_if(
+            self.supply_voltage is None,
+            ("supply_voltage",),
+            got="a current over time without a supply",
+            expected="the voltage that the current is raised with",
+            hint="supply_voltage: 65 V, from a boost capacitor, or 14 V from the battery.",
+        )
         if min(self.current) < 0 or not max(self.current) > 0:
             k = int(np.argmin(self.current))
             raise CaseProblem(

@@ -28,7 +28,7 @@ capacitor has fallen to a voltage; that instant is located likewise.
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from klack.errors import InputError, require_positive
+from klack.errors import refuse_if, require_positive
 from klack.machine.compiling.constant import constant
 from klack.magnetics.circuit import MagneticCircuit
 from klack.magnetics.drive_kernel import due_switch, jump_at, next_time, state_block
@@ -484,13 +484,13 @@ def flux_rows(
     InputError
         If the circuit has no leakage path without eddy currents, or too many different fluxes.
     """
-    if driver.stage is not None and driver.stage.capacitor is None:
-        raise InputError(
-            f"components.{rows.component}",
-            got="a driver that shares its boost capacitor",
-            expected="a solenoid or a magnetic-network at such a driver",
-            hint="give the driver a capacitance of its own.",
-        )
+    refuse_if(
+        driver.stage is not None and driver.stage.capacitor is None,
+        f"components.{rows.component}",
+        got="a driver that shares its boost capacitor",
+        expected="a solenoid or a magnetic-network at such a driver",
+        hint="give the driver a capacitance of its own.",
+    )
     parameters = flux_numbers(plant, resistance=resistance, driver=driver, gap=gap, closing=closing)
 
     def at_rest(displacement: NDArray[np.float64]) -> NDArray[np.float64]:

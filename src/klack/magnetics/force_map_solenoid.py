@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from klack.errors import InputError
-from klack.input.problem import CaseProblem
+from klack.input.problem import CaseProblem, refuse_key_if
 from klack.magnetics.driver import driver_of
 from klack.magnetics.flux_map import FluxMap
 from klack.magnetics.flux_step import flux_rows
@@ -104,13 +104,13 @@ class ForceMapSolenoid(Component):
 
     def _whole_table(self) -> None:
         for name in _TABLE[:3]:
-            if getattr(self, name) is None:
-                raise CaseProblem(
-                    (),
-                    got=f"neither '{name}' nor 'map'",
-                    expected="a map from a file, or current, gaps and linkage",
-                    hint=f"add {name}, or map: {{file: map.csv}}.",
-                )
+            refuse_key_if(
+                getattr(self, name) is None,
+                (),
+                got=f"neither '{name}' nor 'map'",
+                expected="a map from a file, or current, gaps and linkage",
+                hint=f"add {name}, or map: {{file: map.csv}}.",
+            )
         count, width = len(self.current or ()), len(self.gaps or ())
         for name in _TABLE[2:]:
             table = getattr(self, name)

@@ -157,13 +157,13 @@ class ParasiticGap(Section):
         ring = ("radius", "clearance", "length", "off_axis")
         if self.permeance is not None:
             return self._refuse_with(ring, "permeance", "the permeance is sufficient")
-        if any(getattr(self, name) is None for name in ring[:3]):
-            raise CaseProblem(
-                (),
-                got="an incomplete gap",
-                expected="either permeance, or radius, clearance and length",
-                hint="add the missing lengths of the guide ring.",
-            )
+        refuse_key_if(
+            any(getattr(self, name) is None for name in ring[:3]),
+            (),
+            got="an incomplete gap",
+            expected="either permeance, or radius, clearance and length",
+            hint="add the missing lengths of the guide ring.",
+        )
         clearance = self.clearance or 0.0
         if self.off_axis is not None and self.off_axis.eccentricity >= clearance:
             raise CaseProblem(
@@ -228,13 +228,13 @@ class SolidIron(Section):
     def _complete(self) -> Self:
         if self.shape == "cylinder":
             return self._refuse_with(("thickness",), "shape: cylinder", "its area is sufficient")
-        if self.thickness is None:
-            raise CaseProblem(
-                (),
-                got="no key 'thickness'",
-                expected="thickness, for shape: sheet",
-                hint="add thickness.",
-            )
+        refuse_key_if(
+            self.thickness is None,
+            (),
+            got="no key 'thickness'",
+            expected="thickness, for shape: sheet",
+            hint="add thickness.",
+        )
         return self
 
 
@@ -266,13 +266,13 @@ class IronPart(Section):
         if given is None:
             return self
         if self.material.loop is None:
-            if given.coercivity is None:
-                raise CaseProblem(
-                    ("hysteresis",),
-                    got="no key 'coercivity'",
-                    expected="the coercivity of the iron",
-                    hint="add coercivity, or measure the loop: material: {loop: ...}.",
-                )
+            refuse_key_if(
+                given.coercivity is None,
+                ("hysteresis",),
+                got="no key 'coercivity'",
+                expected="the coercivity of the iron",
+                hint="add coercivity, or measure the loop: material: {loop: ...}.",
+            )
         else:
             for name in ("coercivity", "remanence"):
                 refuse_key_if(
@@ -389,13 +389,13 @@ class EddyPart(Section):
         if self.terms > 1:
             wanted = (*wanted, "permeability")
         for name in wanted:
-            if getattr(self, name) is None:
-                raise CaseProblem(
-                    (),
-                    got=f"no key '{name}'",
-                    expected=f"{name}, for shape: {self.shape} with {self.terms} terms",
-                    hint=f"add {name}.",
-                )
+            refuse_key_if(
+                getattr(self, name) is None,
+                (),
+                got=f"no key '{name}'",
+                expected=f"{name}, for shape: {self.shape} with {self.terms} terms",
+                hint=f"add {name}.",
+            )
         return self
 
     def ladder(self) -> EddyLadder:

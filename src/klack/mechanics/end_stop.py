@@ -10,7 +10,7 @@ from klack.contact.rubbing_law import RubbingLaw
 from klack.contact.yielding_law import YieldingLaw
 from klack.errors import InputError
 from klack.hydraulics.film import FilmShape, SphereFilm
-from klack.input.problem import CaseProblem
+from klack.input.problem import CaseProblem, refuse_key_if
 from klack.mechanics.stop_law import ConsistentStopLaw, LinearStopLaw, StopLaw
 from klack.network.component import Component
 from klack.network.port import ELEMENT, Port
@@ -60,21 +60,21 @@ class EndStop(Component):
 
     @model_validator(mode="after")
     def _something_acts(self) -> Self:
-        if self.law is None and self.film is None:
-            raise CaseProblem(
-                (),
-                got="neither law nor film",
-                expected="at least one of them",
-                hint="add law: {kind: consistent} or {kind: linear, stiffness: 1e9 N/m}.",
-            )
-        if self.law is None and self.restitution is not None:
-            raise CaseProblem(
-                ("restitution",),
-                got="restitution without a law",
-                expected="a contact law that it applies to",
-                hint="remove it: a film alone has its own loss.",
-                on_key=True,
-            )
+        refuse_key_if(
+            self.law is None and self.film is None,
+            (),
+            got="neither law nor film",
+            expected="at least one of them",
+            hint="add law: {kind: consistent} or {kind: linear, stiffness: 1e9 N/m}.",
+        )
+        refuse_key_if(
+            self.law is None and self.restitution is not None,
+            ("restitution",),
+            got="restitution without a law",
+            expected="a contact law that it applies to",
+            hint="remove it: a film alone has its own loss.",
+            on_key=True,
+        )
         return self
 
     @model_validator(mode="after")

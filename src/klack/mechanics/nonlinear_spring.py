@@ -208,13 +208,13 @@ class NonlinearSpring(Component):
 
     @model_validator(mode="after")
     def _one_curve(self) -> Self:
-        if (self.stiffness is None) == (not self.deflection):
-            raise CaseProblem(
-                ("stiffness",),
-                got="a stiffness and a table" if self.deflection else "neither stiffness nor table",
-                expected="either 'stiffness' (with 'higher') or 'deflection' with 'force'",
-                hint="write one of both curves.",
-            )
+        refuse_key_if(
+            (self.stiffness is None) == (not self.deflection),
+            ("stiffness",),
+            got="a stiffness and a table" if self.deflection else "neither stiffness nor table",
+            expected="either 'stiffness' (with 'higher') or 'deflection' with 'force'",
+            hint="write one of both curves.",
+        )
         if bool(self.higher) != (self.reference is not None) or (self.higher and self.deflection):
             raise CaseProblem(
                 ("higher",),

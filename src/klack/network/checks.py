@@ -44,21 +44,21 @@ def _check_dangling(components: Mapping[str, Component], nodes: Iterable[Node]) 
                 continue
             if port.role is Role.COIL:
                 raise _no_driver(("components", component), f"{component}.{name}")
-            if port.role is Role.FEEDS:
-                raise CaseProblem(
-                    ("components", component),
-                    got=f"the boost capacitor {component}.{name} without a driver",
-                    expected="boost-drivers that draw from it",
-                    hint=f"join them: [{component}.{name}, driver.supply], or remove it.",
-                )
-            if port.role is Role.FED:
-                raise CaseProblem(
-                    ("components", component),
-                    got="a boost-driver without a capacitor",
-                    expected="capacitance, boost_voltage and recharge_power, or its port 'supply' "
-                    "joined to a boost-capacitor",
-                    hint=f"write [capacitor.outlet, {component}.{name}] among the connections.",
-                )
+            refuse_key_if(
+                port.role is Role.FEEDS,
+                ("components", component),
+                got=f"the boost capacitor {component}.{name} without a driver",
+                expected="boost-drivers that draw from it",
+                hint=f"join them: [{component}.{name}, driver.supply], or remove it.",
+            )
+            refuse_key_if(
+                port.role is Role.FED,
+                ("components", component),
+                got="a boost-driver without a capacitor",
+                expected="capacitance, boost_voltage and recharge_power, or its port 'supply' "
+                "joined to a boost-capacitor",
+                hint=f"write [capacitor.outlet, {component}.{name}] among the connections.",
+            )
             if port.role is Role.VOLTAGE:
                 raise _no_coil(("components", component), f"{component}.{name}")
             raise CaseProblem(

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from klack.hydraulics.gas.flow_law import VALVE
 from klack.hydraulics.gas.gas import Gas, critical_ratio
-from klack.input.problem import CaseProblem
+from klack.input.problem import refuse_key_if
 from klack.network.component import Component
 from klack.units import Pressure, Ratio
 
@@ -33,13 +33,13 @@ class RestrictionComponent(Component):
 
     def _require_with(self, names: tuple[str, ...], chosen: str, why: str) -> Self:
         for name in names:
-            if getattr(self, name) is None:
-                raise CaseProblem(
-                    (),
-                    got=f"{chosen} without {name}",
-                    expected=f"{name}: {why}",
-                    hint=f"add {name}.",
-                )
+            refuse_key_if(
+                getattr(self, name) is None,
+                (),
+                got=f"{chosen} without {name}",
+                expected=f"{name}: {why}",
+                hint=f"add {name}.",
+            )
         return self
 
     def law(self, gas: Gas, factor: float) -> tuple[float, ...]:
