@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import spsolve
 
-from klack.acoustics.force_response import modal_response, surface_velocity
+from klack.acoustics.force_response import modal_response
 from klack.acoustics.harmonic import harmonic_response
 from klack.acoustics.mobility import drive_point_mobility, support_force_transfer
 from klack.acoustics.mount import Mount, mounted
@@ -51,8 +51,6 @@ def test_a_step_of_force_on_one_mode(damping: float) -> None:
     shown = t >= 0
     moved = run.modal_displacement[:, 0] / np.sqrt(MASS)
     assert moved[shown] == pytest.approx(exact[shown], rel=1e-9, abs=1e-9 * 50 / STIFFNESS)
-    speed = surface_velocity(body, run)[:, 0]  # float32 shapes
-    assert speed == pytest.approx(run.modal_velocity[:, 0] / np.sqrt(MASS), rel=1e-6)
 
 
 def test_a_force_that_has_always_acted_moves_nothing() -> None:

@@ -11,7 +11,7 @@ Truth: film impulse, Stefan's fall time, the cavitation limit, and the loop with
 
 from decimal import Decimal, getcontext
 from itertools import pairwise
-from math import cos, log, pi, sin, sqrt
+from math import cos, log, pi, sin
 
 import numpy as np
 import pytest
@@ -31,7 +31,6 @@ from klack.hydraulics.film import (
 )
 from klack.hydraulics.guide_film import (
     guide_film_damping,
-    guide_film_drag,
     guide_film_force,
     guide_film_step,
 )
@@ -344,14 +343,6 @@ def test_a_step_dissipates_and_its_slopes_are_right():
             numeric = (np.array(ahead) - behind) / 2e-6
             # central differences: 1e-12 over distances of 0.1, round-off over 1e-6
             np.testing.assert_allclose(slopes[:, column], numeric, atol=1e-7 * np.abs(slopes).max())
-
-
-def test_drag_along_the_guide():
-    """``int dtheta/(2 pi (1 - eps cos))``."""
-    mean = quad(lambda t: 1.0 / (1.0 - 0.8 * cos(t)), 0.0, 2.0 * pi)[0] / (2.0 * pi)
-
-    assert guide_film_drag(0.8) == pytest.approx(mean, rel=1e-10)
-    assert guide_film_drag(0.8) == pytest.approx(1.0 / sqrt(1.0 - 0.64), rel=1e-14)
 
 
 NEVER = 1e9  # [N] no cavitation

@@ -36,7 +36,8 @@ def test_force_and_inductance(states, point):
 @each("point", range(20))
 def test_armature_flux(states, point):
     circuit, state = states[point]
-    armature = [circuit.branch_index(f"core {k}") for k in (4, 5)]
+    names = [branch.name for branch in circuit.branches]
+    armature = [names.index(f"core {k}") for k in (4, 5)]
 
     flux = np.max(state.branch_fluxes[armature])
 

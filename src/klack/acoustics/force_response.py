@@ -30,7 +30,7 @@ from klack.machine.compiling.jit import njit
 from klack.signals.sampled import TimeSeries
 from klack.simulation.propagator import damping_loss, modal_propagator
 
-__all__ = ["ModalResponse", "aligned_forces", "modal_response", "port_forces", "surface_velocity"]
+__all__ = ["ModalResponse", "aligned_forces", "modal_response", "port_forces"]
 
 
 def port_forces(
@@ -213,14 +213,6 @@ def modal_response(
         modal_displacement=states[:, 0],
         modal_velocity=states[:, 1],
     )
-
-
-def surface_velocity(structure: Structure, response: ModalResponse) -> Floats:
-    """Mean normal velocity of faces at the sample times [m/s], shape (k, f).
-
-    That of the modes, without static rest, which follows the force.
-    """
-    return np.asarray(response.modal_velocity @ structure.face_shapes.T.astype(np.float64))
 
 
 def _interval(sample: float | None, axis: TimeSeries) -> int:

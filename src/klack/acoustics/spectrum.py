@@ -23,10 +23,8 @@ from klack.errors import InputError, refuse_if, require_positive
 from klack.signals.sampled import Spectrum, TimeSeries
 
 __all__ = [
-    "DENSITY_REFERENCE",
     "IMPULSE_REFERENCE",
     "change_spectrum",
-    "density_level",
     "energy_spectral_density",
     "force_series",
     "force_spectrum",
@@ -37,7 +35,6 @@ __all__ = [
 ]
 
 IMPULSE_REFERENCE = 1e-6  # [N s] of levels in dB
-DENSITY_REFERENCE = 1e-12  # [N^2 s/Hz], (1 uN)^2 s/Hz
 _FINE = 160.0  # values per period of the highest frequency that finer series are averaged to
 _COARSE = 2.0  # values per period at least
 _OVERSAMPLED = 8.0  # frequencies per inverse length of the record
@@ -229,9 +226,3 @@ def impulse_level(spectrum: Spectrum) -> NDArray[np.float64]:
     """Level of an impulse spectrum [N s], dB re 1 uN s, shape (k,)."""
     smallest = np.finfo(float).tiny
     return 20.0 * np.log10(np.maximum(np.abs(spectrum.values), smallest) / IMPULSE_REFERENCE)
-
-
-def density_level(density: Spectrum) -> NDArray[np.float64]:
-    """Level of a force density [N^2 s/Hz], dB re (1 uN)^2 s/Hz, shape (k,)."""
-    smallest = np.finfo(float).tiny
-    return 10.0 * np.log10(np.maximum(np.real(density.values), smallest) / DENSITY_REFERENCE)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from klack.machine.compiling.jit import inner, njit
 
-__all__ = ["guide_film_damping", "guide_film_drag", "guide_film_force", "guide_film_step"]
+__all__ = ["guide_film_damping", "guide_film_force", "guide_film_step"]
 
 Matrix = NDArray[np.float64]
 
@@ -111,12 +111,6 @@ def guide_film_step(
     slopes[1, 0] = -C[1, 0] / step - 0.5 * (more * (x * v + y * u) + steep * x * y)
     slopes[1, 1] = -C[1, 1] / step - 0.5 * (more * (y * v + along + y * v) + steep * y * y)
     return -(C[0, 0] * u + C[0, 1] * v), -(C[1, 0] * u + C[1, 1] * v), slopes
-
-
-@njit
-def guide_film_drag(eccentricity: float) -> float:
-    """Drag against axial motion over ``2 pi mu R L v / c``: ``1/sqrt(1 - eps^2)``."""
-    return 1.0 / sqrt(1.0 - eccentricity * eccentricity)
 
 
 @inner

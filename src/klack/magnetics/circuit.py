@@ -158,10 +158,6 @@ class MagneticCircuit:
         """Constant magnetomotive force per branch, shape (n_branches,) [A]."""
         return np.array([branch.remanence for branch in self.branches], dtype=float)
 
-    def branch_index(self, name: str) -> int:
-        """Position of a branch."""
-        return [branch.name for branch in self.branches].index(name)
-
     def mmf(self, fluxes: NDArray[np.float64], gap: float) -> NDArray[np.float64]:
         """Mmf of each branch [A] at branch fluxes [Wb], without eddy currents."""
         pairs = zip(self.branches, fluxes, strict=True)

@@ -24,7 +24,6 @@ from klack.signals.low_pass import low_passed
 __all__ = [
     "recorded_stroke",
     "sense",
-    "sensor_delay",
     "sensor_poles",
     "sensor_polynomial",
     "trigger_instant",
@@ -54,11 +53,6 @@ def sense(
     if sensor.resolution > 0.0:
         shown = sensor.resolution * np.round(shown / sensor.resolution)
     return np.asarray(shown)
-
-
-def sensor_delay(sensor: LiftSensor) -> float:
-    """Delay of a steady motion [s]: ``1 / (2 pi f_b)`` for order 1."""
-    return float(sensor_polynomial(sensor)[1]) if sensor.bandwidth is not None else 0.0
 
 
 def sensor_poles(sensor: LiftSensor) -> NDArray[np.complex128]:
