@@ -324,9 +324,9 @@ def test_faces_that_cannot_be_pressed_are_one_error(tmp_path):
     sizing = MeshSizing(size=1e-3)
     materials = {"shaft": STEEL, "hub": STEEL}
     for profiles, got in ((cone, "not one cylinder"), (stacked, "a flat face")):
-        with pytest.raises(InputError, match=rf"fits\.joint: got .*{got}"):
+        with pytest.raises(InputError, match=rf"joint 'joint': got .*{got}"):
             pressed_solid(tmp_path, profiles, materials, {"joint": 1e-6}, sizing)
-    with pytest.raises(InputError, match=r"fits\.seam: got a name of no face"):
+    with pytest.raises(InputError, match=r"joint 'seam': got a name of no face"):
         pressed_solid(tmp_path, stacked, materials, {"seam": 1e-6}, sizing)
 
 
@@ -344,7 +344,7 @@ def test_parts_that_are_glued_otherwise_are_refused():
         ),
     )
     materials = dict.fromkeys(profiles, STEEL)
-    with pytest.raises(InputError, match=r"fits\.joint.*glued to each other by other parts"):
+    with pytest.raises(InputError, match=r"joint 'joint'.*glued to each other by other parts"):
         pressed(profiles, materials, {"joint": 1e-6}, 0.4e-3)
 
     parts = {
@@ -371,7 +371,7 @@ def test_parts_that_are_glued_otherwise_are_refused():
     }
     with pytest.raises(InputError, match="joints that meet in a corner"):
         pressed(parts, dict.fromkeys(parts, STEEL), {"low": 1e-6, "high": 2e-6}, 0.4e-3)
-    with pytest.raises(InputError, match=r"fits\.low: got a part of the faces where"):
+    with pytest.raises(InputError, match=r"joint 'low': got a part of the faces where"):
         pressed(parts, dict.fromkeys(parts, STEEL), {"low": 1e-6}, 0.4e-3)
 
 

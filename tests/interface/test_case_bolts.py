@@ -19,6 +19,7 @@ from klack.assembling.bolts import bolted_joints, struck_bolts
 from klack.case import load_case
 from klack.case.any_case import load_valve_case
 from klack.errors import InputError
+from klack.mesh.solid import write_step_revolved
 
 CASE = "bolted_nozzle.yaml"
 HOUSING = ("bodies", "housing")
@@ -72,10 +73,46 @@ def test_ends_that_cannot_press_are_one_error_with_its_place(tmp_path):
         bolted_joints(case, "housing")
 
 
-def test_a_body_that_is_not_drawn_has_no_bolts(tmp_path):
-    (tmp_path / "a.step").write_text("")
+def test_a_finished_mesh_has_no_bolts(tmp_path):
+    (tmp_path / "a.inp").write_text("")
+    geometry = {"mesh": {"file": "a.inp", "unit": "mm"}}
     with pytest.raises(InputError, match=r"bodies\.housing\.bolts: got bolts of a body that is"):
-        changed(tmp_path, (*HOUSING, "geometry", {"step": {"file": "a.step"}}))
+        changed(tmp_path, (*HOUSING, "geometry", geometry))
+
+
+def test_a_step_file_of_the_parts_has_the_bolts_of_the_drawn_ones(tmp_path):
+    """Truth: the half section. Elements of half a wall: stiffness, pressures 3 %, stress 10 %."""
+    drawn_case = load_case(HOW_TO / CASE)
+    (drawn,) = bolted_joints(drawn_case, "housing")
+    profile = drawn_case.bodies["housing"].geometry.profile
+    write_step_revolved(profile.profiles(), tmp_path / "housing.step")
+    step = (
+        (*HOUSING, "geometry", {"step": {"file": "housing.step"}}),
+        (*HOUSING, "mesh", {"size": "1.5 mm"}),
+        ("bodies", "needle", "geometry", "model", "solid"),
+    )
+    case = changed(tmp_path, *step)
+    (joint,) = bolted_joints(case, "housing")
+
+    assert (joint.lower, joint.upper) == ("nozzle", "body")
+    assert (joint.area, joint.distance) == pytest.approx((drawn.area, drawn.distance), rel=1e-3)
+    assert joint.pressure == pytest.approx(drawn.pressure, rel=1e-3)
+    assert (joint.part_stiffness, joint.least_pressure, joint.largest_pressure) == pytest.approx(
+        (drawn.part_stiffness, drawn.least_pressure, drawn.largest_pressure), rel=0.03
+    )
+    assert joint.stress == pytest.approx(drawn.stress, rel=0.1)
+    assert not joint.open_share
+    assert not joint.doubts
+    rows = dict(inspect_case(case))["housing"]
+    told = [content for what, name, content in rows if (what, name) == ("bolts", "flange")]
+    assert told == [f"{what}: {text}" for what, text in joint.rows()]
+
+    for change, message in (
+        ((*BOLTS, {"flanges": GOOD}), r"bolts\.flanges: got a name of no face .*here: flange\)"),
+        ((*FLANGE, "ends", ["shoulder", "head"]), r"bolts\.flange: .*'head' is no outer face.*top"),
+    ):
+        with pytest.raises(InputError, match=r"case\.yaml:\d+: bodies\.housing\." + message):
+            bolted_joints(changed(tmp_path, *step, change), "housing")
 
 
 def test_random_bolts_end_in_the_closed_form_or_in_a_doubt(tmp_path):

@@ -28,7 +28,7 @@ from klack.assembling.layers import layers_of
 from klack.assembling.placement import Touch, first_touch_of_meshes, first_touch_of_profiles
 from klack.bodies.elasticity.body import ElasticBody, elastic_body
 from klack.bodies.gauges.gauge import Gauge
-from klack.case.bodies import CaseBody, CaseFile, SurfaceName
+from klack.case.bodies import CaseBody, CaseFile, SurfaceName, joints_told_at
 from klack.case.geometry import MeshSettings
 from klack.case.schema import Case
 from klack.case.surface_names import place_of
@@ -353,7 +353,8 @@ def mesh_body(
         Places of a case with another general size [m].
     """
     whole = _whole_mesh(body, name, places, places_at)
-    return parted(whole, body.layers or (), f"bodies.{name}.layers")[0]
+    with joints_told_at("bodies", name, "layers"):
+        return parted(whole, body.layers or ())[0]
 
 
 def _whole_mesh(

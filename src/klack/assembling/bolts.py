@@ -3,11 +3,13 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from math import sqrt
 
 from klack.assembling.fits import (
     ELEMENTS,
     Chosen,
     Drawn,
+    FileShape,
     Sizes,
     joint_mesh,
     joints_of,
@@ -18,12 +20,15 @@ from klack.assembling.fits import (
 from klack.case.bodies import Bolts, CaseFile
 from klack.case.placed_errors import tells_place
 from klack.contact.bolted_joint import clamped_state
-from klack.mesh.joint import flat_joint
+from klack.mesh.joint import FlatJoint, flat_joint
+from klack.mesh.mesh import Mesh
+from klack.mesh.solid_joint import flat_solid_joint
 from klack.units import format_si
 
 __all__ = ["BoltedJoint", "bolted_joints", "struck_bolts"]
 
-_ACROSS = 8  # elements along an end
+_ACROSS = 8  # elements along an end of a half section
+_ON_FACE, _ON_END = 400.0, 100.0  # squares of an element's size on the joint of solids, on an end
 _STRONGEST = 1.1e9  # [Pa] yield of class 12.9, ISO 898-1
 _OPEN, _MOSTLY = 0.01, 0.5  # of the face
 _LENGTHS = (0.5, 3.0)  # stretched length over the distance of the ends
@@ -202,22 +207,18 @@ def struck_bolts(case: CaseFile, peak: float) -> tuple[BoltedJoint, ...]:
 @lru_cache(maxsize=20)
 def _computed(
     body: str,
-    drawn: Drawn,
+    shape: Drawn | FileShape,
     chosen: Chosen,
     bolts: tuple[tuple[str, Bolts], ...],
     sizes: Sizes,
 ) -> tuple[BoltedJoint, ...]:
     """Kept: a run asks once for the doubts, and once for the numbers."""
-    profiles, materials = dict(drawn), dict(chosen)
+    materials = dict(chosen)
     ((name, given),) = bolts
-    joint = flat_joint(profiles, name, given.ends)
-    finer = {name: joint.length / ELEMENTS}
-    for end in sorted(joint.ends):
-        lengths = (c.length for p in profiles.values() for c in p.curves if c.name == end)
-        finer[end] = sum(lengths) / _ACROSS
-    mesh = joint_mesh(body, drawn, sizes, finer)
+    joint, mesh = _meshed_joint(body, shape, name, given.ends, sizes)
     preload = given.count * given.preload
     state = clamped_state(mesh, materials, joint, preload)
+    area = float(state.area.sum())
     return (
         BoltedJoint(
             body=body,
@@ -226,14 +227,14 @@ def _computed(
             upper=joint.upper,
             ends=joint.ends,
             count=given.count,
-            area=joint.area,
+            area=area,
             distance=state.distance,
             preload=preload,
             length=given.length,
             bolt_stress=given.preload / given.area,
             bolt_yield=given.yield_stress,
-            pressure=preload / joint.area,
-            least_pressure=float(state.pressure[state.area > 0.0].min()),
+            pressure=preload / area,
+            least_pressure=float(state.pressure.min()),
             largest_pressure=float(state.pressure[state.away].max()),
             open_share=state.open_share,
             stress=state.stress,
@@ -242,3 +243,21 @@ def _computed(
             part_stiffness=state.stiffness,
         ),
     )
+
+
+def _meshed_joint(
+    body: str, shape: Drawn | FileShape, name: str, ends: tuple[str, str], sizes: Sizes
+) -> tuple[FlatJoint, Mesh]:
+    """Joint of this name, and a mesh that is fine there and where bolts press."""
+    if isinstance(shape, FileShape):
+        squares = {name: _ON_FACE, **dict.fromkeys(ends, _ON_END)}
+        finer = {face: sqrt(a / squares[face]) for face, a, _ in shape.faces if face in squares}
+        mesh = joint_mesh(body, shape, sizes, finer)
+        return flat_solid_joint(mesh, name, ends), mesh
+    profiles = dict(shape)
+    joint = flat_joint(profiles, name, ends)
+    finer = {name: joint.length / ELEMENTS}
+    for end in sorted(ends):
+        lengths = (c.length for p in profiles.values() for c in p.curves if c.name == end)
+        finer[end] = sum(lengths) / _ACROSS
+    return joint, joint_mesh(body, shape, sizes, finer)

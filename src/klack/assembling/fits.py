@@ -12,13 +12,13 @@ from klack.bodies.elasticity.body import elastic_body
 from klack.bodies.elasticity.eigen import eigenmodes
 from klack.bodies.elasticity.press_fit import pressed_state
 from klack.bodies.elasticity.stress import work_of_stress
-from klack.case.bodies import CaseFile, Fit
+from klack.case.bodies import CaseFile, Fit, joints_told_at
 from klack.case.geometry import StepFile
 from klack.case.placed_errors import tells_place
-from klack.errors import InputError
 from klack.materials.material import Material
 from klack.mesh.joint import Joint, cylinder_joint
 from klack.mesh.mesh import Mesh
+from klack.mesh.moments import Moments
 from klack.mesh.profile import Profile
 from klack.mesh.sizing import MeshSizing
 from klack.mesh.solid_joint import solid_joint
@@ -47,10 +47,11 @@ Drawn = tuple[tuple[str, Profile], ...]
 
 
 class FileShape(NamedTuple):
-    """A STEP file, and what it has now."""
+    """A STEP file, what it has now, and its faces: area [m^2], radius of one that is a cylinder."""
 
     step: StepFile
     content: bytes
+    faces: tuple[tuple[str, float, float], ...]
 
 
 Chosen = tuple[tuple[str, Material], ...]
@@ -186,10 +187,13 @@ def joints_of(
         profiles = drawn.geometry.profile.profiles()
         shape, solids = tuple(profiles.items()), tuple(profiles)
     else:
-        assert drawn.geometry.step is not None
-        shape = FileShape(drawn.geometry.step, drawn.geometry.step.file.read_bytes())
-        solids = tuple(solid.name for solid in step_content(shape.step.file).solids)
-    try:
+        step = drawn.geometry.step
+        assert step is not None
+        content = step_content(step.file)
+        faces = ((face.name, face.size, _radius(face.moments)) for face in content.faces)
+        shape = FileShape(step, step.file.read_bytes(), tuple(faces))
+        solids = tuple(solid.name for solid in content.solids)
+    with joints_told_at("bodies", body, key):
         return compute(
             body,
             shape,
@@ -197,15 +201,11 @@ def joints_of(
             tuple(given.items()),
             (drawn.mesh.size, drawn.mesh.grading, tuple(drawn.mesh.surfaces.items())),
         )
-    except InputError as error:
-        if not error.where.startswith(key):
-            raise
-        raise InputError(
-            f"bodies.{body}.{error.where}",
-            got=error.got,
-            expected=error.expected,
-            hint=error.hint,
-        ) from error
+
+
+def _radius(moments: Moments) -> float:
+    """Of a cylinder, from the middle one of its second moments [m]: half its area times R^2."""
+    return float(np.sqrt(2.0 * np.linalg.eigvalsh(moments.second)[1] / moments.volume))
 
 
 def joint_mesh(
@@ -305,15 +305,18 @@ def _meshed_joints(
 ) -> tuple[list[Joint], Mesh]:
     """Joints of these names, and a mesh that is fine there."""
     if isinstance(shape, FileShape):
-        coarse = joint_mesh(body, shape, sizes, {})
-        joints = [solid_joint(coarse, name) for name in names]
-        finer = {joint.name: _size_of_solid(joint) for joint in joints}
-    else:
-        joints = [cylinder_joint(dict(shape), name) for name in names]
-        finer = {joint.name: joint.length / ELEMENTS for joint in joints}
+        finer = {
+            name: _size_of_solid(area / (2.0 * np.pi * radius), radius)
+            for name, area, radius in shape.faces
+            if name in names
+        }
+        mesh = joint_mesh(body, shape, sizes, finer)
+        return [solid_joint(mesh, name) for name in names], mesh
+    joints = [cylinder_joint(dict(shape), name) for name in names]
+    finer = {joint.name: joint.length / ELEMENTS for joint in joints}
     return joints, joint_mesh(body, shape, sizes, finer)
 
 
-def _size_of_solid(joint: Joint) -> float:
+def _size_of_solid(length: float, radius: float) -> float:
     """Size [m] of elements of a solid: 8 along a joint, but 25 to 75 round it."""
-    return max(min(joint.length / 8.0, joint.radius / 4.0), joint.radius / 12.0)
+    return max(min(length / 8.0, radius / 4.0), radius / 12.0)

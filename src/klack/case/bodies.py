@@ -34,7 +34,7 @@ from klack.materials.hardening import (
 )
 from klack.materials.library import MATERIALS, find_material
 from klack.materials.material import Material
-from klack.mesh.joint import cylinder_joint, edges_of_two, flat_joint
+from klack.mesh.joint import JointError, cylinder_joint, edges_of_two, flat_joint
 from klack.units import (
     Area,
     Density,
@@ -63,6 +63,7 @@ __all__ = [
     "Reduction",
     "SurfaceName",
     "WrittenCase",
+    "joints_told_at",
 ]
 
 
@@ -270,7 +271,8 @@ class Bolts(Section):
     """Bolts that press two parts together along the axis, or a nut on a thread round the axis."""
 
     ends: tuple[Name, Name] = Field(
-        description="Edges that they press, one of either part: under the head, and at the thread.",
+        description="Edges or faces that they press, one of either part: under the head, and at "
+        "the thread.",
     )
     preload: Force = Field(gt=0, examples=["8 kN"], description="Of each bolt, after tightening.")
     area: Area = Field(
@@ -330,7 +332,7 @@ class CaseBody(Section):
     bolts: dict[Name, Bolts] | None = Field(
         default=None,
         max_length=1,
-        description="edge: bolts that press the two parts of a profile that share it, a flat face; "
+        description="edge or face: bolts that press the two parts that share it, a flat face; "
         "klack inspect and klack impact show pressure, stiffness and what lifts the joint.",
     )
     layers: dict[Name, CaseLayer] | None = Field(
@@ -414,23 +416,23 @@ class CaseBody(Section):
 
     def _check_joints(self) -> None:
         """Reject fits and bolts of other geometries, and of edges of another shape."""
-        profile = None if self.geometry.is_absent else self.geometry.profile
+        shape = None if self.geometry.is_absent or self.matrices is not None else self.geometry
+        profile = shape and shape.profile
         kinds = {"fits": ("a press fit", self.fits), "bolts": ("bolts", self.bolts)}
         for key, (kind, given) in kinds.items():
-            of_file = key == "fits" and not self.geometry.is_absent and self.geometry.step
-            if given and (self.matrices is not None or not (profile or of_file)):
-                also = " or geometry.step" if key == "fits" else ""
+            if given and not (shape and (profile or shape.step)):
                 raise CaseProblem(
                     (key,),
-                    got=f"{kind} of a body that is not drawn",
-                    expected=f"geometry.profile{also} with a part for either side of the joint",
+                    got=f"{kind} of a body that is neither drawn nor a STEP file",
+                    expected="geometry.profile or geometry.step with a part for either side of the "
+                    "joint",
                     hint=f"draw the parts, or remove '{key}': the solids are glued then.",
                     on_key=True,
                 )
             for name, item in (given or {}).items():
                 if profile is None:  # faces of the file are known with its mesh
                     continue
-                with _told_at(key, name):
+                with joints_told_at(key):
                     if isinstance(item, Bolts):
                         flat_joint(profile.profiles(), name, item.ends)
                     else:
@@ -467,7 +469,7 @@ class CaseBody(Section):
         if geometry.profile is None:
             return
         for name in self.layers:
-            with _told_at("layers", name):
+            with joints_told_at("layers"):
                 edges_of_two(geometry.profile.profiles(), name)
 
     @property
@@ -477,13 +479,13 @@ class CaseBody(Section):
 
 
 @contextmanager
-def _told_at(*key: str) -> Iterator[None]:
-    """What is wrong with a joint as drawn, at its key in the case."""
+def joints_told_at(*key: str) -> Iterator[None]:
+    """What is wrong with a joint, at its name below a key of the case."""
     try:
         yield
-    except InputError as error:
+    except JointError as error:
         raise CaseProblem(
-            key, got=error.got, expected=error.expected, hint=error.hint, on_key=True
+            (*key, error.name), got=error.got, expected=error.expected, hint=error.hint, on_key=True
         ) from error
 
 

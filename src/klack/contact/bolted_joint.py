@@ -1,20 +1,24 @@
-r"""Two parts that bolts press together along the axis: where they touch, and how stiff they are.
+r"""Two parts that bolts press together at a right angle to a face: where they touch, how stiff.
 
 The parts have nodes of their own on either side of a flat joint, which pushes and does not pull
-and has no friction. Bolts press two edges, under the head and at the thread, with forces
-that are uniform over either area. With the contact forces :math:`\lambda` the bolts carry
-:math:`N = \sum_i \lambda_i`, and gaps and the approach a of the two edges are
+and has no friction. Its pressure is linear between corners of elements,
+:math:`p = \sum_i p_i \chi_i \ge 0`, and gaps are means with the same weights. Bolts press two
+faces, under the head and at the thread, with forces that are uniform over either area. With the
+contact forces :math:`\lambda_i = p_i \int \chi_i\, dA` the bolts carry
+:math:`N = \sum_i \lambda_i`, and gaps and the approach a of the two faces are
 
-.. math:: g = P^T S P\, \lambda - a \ge 0, \qquad \lambda \ge 0, \qquad \lambda^T g = 0, \qquad
-    P = \begin{pmatrix} I \\ 1^T \end{pmatrix},
+.. math:: g = P^T S P\, \lambda - a + B\, \theta \ge 0, \qquad \lambda \ge 0, \qquad
+    \lambda^T g = 0, \qquad B^T \lambda = 0, \qquad P = \begin{pmatrix} I \\ 1^T \end{pmatrix},
 
-with the flexibility S of the parts for unit forces at the joint and between the edges. Faces that
+with the flexibility S of the parts for unit forces at the joint and between the faces. Solids in
+space may tilt by :math:`\theta`, with the levers B of the contact forces about the middle of the
+bolts; a half section has none. Faces that
 meet without a gap keep their contact at any force (a receding contact, Dundurs & Stippes 1970):
 all is proportional to the preload, and :math:`k = N / a` is one number, the stiffness of the
 clamped parts.
 
-Limits: linear; faces that are flat and parallel before they are pressed; bolts spread round the
-circle; load that both edges share evenly over their areas.
+Limits: linear; faces that are flat and parallel before they are pressed; load that both faces
+share evenly over their areas, of a half section all round; bolts that do not bend.
 """
 
 from collections.abc import Mapping
@@ -22,18 +26,29 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import coo_array, csr_array, vstack
 
+from klack.bodies.elasticity.condensation import condensed_inverse
 from klack.bodies.elasticity.factorization import factorize
-from klack.bodies.elasticity.loads import traction_load
-from klack.bodies.elasticity.press_fit import WITHOUT, PartedBody, far_from, nodes_of
-from klack.contact.complementarity import solve_lcp
-from klack.errors import InputError
+from klack.bodies.elasticity.loads import face_points, traction_load
+from klack.bodies.elasticity.press_fit import WITHOUT, JointSides, PartedBody, far_from, nodes_of
+from klack.bodies.elasticity.quadrature import quadrature
+from klack.bodies.elasticity.shape_functions import shape_functions
+from klack.contact.complementarity import ComplementaritySolver
 from klack.materials.material import Material
-from klack.mesh.joint import FlatJoint
-from klack.mesh.mesh import Mesh
+from klack.mesh.families import FAMILIES
+from klack.mesh.joint import FlatJoint, JointError
+from klack.mesh.mesh import FaceBlock, Mesh
+from klack.units import format_si
 
 __all__ = ["ClampedState", "clamped_state"]
+
+Floats = NDArray[np.float64]
+
+_TILTS, _PASSES = 1e4, 3  # flexibility against tilting, over that of the parts
+_ASIDE = 1e-3  # of the length of the joint: middles of ends apart; of all forces, their levers
+_LEVEL = 1e-6  # of a normal; of the length, from a plane
+_FACING = 0.02  # of the normal: curved faces in elements of a quarter of their radius
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -42,22 +57,24 @@ class ClampedState:
 
     Parameters
     ----------
-    radius, pressure, area (n,) [m, Pa, m^2]
-        Of the nodes of the joint, along the radius; an area of 0 is on the axis.
+    pressure, area (n,) [Pa, m^2]
+        At the corners of elements on the joint; the area that each one carries.
+    middle (n, d) [m]
+        Of these areas: forces that act there have the moment of the pressure.
     closed, away (n,)
         Which touch; which are far from sharp corners, where a linear pressure has no limit, or all
         that touch where none of these is.
     stiffness [N/m]
-        Preload over the approach of the two edges, each as the mean over its area.
+        Preload over the approach of the two ends, each as the mean over its area.
     distance [m]
-        Between the middles of the two edges along the axis.
+        Between the middles of the two ends along the bolts.
     stress [Pa]
         Largest equivalent stress of each solid, away from sharp corners.
     """
 
-    radius: NDArray[np.float64]
-    pressure: NDArray[np.float64]
-    area: NDArray[np.float64]
+    pressure: Floats
+    area: Floats
+    middle: Floats
     closed: NDArray[np.bool_]
     away: NDArray[np.bool_]
     stiffness: float
@@ -75,122 +92,161 @@ def clamped_state(
 ) -> ClampedState:
     """Solve for the state under a preload [N] of all bolts together.
 
-    Rejects parts that are glued to each other otherwise, and edges that cannot press them together.
+    Rejects parts that are glued to each other otherwise, and ends that cannot press them together.
 
     Parameters
     ----------
     mesh
-        Half section, parts glued; the joint is its node set of that name, the ends are surfaces.
+        Half section or solid, parts glued; the joint is its node set of that name, the ends are
+        surfaces.
     """
     parted = PartedBody.of(mesh, materials, [joint])
     (side,) = parted.sides
-    lower, upper = side.nodes
-    count = len(lower)
-    load, heights, rims = _loads(mesh, parted, joint)
-    at = np.arange(count)
-    forces = np.zeros((parted.mesh.dof_count, count + 1))  # f = R^T (contact forces, bolts)
-    forces[2 * upper + 1, at], forces[2 * lower + 1, at] = 1.0, -1.0
-    forces[:, count] = load
+    load, middles, rims = _loads(mesh, parted, joint)
+    _require_whole_plane(parted, joint)
+    push, area, middle, corner = _pushes(parted.mesh, side, joint.normal)
+    count = len(area)
+    forces = csr_array(vstack([push, csr_array(load[None])]))  # contact forces, bolts
     free = np.setdiff1d(np.arange(parted.mesh.dof_count), parted.held())
-    moved = np.zeros_like(forces)
-    with factorize(csr_array(parted.stiffness[free][:, free])) as factor:
-        moved[free] = factor.solve(forces[free])
-    flexible = forces.T @ moved
     P = np.vstack([np.eye(count), np.ones(count)])
-    A = P.T @ flexible @ P
-    unit, closed, _ = solve_lcp(0.5 * (A + A.T), -np.ones(count))  # an approach of 1 m
-    stiffness = float(unit.sum())
-    contact = unit * (preload / stiffness)
-    u = moved @ (P @ contact)
-    place = parted.mesh.points[lower]
-    area = _nodal_areas(parted.mesh.points, side.faces, side.nodes[1])
+    lever = (middle - middles.mean(axis=0)) @ joint.across.T / joint.length
+    with factorize(csr_array(parted.stiffness[free][:, free])) as factor:
+        A = P.T @ condensed_inverse(factor, csr_array(forces[:, free])) @ P
+        unit, closed = _pressed(0.5 * (A + A.T), lever)
+        stiffness = float(unit.sum())
+        if stiffness <= 0.0 or np.any(np.abs(lever.T @ unit) > _ASIDE * stiffness):
+            raise _wrong(joint, "beside the face where they touch", "a middle within it")
+        contact = unit * (preload / stiffness)
+        u = np.zeros(parted.mesh.dof_count)
+        u[free] = factor.solve((forces.T @ (P @ contact))[free])
     corners = np.vstack([parted.sharp_corners, rims])
-    order = np.argsort(place[:, 0])
-    on_axis = area <= 1e-12 * area.max()
-    pressure = np.divide(contact, area, out=np.zeros(count), where=~on_axis)
     around = WITHOUT * joint.length
-    closed &= ~on_axis
-    away = far_from(corners, place, around)
+    away = far_from(corners, corner, around)
     if not (away & closed).any():
         away = closed
     return ClampedState(
-        radius=place[order, 0],
-        pressure=pressure[order],
-        area=np.where(on_axis, 0.0, area)[order],
-        closed=closed[order],
-        away=away[order],
+        pressure=contact / area,
+        area=area,
+        middle=middle,
+        closed=closed,
+        away=away,
         stiffness=stiffness,
-        distance=heights[1] - heights[0],
+        distance=float((middles[1] - middles[0]) @ joint.normal),
         stress=parted.largest_stress(u, materials, corners, around),
     )
 
 
-def _loads(
-    mesh: Mesh, parted: PartedBody, joint: FlatJoint
-) -> tuple[NDArray[np.float64], tuple[float, float], NDArray[np.float64]]:
-    """Nodal forces of bolts that pull with 1 N, heights of both ends [m], rims of a thread.
+def _require_whole_plane(parted: PartedBody, joint: FlatJoint) -> None:
+    """Reject further faces of both solids in the plane of the joint, which would press too."""
+    height = float(parted.mesh.points[parted.sides[0].nodes[0][0]] @ joint.normal)
+    for _, x, normal in parted.faces_beside([joint]):
+        level = np.abs(normal @ joint.normal) > 1.0 - _LEVEL
+        if np.any(level & (np.abs(x @ joint.normal - height) < _LEVEL * joint.length)):
+            raise JointError(
+                joint.name,
+                got="a part of the flat face where '{}' and '{}' meet".format(*joint.solids),
+                expected="all faces of both in this plane",
+                hint="give them the same name.",
+            )
+
+
+def _pressed(A: Floats, lever: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    """Contact forces (n,) [N] at an approach of 1 m without a moment, and which points touch.
+
+    A soft resistance against tilting, taken back in each pass (method of multipliers, Hestenes
+    1969): the moment falls by four powers of ten each time.
+    """
+    soft = _TILTS * np.trace(A) / len(A)
+    solver = ComplementaritySolver(A + soft * lever @ lever.T)
+    tilt, closed = np.zeros(lever.shape[1]), np.ones(len(A), dtype=bool)
+    for _ in range(_PASSES):
+        unit, closed, _ = solver.solve(lever @ tilt - 1.0, closed)
+        tilt += soft * (lever.T @ unit)
+    return unit, closed
+
+
+def _pushes(
+    mesh: Mesh, side: JointSides, normal: Floats
+) -> tuple[csr_array, Floats, Floats, Floats]:
+    """Nodal forces (n, n_dof) of 1 N at each corner, its area, its middle, the corner (n, d)."""
+    N, x, size, _ = face_points(mesh, FaceBlock(side.family, side.faces))
+    family = FAMILIES[side.family]
+    chi = shape_functions(family.linear, quadrature(side.family, "mass")[0])[0]
+    corners, at = np.unique(side.faces[:, : family.corners], return_inverse=True)
+    at = at.reshape(len(side.faces), family.corners)
+    count, d = len(corners), mesh.dimension
+    weight = np.einsum("fq,qc,qi->fci", size, chi, N)
+    area = np.bincount(at.ravel(), weight.sum(axis=2).ravel(), minlength=count)
+    share = weight / area[at][:, :, None]
+    row = np.broadcast_to(at[:, :, None], share.shape).ravel()
+    local = np.searchsorted(side.nodes[1], side.faces)
+    forces = csr_array((count, mesh.dof_count))
+    for sign, nodes in zip((-1.0, 1.0), side.nodes, strict=True):
+        node = np.broadcast_to(nodes[local][:, None, :], share.shape).ravel()
+        for way in np.flatnonzero(normal):
+            value = sign * normal[way] * share.ravel()
+            forces = forces + coo_array((value, (row, d * node + way)), shape=forces.shape)
+    middle = np.zeros((count, d))
+    np.add.at(middle, at, np.einsum("fq,qc,fqa->fca", size, chi, x) / area[at][:, :, None])
+    return csr_array(forces), area, middle, mesh.points[corners]
+
+
+def _loads(mesh: Mesh, parted: PartedBody, joint: FlatJoint) -> tuple[Floats, Floats, Floats]:
+    """Nodal forces of bolts that pull with 1 N, middles of both ends (2, d) [m], rims of a thread.
 
     The lower end comes first. A thread's shear ends in a jump, where the stress has no limit.
     """
-    owners = [
-        next(b.solid for b in mesh.blocks if np.isin(nodes, b.connectivity).all(axis=1).any())
-        for nodes in (mesh.surface(end).blocks[0].connectivity for end in joint.ends)
-    ]
+    d = mesh.dimension
     part_of = {solid: number for number, part in enumerate(parted.parts) for solid in part}
-    below, above = (part_of[solid] for solid in joint.solids)
-    sides = [part_of[owner] for owner in owners]
-    if sorted(sides) != sorted([below, above]):
-        raise _wrong(joint, "the same side of the joint", "one edge on either side")
-    load = np.zeros((parted.mesh.node_count, 2))
-    heights = {}
-    rims = [np.empty((0, 2))]
-    for end, owner, part in zip(joint.ends, owners, sides, strict=True):
-        away = 1.0 if part == above else -1.0
+    load = np.zeros((parted.mesh.node_count, d))
+    middles = {}
+    rims = [np.empty((0, d))]
+    for end in joint.ends:
         surface = mesh.surface(end)
-        facing: list[NDArray[np.float64]] = []
+        owners = {
+            block.solid
+            for faces in surface.blocks
+            for block in mesh.blocks
+            if np.isin(faces.connectivity, block.connectivity).all(axis=1).any()
+        }
+        sides = {part_of[owner] for owner in owners}
+        if len(sides) > 1:
+            raise _wrong(joint, f"'{end}' is on both sides of the joint", "one face on either side")
+        away = 1.0 if sides == {part_of[joint.upper]} else -1.0
+        facing: list[Floats] = []
 
-        def along(
-            x: NDArray[np.float64],
-            normal: NDArray[np.float64],
-            facing: list[NDArray[np.float64]] = facing,
-        ) -> NDArray[np.float64]:
-            facing.append(normal[:, 1])
-            return np.array(np.broadcast_to([0.0, 1.0], x.shape))
+        def along(x: Floats, normal: Floats, facing: list[Floats] = facing) -> Floats:
+            facing.append(normal @ joint.normal)
+            return np.broadcast_to(joint.normal, x.shape)
 
-        glued = traction_load(mesh, surface, along)[1::2]
+        glued = traction_load(mesh, surface, along).reshape(-1, d) @ joint.normal
         normal = away * np.concatenate(facing)
-        if normal.min() < -1e-6:
+        if normal.min() < -_FACING:
             raise _wrong(joint, f"'{end}', a face towards the joint", "faces away from the joint")
         weight = glued / glued.sum()
-        own = nodes_of(parted.mesh, owner)
-        load[own, 1] -= away * weight[parted.nodes[own]]
-        heights[away] = float(weight @ mesh.points[:, 1])
-        if normal.max() < 1.0 - 1e-6:
-            node, times = np.unique(
-                np.concatenate([b.connectivity[:, :2].ravel() for b in surface.blocks]),
-                return_counts=True,
-            )
-            rims.append(mesh.points[node[times == 1]])
-    return load.ravel(), (heights[-1.0], heights[1.0]), np.vstack(rims)
+        own = np.unique(np.concatenate([nodes_of(parted.mesh, owner) for owner in owners]))
+        load[own] -= away * weight[parted.nodes[own]][:, None] * joint.normal
+        middles[away] = weight @ mesh.points
+        if normal.max() < 1.0 - _LEVEL:
+            rims += [mesh.points[np.unique(block.rim[:, :2])] for block in surface.blocks]
+    if len(middles) < 2:
+        raise _wrong(joint, "the same side of the joint", "one edge on either side")
+    both = np.array([middles[-1.0], middles[1.0]])
+    aside = float(np.linalg.norm(joint.across @ (both[1] - both[0])))
+    if aside > _ASIDE * joint.length:
+        raise _wrong(
+            joint,
+            f"their middles are {format_si(aside, 'm', 3)} apart across the bolts",
+            "ends that face each other",
+        )
+    return load.ravel(), both, np.vstack(rims)
 
 
-def _wrong(joint: FlatJoint, got: str, expected: str) -> InputError:
-    return InputError(
-        f"bolts.{joint.name}",
+def _wrong(joint: FlatJoint, got: str, expected: str) -> JointError:
+    return JointError(
+        joint.name,
         got=f"bolts between {joint.ends[0]} and {joint.ends[1]}: {got}",
         expected=f"{expected}, so that the bolts press '{joint.lower}' and '{joint.upper}' "
         "together",
         hint="name the face under the head, and the face or cylinder that the thread pulls.",
     )
-
-
-def _nodal_areas(
-    points: NDArray[np.float64], faces: NDArray[np.int64], nodes: NDArray[np.int64]
-) -> NDArray[np.float64]:
-    r"""Area of each node of straight sides, :math:`\int N_i\, 2 \pi r\, ds`."""
-    r = points[faces, 0]
-    length = np.linalg.norm(points[faces[:, 1]] - points[faces[:, 0]], axis=1)
-    share = np.column_stack([r[:, 0] / 6.0, r[:, 1] / 6.0, (r[:, 0] + r[:, 1]) / 3.0])
-    area = np.zeros(len(nodes))
-    np.add.at(area, np.searchsorted(nodes, faces), 2.0 * np.pi * length[:, None] * share)
-    return area

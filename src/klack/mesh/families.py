@@ -49,6 +49,16 @@ class ElementFamily:
         """Number of nodes per element."""
         return self.corners + (len(self.edges) if self.quadratic else 0)
 
+    @property
+    def linear(self) -> str:
+        """Name of the family with the same corners and no mid nodes."""
+        shape = self.dimension, self.corners
+        return next(
+            name
+            for name, other in FAMILIES.items()
+            if (other.dimension, other.corners) == shape and not other.quadratic
+        )
+
 
 _TRI_EDGES = ((0, 1), (1, 2), (2, 0))
 _QUAD_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0))

@@ -2,8 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import pi
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +9,23 @@ from numpy.typing import NDArray
 from klack.errors import InputError
 from klack.mesh.profile import SAME, Curve, Profile
 
-__all__ = ["FlatJoint", "Joint", "across", "cylinder_joint", "edges_of_two", "flat_joint"]
+__all__ = [
+    "FlatJoint",
+    "Joint",
+    "JointError",
+    "across",
+    "cylinder_joint",
+    "edges_of_two",
+    "flat_joint",
+]
+
+
+class JointError(InputError):
+    """Something wrong with what two solids share; ``name`` is that of the edge or face."""
+
+    def __init__(self, name: str, *, got: str, expected: str, hint: str) -> None:
+        self.name = name
+        super().__init__(f"joint '{name}'", got=got, expected=expected, hint=hint)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,8 +40,6 @@ class Joint:
     axis (3,) [m], (3,)
         Point and direction, of a solid body; None: that of a half section.
     """
-
-    key: ClassVar[str] = "fits"
 
     name: str
     inner: str
@@ -55,26 +67,29 @@ class Joint:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlatJoint:
-    """A flat face across the axis that is the edge of two solids, and where bolts press them.
+    """A flat face that two solids share, and where bolts press them.
 
     Parameters
     ----------
     lower, upper
         Names of the solids.
-    length, area [m, m^2]
-        Of the edge along the radius; of the face.
+    length [m]
+        Of the edge along the radius.
     ends
-        Names of the two edges, of one solid each.
+        Names of the two edges or faces, of one solid each.
+    normal (d,)
+        From the lower to the upper solid.
+    across (d - 1 | 0, d)
+        Directions in the face in which a solid may tilt; none of a half section.
     """
-
-    key: ClassVar[str] = "bolts"
 
     name: str
     lower: str
     upper: str
     length: float
-    area: float
     ends: tuple[str, str]
+    normal: NDArray[np.float64]
+    across: NDArray[np.float64]
 
     @property
     def solids(self) -> tuple[str, str]:
@@ -88,18 +103,18 @@ def cylinder_joint(profiles: Mapping[str, Profile], name: str) -> Joint:
     size = max(abs(x) for c in (*own, *others) for x in (*c.start, *c.end))
     radii = [r for curve in (*own, *others) for r, _ in (curve.start, curve.end)]
     if min(radii) <= SAME * size:
-        raise _error(
+        raise JointError(
             name,
-            "an edge on the axis, or one that ends there",
-            "a cylinder around the axis",
-            "name the edge where the outer part meets the inner one.",
+            got="an edge on the axis, or one that ends there",
+            expected="a cylinder around the axis",
+            hint="name the edge where the outer part meets the inner one.",
         )
     if max(radii) - min(radii) > SAME * size or any(c.centre is not None for c in own):
-        raise _error(
+        raise JointError(
             name,
-            "an edge that is not parallel to the axis, or edges of several radii",
-            "a cylinder: straight edges of one radius",
-            "a cone or a flat face cannot be pressed on; draw and name the cylinder.",
+            got="an edge that is not parallel to the axis, or edges of several radii",
+            expected="a cylinder: straight edges of one radius",
+            hint="a cone or a flat face cannot be pressed on; draw and name the cylinder.",
         )
     _require_same_ends(name, one, own, two, others)
     upwards = own[0].end[1] > own[0].start[1]  # the material is on the left: inside
@@ -129,23 +144,23 @@ def flat_joint(profiles: Mapping[str, Profile], name: str, ends: tuple[str, str]
     size = max(abs(x) for c in (*own, *others) for x in (*c.start, *c.end))
     heights = [z for curve in (*own, *others) for _, z in (curve.start, curve.end)]
     if max(heights) - min(heights) > SAME * size or any(c.centre is not None for c in own):
-        raise _error(
+        raise JointError(
             name,
-            "an edge that is not at a right angle to the axis, or edges of several heights",
-            "a flat face: straight edges of one z",
-            "bolts press along the axis; draw and name the flat face, a cone is not computed.",
+            got="an edge that is not at a right angle to the axis, or edges of several heights",
+            expected="a flat face: straight edges of one z",
+            hint="bolts press along the axis; draw and name the flat face, a cone is not computed.",
         )
     _require_same_ends(name, one, own, two, others)
     for end in ends:
         curves = [(solid, c) for solid, p in profiles.items() for c in p.curves if c.name == end]
         straight = all(c.centre is None and c.start[0] + c.end[0] > SAME * size for _, c in curves)
         if len({solid for solid, _ in curves}) != 1 or not straight:
-            raise _error(
+            raise JointError(
                 name,
-                f"bolts between {ends[0]} and {ends[1]}, where '{end}' is no straight edge of one "
-                "part, or lies on the axis",
-                "two edges: one under the head, one where the thread carries",
-                "name these edges in the parts; a nut presses as a head does.",
+                got=f"bolts between {ends[0]} and {ends[1]}, where '{end}' is no straight edge of "
+                "one part, or lies on the axis",
+                expected="two edges: one under the head, one where the thread carries",
+                hint="name these edges in the parts; a nut presses as a head does.",
             )
     upper = own[0].end[0] > own[0].start[0]  # the material is on the left: above
     return FlatJoint(
@@ -153,8 +168,9 @@ def flat_joint(profiles: Mapping[str, Profile], name: str, ends: tuple[str, str]
         lower=two if upper else one,
         upper=one if upper else two,
         length=float(sum(curve.length for curve in own)),
-        area=float(sum(pi * (c.start[0] + c.end[0]) * c.length for c in own)),
         ends=ends,
+        normal=np.array([0.0, 1.0]),
+        across=np.empty((0, 2)),
     )
 
 
@@ -165,11 +181,12 @@ def _require_same_ends(
     if len(own) != len(others) or not all(
         any(_same(curve, other, size) for other in others) for curve in own
     ):
-        raise _error(
+        raise JointError(
             name,
-            f"edges of '{one}' and '{two}' with different ends",
-            "the same two ends in both parts",
-            "end the edge of either part where the other one ends, as for parts that are glued.",
+            got=f"edges of '{one}' and '{two}' with different ends",
+            expected="the same two ends in both parts",
+            hint="end the edge of either part where the other one ends, as for parts that are "
+            "glued.",
         )
 
 
@@ -186,12 +203,12 @@ def edges_of_two(profiles: Mapping[str, Profile], name: str) -> dict[str, list[C
             for other in dict.fromkeys(c.name for p in profiles.values() for c in p.curves)
             if other and sum(any(c.name == other for c in p.curves) for p in profiles.values()) == 2
         ]
-        raise _error(
+        raise JointError(
             name,
-            f"a name of edges of {_listed(edges) or 'no part'}",
-            "the name of the edge that two parts share "
+            got=f"a name of edges of {_listed(edges) or 'no part'}",
+            expected="the name of the edge that two parts share "
             f"(here: {', '.join(shared) or 'none, no two parts have a name in common'})",
-            "give the shared edge this name in both parts.",
+            hint="give the shared edge this name in both parts.",
         )
     return edges
 
@@ -204,7 +221,3 @@ def _same(a: Curve, b: Curve, size: float) -> bool:
 
 def _listed(names: Mapping[str, object]) -> str:
     return ", ".join(f"'{name}'" for name in names)
-
-
-def _error(name: str, got: str, expected: str, hint: str) -> InputError:
-    return InputError(f"joint '{name}'", got=got, expected=expected, hint=hint)

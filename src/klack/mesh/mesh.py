@@ -63,6 +63,15 @@ class FaceBlock:
     family: str
     connectivity: NDArray[np.int64]
 
+    @property
+    def rim(self) -> NDArray[np.int64]:
+        """Edges of one face only, with their mid nodes (m, 2 | 3); of lines the ends (m, 1)."""
+        edges = [face.nodes for face in FAMILIES[self.family].faces] or [(0,), (1,)]
+        rows = np.vstack([self.connectivity[:, list(edge)] for edge in edges])
+        keys = np.sort(rows[:, :2], axis=1)
+        _, first, count = np.unique(keys, axis=0, return_index=True, return_counts=True)
+        return np.asarray(rows[first[count == 1]])
+
 
 @dataclass(frozen=True, slots=True)
 class Surface:

@@ -8,8 +8,8 @@ import scipy
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 
-from klack.errors import InputError
 from klack.mesh.families import FAMILIES
+from klack.mesh.joint import JointError
 from klack.mesh.mesh import FaceBlock, FacePair, FaceTable, Mesh, Surface
 
 __all__ = ["parted"]
@@ -17,7 +17,7 @@ __all__ = ["parted"]
 Ints = NDArray[np.int64]
 
 
-def parted(mesh: Mesh, names: Iterable[str], where: str = "parted") -> tuple[Mesh, Ints]:
+def parted(mesh: Mesh, names: Iterable[str]) -> tuple[Mesh, Ints]:
     """Mesh whose two solids meet at each named node set without shared nodes: its ``pairs``.
 
     Beside it stands the node of the given mesh that each of its nodes is.
@@ -26,14 +26,14 @@ def parted(mesh: Mesh, names: Iterable[str], where: str = "parted") -> tuple[Mes
     group gets a node of its own at the end of the numbering. So a node at the rim of a pair stays
     one where solids are glued beyond it.
 
-    Rejects a name that is not that of faces between exactly two solids; ``where`` begins the error.
+    Rejects a name that is not that of faces between exactly two solids.
     """
     names = tuple(names)
     if not names:
         return mesh, np.arange(mesh.node_count)
     table = FaceTable.of(mesh.blocks)
     faces = _Faces(table)
-    open_rows = {name: _between(mesh, faces, name, where) for name in names}
+    open_rows = {name: _between(mesh, faces, name) for name in names}
     rows = np.unique(np.concatenate(list(open_rows.values())))
     split = np.unique(faces.nodes[rows])
     split = split[split >= 0]
@@ -140,7 +140,7 @@ class _Faces:
         return rows[(np.isin(self.nodes[rows], members) | (self.nodes[rows] < 0)).all(axis=1)]
 
 
-def _between(mesh: Mesh, faces: _Faces, name: str, where: str) -> Ints:
+def _between(mesh: Mesh, faces: _Faces, name: str) -> Ints:
     found = faces.of_two_solids(mesh.node_sets.get(name, np.empty(0, dtype=np.int64)))
     pairs = {
         tuple(mesh.blocks[faces.table.block[row + side]].solid for side in (0, 1)) for row in found
@@ -154,8 +154,8 @@ def _between(mesh: Mesh, faces: _Faces, name: str, where: str) -> Ints:
         got = "a name of no face between two solids"
     else:
         got = f"faces between {len(pairs)} pairs of solids"
-    raise InputError(
-        f"{where}.{name}",
+    raise JointError(
+        name,
         got=got,
         expected="the name of the faces that two solids share "
         f"(here: {', '.join(known) or 'none, no such face has a name'})",

@@ -1,48 +1,45 @@
-"""The cylinder that two solids of a mesh share: a press fit of parts from a STEP file."""
+"""What two solids of a STEP file share in their mesh: a cylinder, a flat face."""
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from klack.errors import InputError
-from klack.mesh.families import FAMILIES
-from klack.mesh.joint import Joint, across
+from klack.mesh.joint import FlatJoint, Joint, JointError, across
 from klack.mesh.mesh import Mesh
 from klack.mesh.parting import parted
 
-__all__ = ["solid_joint"]
+__all__ = ["flat_solid_joint", "solid_joint"]
 
-_ROUND = 1e-5  # of the radius: how far nodes are from a cylinder
+Floats = NDArray[np.float64]
+
+_EVEN = 1e-5  # of radius or extent: how far nodes are from a cylinder or a plane
 _FLAT = 1e-2  # turn of the normals, from which a face is round: 20 deg
 
 
 def solid_joint(mesh: Mesh, name: str) -> Joint:
     """Joint of all faces of one name; rejects what is no cylinder between exactly two solids."""
-    apart, _ = parted(mesh, [name], Joint.key)
-    pair = apart.pairs[name]
-    corners = np.vstack([b.connectivity[:, : FAMILIES[b.family].corners] for b in pair.first])
-    a, b, c = (apart.points[corners[:, k]] for k in range(3))
-    normal = np.cross(b - a, c - a)
-    sizes, ways = np.linalg.eigh(normal.T @ normal)
-    points = apart.points[np.unique(np.concatenate([b.connectivity.ravel() for b in pair.first]))]
-    centre, extent = points.mean(axis=0), float(np.ptp(points, axis=0).max())
+    faces = _Faces.of(mesh, name)
+    points, sizes, ways = faces.points, faces.sizes, faces.ways
+    centre, extent = points.mean(axis=0), faces.extent
     if sizes[1] < _FLAT * sizes[2]:
-        raise _solid_error(name, "a flat face, or one that is hardly round")
+        raise _no_cylinder(name, "a flat face, or one that is hardly round")
 
-    def cylinder(x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def cylinder(x: Floats) -> tuple[Floats, Floats]:
         axis = ways[:, 0] + ways[:, 1:] @ x[:2]
         return centre + extent * (ways[:, 1:] @ x[2:4]), axis / np.linalg.norm(axis)
 
-    def off(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    def off(x: Floats) -> Floats:
         return np.asarray(np.linalg.norm(across(points, *cylinder(x)), axis=1) / extent - x[4])
 
     found = least_squares(off, [0.0, 0.0, 0.0, 0.0, 0.5], xtol=1e-15, ftol=1e-15, gtol=1e-15)
     middle, axis = cylinder(found.x)
     radius = extent * float(found.x[4])
-    out = np.einsum("fi,fi->f", normal, across((a + b + c) / 3.0, middle, axis))
-    if np.abs(found.fun).max() * extent > _ROUND * radius or out.min() * out.max() <= 0.0:
-        raise _solid_error(name, "faces that are not one cylinder")
-    one, two = pair.solids
+    out = np.einsum("fi,fi->f", faces.normal, across(faces.middle, middle, axis))
+    if np.abs(found.fun).max() * extent > _EVEN * radius or out.min() * out.max() <= 0.0:
+        raise _no_cylinder(name, "faces that are not one cylinder")
+    one, two = faces.solids
     return Joint(
         name=name,
         inner=one if out[0] > 0.0 else two,
@@ -53,9 +50,100 @@ def solid_joint(mesh: Mesh, name: str) -> Joint:
     )
 
 
-def _solid_error(name: str, got: str) -> InputError:
-    return InputError(
-        f"{Joint.key}.{name}",
+def flat_solid_joint(mesh: Mesh, name: str, ends: tuple[str, str]) -> FlatJoint:
+    """Joint of all faces of one name; rejects what is no plane between exactly two solids.
+
+    Its length is twice its area over its rim: the width of a ring, the radius of a disc.
+
+    Parameters
+    ----------
+    ends
+        Names of outer faces.
+    """
+    faces = _Faces.of(mesh, name)
+    axis = faces.ways[:, 2] * np.sign(faces.ways[np.abs(faces.ways[:, 2]).argmax(), 2])
+    up = faces.normal @ axis
+    if np.ptp(faces.points @ axis) > _EVEN * faces.extent or up.min() * up.max() <= 0.0:
+        raise JointError(
+            name,
+            got="faces that are not one plane",
+            expected="a flat face: bolts press at a right angle to it",
+            hint="name the flat face in the CAD file; a cone or a step is not computed.",
+        )
+    for end in ends:
+        if end not in mesh.surfaces:
+            raise JointError(
+                name,
+                got=f"bolts between {ends[0]} and {ends[1]}, where '{end}' is no outer face",
+                expected="two faces: one under the head, one where the thread carries "
+                f"(here: {', '.join(known for known in mesh.surfaces if known not in ends)})",
+                hint="name these faces in the CAD file; 'klack inspect' lists the names.",
+            )
+    one, two = faces.solids
+    return FlatJoint(
+        name=name,
+        lower=one if up[0] > 0.0 else two,
+        upper=two if up[0] > 0.0 else one,
+        length=float(np.abs(up).sum() / faces.rim),
+        ends=ends,
+        normal=axis,
+        across=faces.ways[:, :2].T,
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Faces:
+    """Faces that exactly two solids share.
+
+    Parameters
+    ----------
+    solids
+        Names of both.
+    points (n, 3) [m]
+        Of all nodes.
+    middle, normal (f, 3) [m], [m^2]
+        Of each face; outwards from the first solid, as long as twice the area.
+    sizes, ways (3,), (3, 3)
+        Squares of the normals along each way, ascending.
+    rim [m]
+        Length of the outline.
+    """
+
+    solids: tuple[str, str]
+    points: Floats
+    middle: Floats
+    normal: Floats
+    sizes: Floats
+    ways: Floats
+    rim: float
+
+    @classmethod
+    def of(cls, mesh: Mesh, name: str) -> "_Faces":
+        apart, _ = parted(mesh, [name])
+        pair = apart.pairs[name]
+        (faces,) = pair.first  # of one family: tri6
+        corners = apart.points[faces.connectivity[:, :3]]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        sizes, ways = np.linalg.eigh(normal.T @ normal)
+        along = np.diff(apart.points[faces.rim[:, [0, 2, 1]]], axis=1)
+        return cls(
+            solids=pair.solids,
+            points=apart.points[np.unique(faces.connectivity)],
+            middle=corners.mean(axis=1),
+            normal=normal,
+            sizes=sizes,
+            ways=ways,
+            rim=float(np.linalg.norm(along, axis=-1).sum()),
+        )
+
+    @property
+    def extent(self) -> float:
+        return float(np.ptp(self.points, axis=0).max())
+
+
+def _no_cylinder(name: str, got: str) -> JointError:
+    return JointError(
+        name,
         got=got,
         expected="a cylinder: faces of one radius round one axis",
         hint="a cone or a flat face cannot be pressed on; name the cylinder in the CAD file.",

@@ -32,7 +32,7 @@ class StepPart:
     low, high (3,) [m]
         Corners of the box around all.
     moments
-        Of solids.
+        Second moments [m^5] or [m^4] about the centre.
     """
 
     name: str
@@ -41,7 +41,7 @@ class StepPart:
     size: float
     low: NDArray[np.float64]
     high: NDArray[np.float64]
-    moments: Moments | None = None
+    moments: Moments
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,19 +76,19 @@ def _parts(shapes: list, names: tuple[str, ...], unit: float) -> tuple[StepPart,
                 size=sum(shape.mass for shape in here) / unit,
                 low=np.round(low / _BOX_MARGIN) * _BOX_MARGIN / MM,
                 high=np.round(high / _BOX_MARGIN) * _BOX_MARGIN / MM,
-                moments=_moments(here) if unit == MM**3 else None,
+                moments=_moments(here, unit),
             )
         )
     return tuple(parts)
 
 
-def _moments(solids: list) -> Moments:
+def _moments(shapes: list, unit: float) -> Moments:
     """OpenCASCADE's tensor of inertia is about the centre."""
     parts = []
-    for solid in solids:
-        tensor, centre = solid.inertia, solid.center
-        inertia = np.array([[tensor[i, j] for j in range(3)] for i in range(3)]) / MM**5
+    for shape in shapes:
+        tensor, centre = shape.inertia, shape.center
+        inertia = np.array([[tensor[i, j] for j in range(3)] for i in range(3)]) / (unit * MM**2)
         second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
         at = np.array([centre.x, centre.y, centre.z]) / MM
-        parts.append((1.0, Moments(volume=solid.mass / MM**3, centre=at, second=second)))
+        parts.append((1.0, Moments(volume=shape.mass / unit, centre=at, second=second)))
     return Moments.together(parts)

@@ -164,7 +164,7 @@ _BOLTS = JsonForm(
     Key("joint", str),
     Key("lower", str),
     Key("upper", str),
-    Key("ends", list[str], "Edges that the bolts press."),
+    Key("ends", list[str], "Edges or faces that the bolts press."),
     Key("count", int, "Of bolts."),
     Key("area_m2", Real, "Of the joint.", "area"),
     Key("preload_N", Real, of="preload"),

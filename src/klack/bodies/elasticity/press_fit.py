@@ -14,9 +14,10 @@ Limits: linear; the joint is closed all over (a negative pressure shows where it
 one joint are held together by nothing else.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,10 +30,8 @@ from klack.bodies.elasticity.factorization import factorize
 from klack.bodies.elasticity.loads import face_points, over_faces
 from klack.bodies.elasticity.rigid_motions import held_best, held_dofs, rigid_motions
 from klack.bodies.elasticity.stress import StressField, von_mises
-from klack.errors import InputError
 from klack.materials.material import Material
-from klack.mesh.families import FAMILIES
-from klack.mesh.joint import FlatJoint, Joint
+from klack.mesh.joint import FlatJoint, Joint, JointError
 from klack.mesh.mesh import ElementBlock, FaceBlock, FacePair, Mesh
 from klack.mesh.parting import parted
 
@@ -47,6 +46,7 @@ __all__ = [
     "pressed_state",
 ]
 
+J = TypeVar("J", Joint, FlatJoint)
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
@@ -122,12 +122,12 @@ def pressed_state(
     """
     body = PartedBody.of(mesh, materials, joints)
     apart, sides = body.mesh, body.sides
-    _require_all_pressed(apart, joints, sides)
+    _require_all_pressed(body, joints)
     masters = np.concatenate([each.nodes[0] for each in sides])
     slaves = np.concatenate([each.nodes[1] for each in sides])
     if len(np.unique(slaves)) < len(slaves) or np.isin(slaves, masters).any():
-        raise InputError(
-            "fits",
+        raise JointError(
+            joints[-1].name,
             got="joints that meet in a corner",
             expected="one overlap at every node",
             hint="give edges of one cylinder the same name.",
@@ -179,24 +179,16 @@ def pressed_state(
     )
 
 
-def _require_all_pressed(
-    apart: Mesh, joints: Sequence[Joint], sides: Sequence["JointSides"]
-) -> None:
+def _require_all_pressed(body: "PartedBody", joints: Sequence[Joint]) -> None:
     """Reject further faces of the parts of a joint, except across its axis, where none presses."""
-    for pair in apart.pairs.values():
-        own = [(j, s) for j, s in zip(joints, sides, strict=True) if {*j.solids} == {*pair.solids}]
-        for block in pair.first:
-            pressed = [np.isin(block.connectivity, s.nodes).all(axis=1) for _, s in own]
-            rest = FaceBlock(block.family, block.connectivity[~np.any(pressed, axis=0)])
-            normal = face_points(apart, rest)[3].reshape(-1, apart.dimension)
-            joint = own[0][0]
-            if np.any(np.abs(joint.height(normal)) < 1.0 - _LEVEL):
-                raise InputError(
-                    f"{joint.key}.{joint.name}",
-                    got="a part of the faces where '{}' and '{}' meet".format(*joint.solids),
-                    expected="a fit for all of them that are not at a right angle to the axis",
-                    hint="give all faces of one cylinder the same name, others a fit of their own.",
-                )
+    for joint, _, normal in body.faces_beside(joints):
+        if np.any(np.abs(joint.height(normal)) < 1.0 - _LEVEL):
+            raise JointError(
+                joint.name,
+                got="a part of the faces where '{}' and '{}' meet".format(*joint.solids),
+                expected="a fit for all of them that are not at a right angle to the axis",
+                hint="give all faces of one cylinder the same name, others a fit of their own.",
+            )
 
 
 def _tied(
@@ -254,7 +246,7 @@ class PartedBody:
         """Part a mesh; edges or faces of a joint are its node set of that name."""
         between = {" and ".join(sorted(j.solids)): _shared(mesh, *j.solids) for j in joints}
         whole = replace(mesh, node_sets={**mesh.node_sets, **between})
-        apart, nodes = parted(whole, between, joints[0].key)
+        apart, nodes = parted(whole, between)
         return cls(
             mesh=apart,
             nodes=nodes,
@@ -299,6 +291,20 @@ class PartedBody:
         return np.union1d(
             held_dofs(self.mesh, np.empty(0, np.int64)), held_best(motions, candidates)
         )
+
+    def faces_beside(self, joints: Sequence[J]) -> Iterator[tuple[J, Floats, Floats]]:
+        """Points (n, d) and normals of further faces that the solids of a joint share."""
+        for pair in self.mesh.pairs.values():
+            own = [
+                (j, s)
+                for j, s in zip(joints, self.sides, strict=True)
+                if {*j.solids} == {*pair.solids}
+            ]
+            for block in pair.first:
+                named = [np.isin(block.connectivity, s.nodes).all(axis=1) for _, s in own]
+                rest = FaceBlock(block.family, block.connectivity[~np.any(named, axis=0)])
+                _, x, _, normal = face_points(self.mesh, rest)
+                yield own[0][0], *(v.reshape(-1, self.mesh.dimension) for v in (x, normal))
 
     @property
     def sharp_corners(self) -> Floats:
@@ -350,11 +356,8 @@ class JointSides:
     @property
     def ends(self) -> Ints:
         """Places of the corner nodes at the rim in :attr:`nodes`."""
-        of_face = FAMILIES[self.family].faces
-        ways = [f.nodes[:2] for f in of_face] or [(0,), (1,)]
-        rims = np.sort(np.vstack([self.faces[:, list(way)] for way in ways]), axis=1)
-        rim, count = np.unique(rims, axis=0, return_counts=True)
-        return np.searchsorted(self.nodes[1], np.unique(rim[count == 1]))
+        rim = FaceBlock(self.family, self.faces).rim[:, :2]
+        return np.searchsorted(self.nodes[1], np.unique(rim))
 
     def pressure(self, apart: Mesh, push: Floats) -> tuple[Floats, Floats, Floats]:
         """Middle of each side (n, d) [m], its area [m^2] and mean pressure [Pa].
@@ -390,8 +393,8 @@ def _glued_parts(apart: Mesh, joints: Sequence[Joint | FlatJoint]) -> list[set[s
             parts = [part for part in parts if part not in joined] + [set().union(*joined)]
     for joint in joints:
         if any({*joint.solids} <= part for part in parts):
-            raise InputError(
-                f"{joint.key}.{joint.name}",
+            raise JointError(
+                joint.name,
                 got="'{}' and '{}', glued to each other by other parts".format(*joint.solids),
                 expected="parts that only this joint holds together",
                 hint="leave out the part that joins them: a later weld leaves the joint as it is.",

@@ -20,6 +20,7 @@ from klack.bodies.elasticity.quadrature import quadrature
 from klack.bodies.elasticity.shape_functions import reference_nodes, shape_functions
 from klack.errors import InputError
 from klack.materials.material import Material
+from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import ElementBlock, Mesh
 
 __all__ = [
@@ -34,10 +35,6 @@ __all__ = [
 COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
 """Order of the stresses; of a body of revolution x is the radius and y the direction around."""
 
-_LINEAR = {
-    **{"tri6": "tri3", "quad8": "quad4", "tet10": "tet4"},
-    **{"hex20": "hex8", "wedge15": "wedge6"},
-}
 _CORNER = 1.0 / np.sqrt(3.0)
 
 
@@ -203,9 +200,9 @@ class _Block:
 
 def stress_points(family: str) -> NDArray[np.float64]:
     """Reference coordinates where the stress is taken, shape (q, d)."""
-    if family not in _LINEAR:
+    if not FAMILIES[family].quadratic:
         return reference_nodes(family).mean(axis=0, keepdims=True)
-    match _LINEAR[family]:
+    match FAMILIES[family].linear:
         case "tet4":
             return quadrature("tet10", "stiffness")[0]
         case "wedge6":
@@ -222,7 +219,7 @@ def _to_nodes(family: str, xi: NDArray[np.float64]) -> NDArray[np.float64]:
     nodes = reference_nodes(family)
     if len(xi) == 1:
         return np.ones((len(nodes), 1))
-    linear = _LINEAR[family]
+    linear = FAMILIES[family].linear
     at_points, at_nodes = shape_functions(linear, xi)[0], shape_functions(linear, nodes)[0]
     return np.asarray(np.linalg.solve(at_points.T, at_nodes.T).T)
 
