@@ -169,9 +169,14 @@ def test_the_shared_face_of_a_step_file_can_be_a_layer(tmp_path):
     at = mesh.points[pair.first[0].connectivity]
     assert np.array_equal(at, mesh.points[pair.second[0].connectivity])
     assert np.ptp(at[..., 2]) < 1e-9
+    shown = [row for row in dict(inspect_case(case))["needle"] if row[0] == "layer"]
+    assert len(shown) == 5
+    assert shown[0] == ("layer", "joint", "between: needle and armature, 19.63 mm^2")
     other = changed(tmp_path, step, *coarse, (*LAYERS, {"seam": STIFF}))
     with pytest.raises(InputError, match=r"layers\.seam: got a name of no face between two solids"):
         mesh_body(other.bodies["needle"], "needle")
+    with pytest.raises(InputError, match=r"case\.yaml:\d+: bodies\.needle\.layers\.seam: got"):
+        list(inspect_case(other))
 
 
 @pytest.mark.slow

@@ -9,10 +9,10 @@ import numpy as np
 from klack.analyses.valve_inspection import valve_rows
 from klack.assembling.assembled_bodies import assembled_body
 from klack.assembling.bodies import assemble_body, mesh_body
-from klack.assembling.bolts import bolted_joints
-from klack.assembling.fits import press_fits
+from klack.assembling.bolts import BoltedJoint, bolted_joints
+from klack.assembling.fits import PressFit, press_fits
 from klack.assembling.given_bodies import reduced_from_file
-from klack.assembling.layers import layer_states
+from klack.assembling.layers import LayerState, layer_states
 from klack.bodies.elasticity.eigen import eigenmodes
 from klack.bodies.model_files.matrices import MATRIX_FORMATS, read_matrix
 from klack.bodies.model_files.system_matrix import SystemMatrix, WhichMatrixError
@@ -22,6 +22,7 @@ from klack.case.geometry import ProfileGeometry
 from klack.case.key_path import kind_at, node_at, written_at
 from klack.case.origin import ExpandedCase
 from klack.case.parameters import ParameterValue
+from klack.case.placed_errors import tells_place
 from klack.case.schema import Case
 from klack.case.surface_names import require_surface_names
 from klack.case.valve import ValveCase
@@ -221,19 +222,20 @@ def inspect_bodies(case: CaseFile) -> Iterator[tuple[str, Inspected]]:
                 mesh.file, mesh.unit, solids=solids, solids_only=mesh.solids_only
             )
             known[name] = tuple(model.mesh.surfaces)
-            yield name, _weighed(case, name, _mesh_rows(Path(mesh.file), model), _moments(model))
+            found = _weighed(case, name, _mesh_rows(Path(mesh.file), model), _moments(model))
+            yield name, _with_joints(case, name, found)
         elif body.geometry.step is not None:
             content = step_content(body.geometry.step.file)
             known[name] = tuple(face.name for face in content.faces)
-            moments = {solid.name: solid.moments for solid in content.solids if solid.moments}
+            moments = {solid.name: solid.moments for solid in content.solids}
             found = _weighed(case, name, _step_rows(content), moments)
-            yield name, replace(found, rows=(*found.rows, *_fit_rows(case, name)))
+            yield name, _with_joints(case, name, found)
         elif body.geometry.profile is not None:
             profiles = body.geometry.profile.profiles()
             rows = _drawn_rows(body.geometry.profile, profiles)
             drawn = {solid: profile.moments for solid, profile in profiles.items()}
             found = _weighed(case, name, rows, drawn)
-            yield name, replace(found, rows=(*found.rows, *_joint_rows(case, name)))
+            yield name, _with_joints(case, name, found)
     require_surface_names(case, known)
 
 
@@ -248,23 +250,28 @@ def _drawn_rows(drawn: ProfileGeometry, profiles: Mapping[str, Profile]) -> Iter
         yield "surface", edge, f"z {_range(points[:, 1])}, r {_range(points[:, 0])}"
 
 
-def _fit_rows(case: CaseFile, name: str) -> Iterator[Row]:
-    for kind, found in (
-        ("press fit", press_fits(case, name)),
-        ("bolts", bolted_joints(case, name)),
-    ):
-        for each in found:
-            yield from ((kind, each.joint, f"{what}: {text}") for what, text in each.rows())
-            yield from (("doubt", each.joint, doubt) for doubt in each.doubts)
+def _with_joints(case: CaseFile, name: str, found: Inspected) -> Inspected:
+    return replace(found, rows=(*found.rows, *_joint_rows(case, name)))
 
 
 def _joint_rows(case: CaseFile, name: str) -> Iterator[Row]:
-    yield from _fit_rows(case, name)
-    if case.bodies[name].layers:
-        body = assemble_body(case, name, mesh_body(case.bodies[name], name, ()))
-        for state in layer_states(body, eigenmodes(body, count=_MODES)):
-            yield from (("layer", state.name, f"{what}: {text}") for what, text in state.rows())
-            yield from (("doubt", state.name, doubt) for doubt in state.doubts)
+    """Press fits, bolts and layers between the parts of a body, and their doubts."""
+    joints: list[tuple[str, str, PressFit | BoltedJoint | LayerState]] = [
+        *(("press fit", fit.joint, fit) for fit in press_fits(case, name)),
+        *(("bolts", bolted.joint, bolted) for bolted in bolted_joints(case, name)),
+        *(("layer", state.name, state) for state in _layers(case, name)),
+    ]
+    for kind, joint, found in joints:
+        yield from ((kind, joint, f"{what}: {text}") for what, text in found.rows())
+        yield from (("doubt", joint, doubt) for doubt in found.doubts)
+
+
+@tells_place
+def _layers(case: CaseFile, name: str) -> tuple[LayerState, ...]:
+    if not case.bodies[name].layers:
+        return ()
+    body = assemble_body(case, name, mesh_body(case.bodies[name], name, ()))
+    return layer_states(body, eigenmodes(body, count=_MODES))
 
 
 def _weighed(

@@ -55,6 +55,7 @@ const STYLE = `
 .ks-faces div{display:flex;flex-wrap:wrap;gap:2px 7px;align-items:center}
 .ks dl{margin:2px 0 6px;font-size:12.5px}
 .ks dt{color:var(--soft);float:left;clear:left;margin-right:6px}
+.ks .ks-joint{float:none;margin-top:5px;color:inherit;font-weight:600}
 .ks dd{margin:0;overflow-wrap:anywhere;font-variant-numeric:tabular-nums}
 .ks-said-of{margin:5px 0;overflow-wrap:anywhere;font-variant-numeric:tabular-nums;font-size:12.5px}
 .ks-said-of b{font-weight:600}
@@ -83,7 +84,8 @@ const STYLE = `
 
 const BODY_COLOURS = [['#9db8d2', '#86a8c9'], ['#d8bd95', '#bd9c6b'], ['#a9c6a4', '#86ab80'], ['#c8b3d3', '#a78db6'], ['#c9c9c4', '#a3a39d']];
 const CONTACT_COLOUR = '#d55e00', HELD_COLOUR = '#0a7f5f', RING_COLOUR = '#c2185b';
-const WEIGHED = ['solid', 'volume', 'mass', 'centre of gravity', 'inertia', 'press fit', 'doubt'];
+const JOINTS = ['press fit', 'bolts', 'layer'];
+const WEIGHED = ['solid', 'volume', 'mass', 'centre of gravity', 'inertia', ...JOINTS, 'doubt'];
 const TURN = Math.PI / 180;
 const UNNAMED = 65535;
 const STRESS_DECADES = 3; // of the colours: the contact has a hundred times the stress of the rest
@@ -1018,7 +1020,14 @@ class SceneView {
     const several = body.packed.rows.filter(([what]) => what === 'solid').length > 1;  // one may have the name of its body
     const list = rows => {
       const node = el('dl');
+      let joint = '';
       for (const [what, name, content] of rows) {
+        if (JOINTS.includes(what)) {  // its rows below its name once
+          if (joint !== `${what} ${name}`) node.append(el('dt', {class: 'ks-joint', text: joint = `${what} ${name}`}));
+          const at = content.indexOf(': ');
+          node.append(el('dt', {text: content.slice(0, at)}), el('dd', {text: content.slice(at + 2)}));
+          continue;
+        }
         const kind = what === 'solid' && /mm(³|\^3)/.test(content) ? 'volume' : what;
         node.append(el('dt', {text: name && (several || name !== body.name) ? `${kind} ${name}` : kind}), el('dd', {text: content || name}));
       }
