@@ -291,6 +291,28 @@ def test_the_line_of_an_error_is_marked_until_it_moves_and_the_cursor_goes_there
     assert not go.is_visible()
 
 
+def test_doubts_of_a_valid_text_are_shown_and_marked_at_the_lines_of_their_keys(editor):
+    """An unusual speed, and a parameter without use; truth: the lines of their names."""
+    text = text_of(editor)
+    odd = text.replace("0.3 m/s", "30 m/s").replace(
+        "materials:", "parameters: {idle: 1 N}\nmaterials:"
+    )
+    lines = [line_of(odd, words) for words in ("idle: 1 N", "30 m/s")]
+    marks = "[...document.querySelectorAll('#k-lines .k-odd')].map(e => e.textContent).join()"
+    editor.get_by_label("case file, YAML").fill(odd)
+    editor.wait_for_selector("text=valid impact, not saved")
+    words = editor.locator("#k-doubts").inner_text()
+    editor.get_by_role("button", name=f"Go to line {lines[0]}").press("Enter")
+    editor.wait_for_function(f"{marks} === '! {lines[0]}'")  # the other one is not in sight
+    editor.keyboard.press("Control+End")
+    editor.wait_for_function(f"{marks}.endsWith('! {lines[1]}')")
+    assert "parameters.idle: nothing in this case follows from it" in words
+    assert "motion.speed: 30 m/s is unusual" in words
+    assert editor.locator("#k-yaml").get_attribute("aria-invalid") == "false"
+    editor.get_by_label("case file, YAML").fill(text)
+    editor.wait_for_function("document.getElementById('k-doubts').textContent === ''")
+
+
 def test_a_click_on_the_way_to_an_error_goes_to_its_column(editor):
     area, go = editor.get_by_label("case file, YAML"), editor.get_by_role("button", name="Go to")
     text = text_of(editor).replace("speed: 0.3 m/s}", "speed: 0.3 m/s}}")

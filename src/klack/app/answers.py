@@ -332,15 +332,17 @@ class FormField:
 class Checked:
     """What the checker says of a text: an ``error``, empty for a valid one.
 
-    ``line`` and ``column`` of an error count from 1; 0 where it names none of this text.  ``kind``
-    is ``"impact"``, ``"stroke"``, ``"magnet"``, or ``"study"`` of a study in its own file, with the
-    ``case`` that it names; ``has_objectives`` if its study has something to search for;
-    ``has_sliders`` if its numbers can be moved live.
+    ``line`` and ``column`` of an error count from 1; 0 where it names none of this text.
+    ``doubts`` of a valid one are notes with their lines.  ``kind`` is ``"impact"``, ``"stroke"``,
+    ``"magnet"``, or ``"study"`` of a study in its own file, with the ``case`` that it names;
+    ``has_objectives`` if its study has something to search for; ``has_sliders`` if its numbers can
+    be moved live.
     """
 
     error: str = ""
     line: int = 0
     column: int = 0
+    doubts: tuple[tuple[int, str], ...] = ()
     title: str = ""
     kind: str = ""
     fields: tuple[FormField, ...] = ()

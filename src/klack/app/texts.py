@@ -18,13 +18,14 @@ from klack.analyses.study.run import asked_points
 from klack.app.answers import Checked, FormField, MeasureOffer, StudyChoice, StudyOffer, typed
 from klack.app.explorer import has_sliders, sliders_of
 from klack.case.any_case import CaseTree, tree_of
+from klack.case.bodies import WrittenCase
 from klack.case.key_path import kind_at, node_at, written_at
 from klack.case.reader import parse, validated
 from klack.case.rewriting import with_values
 from klack.case.study import CaseStudy, StudyFile
 from klack.case.study_source import StudySource, study_of
 from klack.errors import InputError, KlackError
-from klack.input.problem import CaseProblem, Key
+from klack.input.problem import CaseProblem, Key, key_text
 from klack.input.section import Section
 
 __all__ = [
@@ -300,6 +301,7 @@ def checked_text(text: str, path: str, has_form: bool = True) -> Checked:
         line, column = _place(error, path)
         return Checked(error=str(error), line=line, column=column)
     return Checked(
+        doubts=tuple(_doubts(case, text, path)),
         has_study=case.study is not None,
         has_objectives=case.study is not None and bool(case.study.objectives),
         title=case.title or case.name,
@@ -309,6 +311,13 @@ def checked_text(text: str, path: str, has_form: bool = True) -> Checked:
     )
 
 
+def _doubts(case: WrittenCase, text: str, path: str) -> Iterator[tuple[int, str]]:
+    """Notes with the lines, from 1, of the keys that they begin with; 0 for one of another file."""
+    lines = {key_text(key): line for key, line in parse(text, Path(path))[1].keys.items()}
+    for words in case.input_notes:
+        yield lines.get(words.partition(": ")[0], 0), words
+
+
 def _magnet_of(tree: CaseTree) -> MagnetCase:
     return validated(MagnetCase, tree.text, tree.path, tree.data, tree.lines)
 
@@ -316,7 +325,8 @@ def _magnet_of(tree: CaseTree) -> MagnetCase:
 def _checked_magnet(tree: CaseTree, has_form: bool) -> Checked:
     case = _magnet_of(tree)
     fields = tuple(form_of(case, tree)) if has_form else ()
-    return Checked(title=case.title or case.name, kind="magnet", fields=fields)
+    doubts = tuple(_doubts(case, tree.text, str(tree.path)))
+    return Checked(title=case.title or case.name, kind="magnet", fields=fields, doubts=doubts)
 
 
 def _place(error: KlackError, path: str) -> tuple[int, int]:

@@ -7,6 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import groupby
+from math import inf
 from typing import Any
 
 from nicegui import ui
@@ -117,6 +118,7 @@ class _Editor:
                 button("Run", self._run).props("data-once")
             button("Save", self._save, main=True).props("id=k-save")
         self._message = plain("", "p").classes("k-error").props("role=alert id=k-told")
+        self._doubts = plain("", "p").classes("k-note").props("role=status id=k-doubts")
         self._go = button("").classes("k-go").on("click", js_handler="() => window.klackGo()")
         self._go.set_visibility(False)
         with ui.element("div").classes("k-editor"):
@@ -142,7 +144,7 @@ class _Editor:
                     element("pre", id="k-ink", tabindex=-1, aria_hidden="true")
                     self._area = plain(self._text, "textarea")
                 self._area.props("id=k-yaml spellcheck=false autocomplete=off")
-                self._area.props("aria-describedby=k-told")
+                self._area.props["aria-describedby"] = "k-told k-doubts"
                 self._area.props["aria-label"] = "case file, YAML"
                 # not throttled: what was typed last comes before the click on Save or Discard
                 self._area.on(
@@ -175,6 +177,7 @@ class _Editor:
             self._status.set_text("too long, not kept")
             self._status.classes(remove="good fair", add="out")
             self._message.set_text(_TOO_LONG)
+            self._doubts.set_text("")
             self._go.set_visibility(False)
             return
         self._text = str(text).replace("\n", self._newline)
@@ -259,11 +262,18 @@ class _Editor:
             return
         with self._form:
             self._message.set_text("\n".join(filter(None, (found.error, trouble))))
-            self._go.set_text(f"Go to line {found.line}")
-            self._go.set_visibility(found.line > 0)
-            self._tell("klackMarks", [(found.line, found.column)] if found.error else [])
+            doubts = sorted(found.doubts, key=lambda doubt: doubt[0] or inf)
+            self._doubts.set_text("\n".join(words for _, words in doubts))
+            places = [(line, 0, "k-odd") for line, _ in doubts]
+            if found.error:
+                places = [(found.line, found.column, "k-wrong")]
+            first = places[0][0] if places else 0
+            self._go.set_text(f"Go to line {first}")
+            self._go.set_visibility(first > 0)
+            self._tell("klackMarks", places)
             unsaved = "not saved" if text != self._saved else "saved"
-            self._status.classes(remove="good fair out", add="out" if found.error else "good")
+            grade = "out" if found.error else "fair" if found.doubts else "good"
+            self._status.classes(remove="good fair out", add=grade)
             valid = "not valid" if found.error else f"valid {found.kind}"
             self._status.set_text(f"{valid}, {unsaved}")
             if not found.error:

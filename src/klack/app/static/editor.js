@@ -7,7 +7,7 @@
   const GAP = 12;  // [px] above the first line, as in the style
   let area, ink, lines;  // text area, its letters, line numbers
   let starts = [0], widest = 0;  // of lines
-  let marked = new Set(), first = null;  // lines of errors, and the first with its column, from 1
+  let marked = new Map(), first = null;  // lines of errors and doubts with their kind, and the first with its column, from 1
   let isWaiting = false;
 
   const part = (kind, words) => {
@@ -25,7 +25,7 @@
       starts.push(at + 1);
     }
     widest = Math.max(widest, text.length - starts[starts.length - 1]);
-    if (starts.length !== before) marked = new Set();  // they may stand elsewhere now, the next check tells
+    if (starts.length !== before) marked = new Map();  // they may stand elsewhere now, the next check tells
   };
   const line = (text, number) => text.slice(starts[number], (starts[number + 1] ?? text.length + 1) - 1);
 
@@ -54,7 +54,7 @@
       within = block(words, within);
       const parts = isText ? [part("k-words", words)] : coloured(words);
       if (marked.has(number)) {
-        const wrong = part("k-wrong", "");
+        const wrong = part(marked.get(number), "");
         wrong.append(...parts);
         found.push(wrong, "\n");
       } else found.push(...parts, "\n");
@@ -81,7 +81,7 @@
     const to = Math.min(starts.length, Math.ceil((scrollTop + clientHeight) / row) + AHEAD);
     const numbers = [];
     for (let number = from; number < to; number++) {
-      numbers.push(marked.has(number) ? part("k-wrong", `! ${number + 1}`) : `${number + 1}`, "\n");
+      numbers.push(marked.has(number) ? part(marked.get(number), `! ${number + 1}`) : `${number + 1}`, "\n");
     }
     const isPlain = widest > WIDEST;
     area.classList.toggle("k-drawn", !isPlain);
@@ -116,14 +116,14 @@
   }
   window.klackDrawn = () => { if (begun()) changed(); };  // the text is another one without an event
 
-  // lines and columns, from 1, of what the checker says of a text; 0 where it names none
+  // lines and columns, from 1, of what the checker says of a text, and the kinds of their marks; an error comes first
   window.klackMarks = (places, known) => {
     if (!begun() || area.at > known) return;
     area.heard = known;
     index(area.value);
-    marked = new Set(places.map(([number]) => number - 1));
+    marked = new Map(places.map(([number, , kind]) => [number - 1, kind]));
     [first = null] = places;
-    area.setAttribute("aria-invalid", places.length > 0);
+    area.setAttribute("aria-invalid", first?.[2] === "k-wrong");
     soon();
   };
   window.klackGo = () => {
