@@ -11,7 +11,9 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from concurrent import futures
 from dataclasses import replace
@@ -34,7 +36,8 @@ from klack.analyses.study.processes import PointOrder, SentCase, answered, versi
 from klack.analyses.study.where import Where, _Fitting
 from klack.analyses.workers import Failure
 from klack.case.valve import ValveCase
-from klack.errors import ConvergenceError, InputError, MissingExtraError
+from klack.errors import AccuracyWarning, ConvergenceError, InputError, MissingExtraError
+from klack.machine.stages import collected_warnings, trial, warnings_of_threads
 
 pytestmark = pytest.mark.slow  # processes that start, clusters, kills
 
@@ -597,3 +600,31 @@ def until(reached: Callable[[], bool]) -> None:
     while not reached():
         assert time.monotonic() < end, "nothing came"
         time.sleep(0.01)
+
+
+def test_warnings_that_threads_catch_at_the_same_time_stay_their_own():
+    """A trial inside a trial too; what no trial catches is left for its thread."""
+    both = threading.Barrier(2, timeout=60.0)
+    found: dict[str, list[str]] = {}
+
+    def work(name: str) -> None:
+        both.wait()
+        with trial() as outer:
+            both.wait()
+            warnings.warn(f"{name} outer", AccuracyWarning, stacklevel=1)
+            with collected_warnings() as inner:
+                both.wait()
+                warnings.warn(f"{name} inner", AccuracyWarning, stacklevel=1)
+                both.wait()
+        both.wait()
+        warnings.warn(f"{name} left", AccuracyWarning, stacklevel=1)
+        found[name] = [*inner, *(str(item.message) for item in (*outer, *taken()))]
+
+    with warnings_of_threads() as taken:
+        crew = [threading.Thread(target=work, args=(name,)) for name in "ab"]
+        for thread in crew:
+            thread.start()
+        for thread in crew:
+            thread.join()
+
+    assert found == {name: [f"{name} {at}" for at in ("inner", "outer", "left")] for name in "ab"}

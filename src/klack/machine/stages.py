@@ -1,10 +1,11 @@
 """Stages of a long run: times and warnings."""
 
+import threading
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from time import perf_counter
-from typing import TypeVar
+from typing import Any, TextIO, TypeVar
 
 import numpy as np
 
@@ -24,6 +25,7 @@ __all__ = [
     "stages_with_cached",
     "trial",
     "warnings_of",
+    "warnings_of_threads",
 ]
 
 FAILURES = (KlackError, np.linalg.LinAlgError, MemoryError)
@@ -95,12 +97,51 @@ class StageClock:
         }
 
 
+_of_threads: dict[int, list[warnings.WarningMessage]] | None = None
+
+
+@contextmanager
+def warnings_of_threads() -> Iterator[Callable[[], list[warnings.WarningMessage]]]:
+    """Collect warnings of each thread apart from those of the others.
+
+    Yields a function: warnings of the thread that calls it, since it called last.  Within, only
+    :func:`trial` may catch warnings: their filters belong to the whole process.
+    """
+    global _of_threads
+    before = _of_threads
+    caught: dict[int, list[warnings.WarningMessage]] = {}
+
+    def keep(
+        message: Warning | str,
+        category: type[Warning],
+        filename: str,
+        lineno: int,
+        file: TextIO | None = None,
+        line: str | None = None,
+    ) -> None:
+        mine = caught.setdefault(threading.get_ident(), [])
+        mine.append(warnings.WarningMessage(message, category, filename, lineno, file, line))
+
+    def taken() -> list[warnings.WarningMessage]:
+        return caught.pop(threading.get_ident(), [])
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")
+        original: Any = warnings.showwarning
+        warnings.showwarning = keep
+        _of_threads = caught
+        try:
+            yield taken
+        finally:
+            _of_threads = before
+            warnings.showwarning = original
+
+
 @contextmanager
 def collected_warnings() -> Iterator[list[str]]:
     """Collect accuracy warnings as notes, each once; show others as usual."""
     notes: list[str] = []
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with trial() as caught:
         yield notes
     for item in caught:
         if issubclass(item.category, AccuracyWarning):
@@ -113,10 +154,25 @@ def collected_warnings() -> Iterator[list[str]]:
 
 @contextmanager
 def trial() -> Iterator[list[warnings.WarningMessage]]:
-    """Keep the warnings of a trial; :func:`show` shows those that count."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        yield caught
+    """Keep the warnings of a trial; :func:`show` shows those that count.
+
+    Within :func:`warnings_of_threads` those of this thread alone.
+    """
+    caught = _of_threads
+    if caught is None:
+        with warnings.catch_warnings(record=True) as kept:
+            warnings.simplefilter("always")
+            yield kept
+        return
+    thread, mine = threading.get_ident(), list[warnings.WarningMessage]()
+    before = caught.pop(thread, None)
+    caught[thread] = mine
+    try:
+        yield mine
+    finally:
+        del caught[thread]
+        if before is not None:
+            caught[thread] = before
 
 
 def show(caught: Iterable[warnings.WarningMessage]) -> None:
@@ -147,8 +203,7 @@ def for_comparison(what: str, compute: Callable[[], Found]) -> Found | None:
 @contextmanager
 def warnings_of(run: str) -> Iterator[None]:
     """Begin accuracy warnings with their run."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with trial() as caught:
         yield
     for item in caught:
         text: Warning | str = item.message

@@ -200,7 +200,7 @@ class PointKind(ABC, Generic[CaseT, Built]):
         check
             Called now and then; raises :class:`~klack.analyses.study.computing.Stopped` to give up.
         taken
-            See :func:`klack.analyses.study.computing.warnings_of_threads`.
+            See :func:`klack.machine.stages.warnings_of_threads`.
         """
 
     @abstractmethod

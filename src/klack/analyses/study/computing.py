@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import cache
 from queue import Empty, SimpleQueue
-from typing import Any, TextIO, TypeVar
+from typing import Any, TypeVar
 
 from threadpoolctl import ThreadpoolController
 
@@ -24,7 +24,7 @@ from klack.errors import InputError, KlackError
 from klack.files.closing import Closing
 from klack.machine.cores import available_cores
 from klack.machine.progress import Progress, silent
-from klack.machine.stages import FAILURES, show
+from klack.machine.stages import FAILURES, show, warnings_of_threads
 from klack.signals.sampled import TimeSeries
 
 __all__ = [
@@ -142,39 +142,6 @@ def one_thread_of_blas() -> Iterator[None]:
 @cache  # it looks at all libraries of the process, which takes milliseconds
 def _controller() -> ThreadpoolController:
     return ThreadpoolController()
-
-
-@contextmanager
-def warnings_of_threads() -> Iterator[Callable[[], list[warnings.WarningMessage]]]:
-    """Collect warnings of each thread apart from those of the others.
-
-    Yields a function: warnings of the thread that calls it, since it called last.  Within, nothing
-    else may exchange the filters of warnings: they belong to the whole process.
-    """
-    caught: dict[int, list[warnings.WarningMessage]] = {}
-
-    def keep(
-        message: Warning | str,
-        category: type[Warning],
-        filename: str,
-        lineno: int,
-        file: TextIO | None = None,
-        line: str | None = None,
-    ) -> None:
-        mine = caught.setdefault(threading.get_ident(), [])
-        mine.append(warnings.WarningMessage(message, category, filename, lineno, file, line))
-
-    def taken() -> list[warnings.WarningMessage]:
-        return caught.pop(threading.get_ident(), [])
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("always")
-        original: Any = warnings.showwarning
-        warnings.showwarning = keep
-        try:
-            yield taken
-        finally:
-            warnings.showwarning = original
 
 
 class Agenda:
