@@ -4,7 +4,7 @@ Truth: errors against fine steps alone, extrapolated from three lengths; definit
 """
 
 from dataclasses import fields, replace
-from math import inf, isnan, nan
+from math import inf, isnan, nan, pi, sin, sqrt
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -24,7 +24,11 @@ from klack.analyses.stroke.step_check import ImpactChange, checked_steps, impact
 from klack.app.explorer import Explorer
 from klack.case.any_case import load_valve_case, read_valve_case
 from klack.errors import InputError
+from klack.machine.stages import trial
+from klack.mechanics.end_stop import EndStop
+from klack.mechanics.rigid_mass import RigidMass
 from klack.network.accuracy import PROMISED
+from klack.network.network import Network
 from klack.simulation.network_result import ImpactEvent, NetworkResult
 from klack.simulation.network_run import Watch, simulate_network
 from klack.simulation.step_sizes import StepSizes, scaled
@@ -123,6 +127,34 @@ def test_the_end_of_a_run_cuts_off_what_still_grows():
     (change,) = impact_changes([impact(1e-3)], [rising])
     assert isnan(change.peak_force)
     assert (change.time, change.reason) == (0.0, "not over when the run ends")
+
+
+@pytest.mark.parametrize(("end", "grows"), [(0.3, True), (0.95, True), (1.5, False)])
+def test_the_end_of_a_run_before_the_peak_is_a_doubt(end, grows):
+    """Truth: a mass on a linear stop presses hardest a quarter of a period after the touch.
+
+    A run ends with a whole record, up to 1 us later: 2 % of the quarter.
+    """
+    mass, stiffness, gap, speed = 3e-2, 1e7, 50e-6, 0.5
+    quarter = 0.5 * pi * sqrt(mass / stiffness)
+    law = {"kind": "linear", "stiffness": stiffness}
+    parts = {
+        "needle": RigidMass(mass=mass, speed=speed, points=("tip",)),
+        "stop": EndStop(gap=gap, law=law),
+    }
+    rows = Network(parts, (("needle.tip", "stop.lower"), ("stop.upper", "ground"))).rows()
+
+    with trial() as caught:
+        duration = gap / speed + end * quarter
+        run = simulate_network(rows, duration=duration, step=20e-9, record=1e-6)
+
+    (event,) = run.events
+    reached = speed * sqrt(stiffness * mass) * sin(0.5 * pi * min(end, 1.0))
+    assert (event.grows, event.peak_force) == (grows, pytest.approx(reached, rel=0.07))
+    told = [str(item.message) for item in caught]
+    assert [text.partition(",")[0] for text in told] == [
+        "the run ends during impact 1 on 'stop'" for _ in range(grows)
+    ]
 
 
 @pytest.mark.parametrize("accuracy", ["normal", "fine"])

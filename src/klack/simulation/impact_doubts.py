@@ -1,4 +1,4 @@
-"""What a finished run says of its steps: peaks of first impacts that they do not resolve.
+"""What a finished run says of its impacts: peaks that steps do not resolve or its end cuts off.
 
 A peak force is the largest mean of a step.  Two things make it too low:
 
@@ -13,6 +13,7 @@ phase of that swing.  Steps of length ``h`` make each period ``T`` late by ``(2 
 of it, and steps in which the force rises and falls by ``(2 pi h / T)^4 / 720``.
 """
 
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from math import exp, floor, isfinite, log, log10, nan, pi, sqrt
@@ -27,7 +28,7 @@ from klack.simulation.network_result import ImpactEvent, InterfaceRecord
 from klack.simulation.wave_rows import wave_store
 from klack.units import format_si
 
-__all__ = ["impact_doubts", "late_by_swinging", "line_doubts", "missing_peak"]
+__all__ = ["cut_doubts", "impact_doubts", "late_by_swinging", "line_doubts", "missing_peak"]
 
 
 _PEAK, _LATE = PROMISED["normal"]  # of a peak force, and of the time [s] of a first impact
@@ -36,6 +37,7 @@ _SHORTEST = 1e-9  # [s] shorter ones take too long
 _FEWEST = 8  # steps of a contact; in fewer there is no peak to speak of
 _RESOLVED = 100  # steps of a contact that is as short as those tell
 _BESIDE = 5  # steps before and after a peak that may tell of it
+_FIRST = 3  # impacts on a stop that people look at
 _TRUSTED = 0.02  # of a narrow peak; where more is missing, three steps do not tell how much
 
 
@@ -97,6 +99,20 @@ def impact_doubts(
             f"{format_si(length, 's', 3)}. Try: run.step: {format_si(shorter, 's', 3)}"
             f"{better if is_known else ''}."
         )
+
+
+def cut_doubts(events: Sequence[ImpactEvent]) -> Iterator[str]:
+    """Sentences on impacts, the first three on each stop, whose peak the end of a run cuts off."""
+    count = Counter[str]()
+    for event in events:
+        count[event.stop] += 1
+        if event.grows and count[event.stop] <= _FIRST:
+            yield (
+                f"the run ends during impact {count[event.stop]} on '{event.stop}', "
+                f"{format_si(event.contact_time, 's', 3)} after its first touch, while its force "
+                f"grows: {format_si(event.peak_force, 'N', 4)} is not its peak, and contact time "
+                "and impulse are not complete. Try: a longer run.duration."
+            )
 
 
 def _unresolved(event: ImpactEvent, step: float) -> str:

@@ -69,6 +69,9 @@ class InterfaceRecord:
     complete: bool
 
 
+_LATE = 0.75  # of a contact that is not over: a peak after that may still grow
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImpactEvent:
     """One impact: contacts closer together than the longest period of the needle are one.
@@ -124,6 +127,11 @@ class ImpactEvent:
     def is_over(self) -> bool:
         """Whether the bodies have parted, or come to rest."""
         return isfinite(self.restitution) or bool(self.besides)
+
+    @property
+    def grows(self) -> bool:
+        """Whether the run ends before its highest force: in the last quarter of its contact."""
+        return not self.is_over and self.peak_time - self.time > _LATE * self.contact_time
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -40,7 +40,6 @@ SHARE = 0.5
 _PROMISED = 3  # impacts on each stop
 _TOLD = 3  # impacts in a sentence
 _PARTS = 4  # of a run that may end early after each but the last two: a look takes 0.3 ms
-_LATE = 0.75  # of a contact that is not over: a peak after that may still grow
 _SLOW = "slower than 2 % of the fastest impact on this stop"
 _AFTER = "after all that was asked for"
 _OPEN = "not over when the run ends"
@@ -240,7 +239,7 @@ def _change(event: ImpactEvent, other: ImpactEvent, number: int) -> ImpactChange
     """Change of one impact, without what the end cuts off."""
     both = (event, other)
     over = all(e.is_over for e in both)
-    grows = not over and any(e.peak_time - e.time > _LATE * e.contact_time for e in both)
+    grows = any(e.grows for e in both)
     return ImpactChange(
         number=number,
         time=other.time - event.time,
