@@ -8,6 +8,7 @@ from contextlib import suppress
 from dataclasses import replace
 from importlib.resources import files
 from io import BytesIO
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +30,7 @@ from klack.report.chart import (
     Panel,
     ParallelAxis,
     ParallelChart,
+    mark_rows,
 )
 from klack.report.html import render_html
 from klack.report.interactive import figure_of
@@ -150,6 +152,16 @@ def test_a_section_that_fits_fills_the_page_before_a_tall_figure():
     content = replace(tall, sections=(*tall.sections, *(5 * (short,))))
 
     assert pages_of(render_pdf(content)) == pages_of(render_pdf(tall))
+
+
+def test_the_section_after_a_tall_figure_begins_before_it_where_one_of_its_figures_fits():
+    """Of 133 mm on a page of 259 mm: one below the head, two on the next; then two of 204 mm."""
+    tall, tall_too = one_chart_each(2, panels=4).sections
+    charts = tuple(chart for one in one_chart_each(3).sections for chart in one.charts)
+    three = Section(title="Three", charts=charts)
+    content = replace(_EMPTY, numbers=table_of(3, 12), sections=(tall, three, tall_too))
+
+    assert pages_of(render_pdf(content)) == 5  # the last one has the words
 
 
 def test_pictures_leave_the_size_of_their_letters_to_the_style():
@@ -281,6 +293,35 @@ def test_a_legend_is_seen_whole(names: tuple[str, ...]):
 
     assert frame.x0 <= box.x0
     assert box.x1 <= frame.x1
+
+
+def test_labels_of_upright_lines_hide_neither_curves_nor_each_other():
+    """On paper above even a low panel; a row of its own only where two names would meet."""
+    x = np.linspace(0.0, 5.0, 5)
+    names = {0.2: "opening stop touched", 2.5: "drive ends", 2.8: "seat touched", 4.9: "last one"}
+    panel = Panel(
+        y=AxisSpec(label="voltage", unit="V"),
+        curves=(Curve(x=x, y=x, label="line"),),
+        marks=(
+            *(Mark(value=at, label=name) for at, name in names.items()),
+            Mark(value=9.0, label="far"),
+        ),
+        share=0.4,
+    )
+    chart = Chart(name="low", title="low", x=AxisSpec(label="x"), panels=(panel, panel))
+    axes = shown_chart(chart)
+    axes[0].figure.draw_without_rendering()
+    boxes = [[text.get_window_extent() for text in one.texts] for one in axes]
+    frames = [one.get_window_extent() for one in axes]
+    whole = axes[0].figure.bbox
+    pyplot.close(axes[0].figure)
+
+    rows = {mark.label: row for mark, row in mark_rows(chart, panel, 60.0)}
+    assert rows == {name: int(name == "seat touched") for name in names.values()}
+    for above, frame in zip(boxes, frames, strict=True):
+        assert all(box.y0 >= frame.y1 and box.x1 <= whole.x1 for box in above)
+    drawn = [*boxes[0], *boxes[1], *frames]
+    assert not any(a.overlaps(b) for a, b in combinations(drawn, 2))
 
 
 @pytest.mark.parametrize("at", [0.0, 0.3, 0.7, 1.0])

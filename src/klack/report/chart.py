@@ -19,7 +19,6 @@ __all__ = [
     "AREA_OPACITY",
     "COLOURS",
     "DASHES",
-    "LABEL_STEP",
     "AnyChart",
     "AxisSpec",
     "Band",
@@ -34,6 +33,7 @@ __all__ = [
     "RingFrames",
     "dots",
     "frame_text",
+    "mark_rows",
     "squeezed",
     "stems",
     "ticks_of",
@@ -137,8 +137,7 @@ DASHES: dict[Style, tuple[float, ...]] = {
 
 AREA_OPACITY = 0.3
 
-LABEL_STEP = 0.13
-"""Share of the panel between labels of vertical marks."""
+_MARGIN = 0.05
 
 _TURNING = 0.6
 """Share of the x axis beyond which labels stand left of their lines, also where it is narrow."""
@@ -260,16 +259,24 @@ class Chart:
 
     def turns(self, x: float) -> bool:
         """Whether a label at this value stands left of it: the right end would cut it."""
-        low, high = self._ends
-        if self.x.log:
-            if min(low, x) <= 0.0:
-                return False
-            low, high, x = log10(low), log10(high), log10(x)
-        return high > low and (x - low) / (high - low) > _TURNING
+        return self.share(x) > _TURNING
 
     def label_place(self, band: Band) -> float:
         """Where the label of a band stands: at its left end, as far as the axis shows it."""
         return max(band.low, self._ends[0])
+
+    def share(self, x: float) -> float:
+        """Place along the x axis: 0 at its left end, 1 at its right one."""
+        low, high = self._ends
+        if self.x.log:
+            if min(low, x) <= 0.0:
+                return 0.0
+            low, high, x = log10(low), log10(high), log10(x)
+        return (x - low) / (high - low) if high > low else 0.0
+
+    def shows(self, x: float) -> bool:
+        """Whether a value lies on the axis or in the margin of one without a range."""
+        return -_MARGIN <= self.share(x) <= 1.0 + _MARGIN
 
     @property
     def _ends(self) -> tuple[float, float]:
@@ -280,6 +287,25 @@ class Chart:
         known = np.concatenate(drawn) if drawn else np.zeros(0)
         known = known[np.isfinite(known) & (known > 0.0 if self.x.log else True)]
         return (float(known.min()), float(known.max())) if known.size else (0.0, 0.0)
+
+
+def mark_rows(chart: Chart, panel: Panel, letters: float) -> tuple[tuple[Mark, int], ...]:
+    """Row of each label of an upright line, where none covers another; ``letters`` span the axis.
+
+    Lines outside the axis have no label.
+    """
+    ends: list[float] = []
+    rows = []
+    upright = [mark for mark in panel.marks if mark.label and mark.axis == "x"]
+    for mark in sorted(upright, key=lambda mark: mark.value):
+        if not chart.shows(mark.value):
+            continue
+        place, width = chart.share(mark.value), (len(mark.label) + 2) / letters
+        begin = place - width if chart.turns(mark.value) else place
+        row = next((row for row, end in enumerate(ends) if end <= begin), len(ends))
+        ends[row:] = [begin + width, *ends[row + 1 :]]
+        rows.append((mark, row))
+    return tuple(rows)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

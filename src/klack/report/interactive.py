@@ -11,7 +11,6 @@ from klack.report.chart import (
     AREA_OPACITY,
     COLOURS,
     DASHES,
-    LABEL_STEP,
     AnyChart,
     AxisSpec,
     BarChart,
@@ -20,6 +19,7 @@ from klack.report.chart import (
     ParallelChart,
     RingFrames,
     frame_text,
+    mark_rows,
     squeezed,
     ticks_of,
 )
@@ -150,6 +150,8 @@ _LAYOUT: dict[str, Any] = {
 }
 _PANEL_HEIGHT = 330
 _PANEL_GAP = 0.06
+_LABEL_STEP = 0.05  # share of the panel of the share 1 that a line of letters takes
+_LETTERS_ON_TELEPHONE = 42.0  # along the x axis of 400 px
 
 
 def figure_of(chart: AnyChart) -> dict[str, Any]:
@@ -363,7 +365,6 @@ def _add_marks(layout: dict[str, Any], chart: Chart, index: int) -> None:
             layout["annotations"].append(
                 _label(chart, band.label, chart.label_place(band), 0.02, y_axis)
             )
-    upright = [mark for mark in panel.marks if mark.label and mark.axis == "x"]
     for mark in panel.marks:
         across = mark.axis == "y"
         layout["shapes"].append(
@@ -378,8 +379,8 @@ def _add_marks(layout: dict[str, Any], chart: Chart, index: int) -> None:
                 "line": {"color": "#5b626b", "width": 1, "dash": "3px,3px"},
             }
         )
-    for i, mark in enumerate(upright):  # one below the other
-        height = 0.98 - LABEL_STEP * i
+    for mark, row in mark_rows(chart, panel, _LETTERS_ON_TELEPHONE):
+        height = 0.98 - _LABEL_STEP / panel.share * row
         layout["annotations"].append(_label(chart, mark.label, mark.value, height, y_axis))
 
 

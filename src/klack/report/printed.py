@@ -23,16 +23,18 @@ from klack.report.chart import (
     AREA_OPACITY,
     COLOURS,
     DASHES,
-    LABEL_STEP,
     AnyChart,
     AxisSpec,
+    Band,
     BarChart,
     Chart,
     Curve,
+    Mark,
     Panel,
     ParallelChart,
     RingFrames,
     frame_text,
+    mark_rows,
     squeezed,
     ticks_of,
 )
@@ -43,6 +45,7 @@ __all__ = ["STYLE", "plain", "png_chart", "shown_chart", "svg", "svg_chart", "wr
 _SHOWN, _COLUMNS = 10, 5
 _INNER = 0.5
 _GREY = "#8A8F98"
+_SOFT = "#444a52"
 
 
 Blank = Callable[..., Figure]
@@ -116,8 +119,11 @@ def _draw(axes: Any, chart: RingFrames, k: int, norm: Normalize) -> PatchCollect
 LETTERS = 9.8
 """Size of letters [pt]: 8 on a page that draws a figure at 0.82 of its size, see template.typ."""
 
-_LINE = 0.1
-"""Share of a panel of the share 1 that a line of letters takes."""
+_LINE = 13.0
+"""Height of a line of letters [pt]."""
+
+_LETTERS_PER_INCH = 10.5
+"""Of the width of a figure, whose x axis is some 0.85 of it."""
 
 _WIDTH = 6.7
 """Text width of an A4 page [in]."""
@@ -246,12 +252,17 @@ def _parallel(chart: ParallelChart, width: float, blank: Blank) -> Figure:
 
 def _curves(chart: Chart, width: float, blank: Blank) -> Figure:
     shares = [panel.share for panel in chart.panels]
-    figure = blank(figsize=(width, 0.9 + 1.7 * sum(shares)), layout="constrained")
+    rows = [mark_rows(chart, panel, _LETTERS_PER_INCH * width) for panel in chart.panels]
+    lines = sum(1 + max((row for _, row in marks), default=-1) for marks in rows)
+    height = 0.9 + 1.7 * sum(shares) + _LINE * lines / 72.0
+    figure = blank(figsize=(width, height), layout="constrained")
     grid = figure.subplots(
         len(shares), 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": shares}
     )[:, 0]
-    for panel, axes in zip(chart.panels, grid, strict=True):
+    for panel, marks, axes in zip(chart.panels, rows, grid, strict=True):
         _draw_panel(axes, panel, chart)
+        for mark, row in marks:
+            _label_above(axes, chart, mark, row)
     _scale(grid[-1], chart.x, "x")
     _legend(figure, grid)
     return figure
@@ -302,15 +313,12 @@ def _draw_panel(axes: Any, panel: Panel, chart: Chart) -> None:
     for band in panel.bands:
         axes.axvspan(band.low, band.high, color="#dbe9f6", alpha=0.45, linewidth=0, zorder=0)
         if band.label:
-            place = chart.label_place(band)
-            _note(axes, place, 0.02, band.label, "bottom", turned=chart.turns(place))
+            _label_band(axes, chart, band)
     for mark in panel.marks:
+        if mark.axis == "x" and not chart.shows(mark.value):
+            continue  # it would lengthen the axis
         draw = axes.axvline if mark.axis == "x" else axes.axhline
         draw(mark.value, color="#5b626b", linewidth=0.7, dashes=(3, 3), zorder=1)
-    upright = [mark for mark in panel.marks if mark.label and mark.axis == "x"]
-    for i, mark in enumerate(upright):
-        height = 0.98 - max(LABEL_STEP, _LINE / panel.share) * i
-        _note(axes, mark.value, height, mark.label, "top", turned=chart.turns(mark.value))
     for curve in panel.curves:
         _draw_curve(axes, curve)
     _scale(axes, panel.y, "y")
@@ -341,17 +349,33 @@ def _draw_curve(axes: Any, curve: Curve) -> None:
         line.set_dashes([0.6 * length for length in DASHES[curve.style]])
 
 
-def _note(axes: Any, x: float, y: float, text: str, height: str, *, turned: bool) -> None:
+def _label_band(axes: Any, chart: Chart, band: Band) -> None:
+    x = chart.label_place(band)
+    turned = chart.turns(x)
     axes.text(
         x,
-        y,
-        plain(f"{text} " if turned else f" {text}"),
+        0.02,
+        plain(f"{band.label} " if turned else f" {band.label}"),
         transform=axes.get_xaxis_transform(),
         ha="right" if turned else "left",
-        va=height,
-        color="#444a52",
+        va="bottom",
+        color=_SOFT,
         clip_on=True,
         bbox=_BEHIND,
+    )
+
+
+def _label_above(axes: Any, chart: Chart, mark: Mark, row: int) -> None:
+    """Name of an upright line above the panel, whose curves it would hide."""
+    axes.annotate(
+        plain(mark.label),
+        (mark.value, 1.0),
+        xycoords=axes.get_xaxis_transform(),
+        xytext=(0.0, 2.0 + _LINE * row),
+        textcoords="offset points",
+        ha="right" if chart.turns(mark.value) else "left",
+        va="bottom",
+        color=_SOFT,
     )
 
 
