@@ -172,7 +172,7 @@ RATE = Kind(
     largest=1e15,
 )
 ROTATION = Kind(
-    "a speed of rotation",
+    "a rotational speed",
     "1/s",
     "2000 rpm",
     ("rpm", "1/min", "1/s"),
@@ -227,16 +227,16 @@ FLUX = Kind("a magnetic flux", "Wb", "20 uWb", ("Wb", "mWb", "uWb"), smallest=1e
 CELSIUS = "degC"
 TEMPERATURE = Kind("a temperature", "K", "20 degC", ("degC", "K"), {"K": 1.0}, largest=1e6)
 TEMPERATURE_RISE = Kind(
-    "a difference of temperatures", "K", "5 K", ("K", "mK"), {"K": 1.0, "mK": 1e-3}, largest=1e6
+    "a temperature difference", "K", "5 K", ("K", "mK"), {"K": 1.0, "mK": 1e-3}, largest=1e6
 )
 HEAT_CAPACITY = Kind("a heat capacity", "J/K", "14 J/K", ("J/K", "kJ/K"))
 SPECIFIC_HEAT = Kind("a specific heat", "J/kg/K", "385 J/kg/K", ("J/kg/K", "kJ/kg/K"))
 CONDUCTANCE = Kind("a thermal conductance", "W/K", "0.6 W/K", ("W/K", "mW/K"))
 HEAT_TRANSFER = Kind("a heat transfer coefficient", "W/m^2/K", "12 W/m^2/K", ("W/m^2/K",))
-EXPANSION = Kind("a coefficient over temperature", "1/K", "12e-6 1/K", ("1/K", "um/m/K"))
+EXPANSION = Kind("a temperature coefficient", "1/K", "12e-6 1/K", ("1/K", "um/m/K"))
 LEVEL = Kind("a level", "dB", "35 dB", ("dB",), {"dB": 1.0, "dBA": 1.0, "dB(A)": 1.0})
 RATIO = Kind(
-    "a number without unit",
+    "a number without a unit",
     "-",
     "0.3",
     ("%",),
@@ -357,7 +357,7 @@ def _of_expression(value: Computed, kind: Kind, where: str) -> float:
             where,
             got=str(value),
             expected=kind.name if kind.bare else f"{kind.name} [{kind.unit}]",
-            hint="check the powers and the units in the expression.",
+            hint="check the exponents and the units in the expression.",
         )
     result = value.value if kind.factors else float(f"{value.value:.15g}")
     return _in_range(result, value, kind, where)
@@ -376,7 +376,7 @@ def _in_range(result: float, value: object, kind: Kind, where: str) -> float:
     if kind.holds(result):
         return result
     unit = "" if kind.unit == "-" else f" {kind.unit}"
-    sizes = f" of a size between {kind.smallest:g} and {kind.largest:g}{unit}, or 0"
+    sizes = f" of a magnitude between {kind.smallest:g} and {kind.largest:g}{unit}, or 0"
     raise QuantityError(
         where, value, kind, "check the power of ten and the unit.", expected=f"{kind.name}{sizes}"
     )
@@ -388,7 +388,7 @@ def _split(text: str, kind: Kind, where: str) -> tuple[float, str]:
     if match is None:
         hint = f'write one number and one unit, e.g. "{kind.example}".'
         if re.match(r"[+-]?\d+,\d", squeezed):
-            hint = f'use a point as decimal sign: "{squeezed.replace(",", ".", 1)}".'
+            hint = f'use a decimal point: "{squeezed.replace(",", ".", 1)}".'
         elif re.search(r"[A-Za-z][23²³]$", squeezed):
             power = {"²": "2", "³": "3"}.get(squeezed[-1], squeezed[-1])
             hint = f"write a power with ^: {squeezed[:-1]}^{power}."
@@ -445,7 +445,7 @@ def base_powers(unit: str) -> tuple[tuple[str, Fraction], ...]:
     """
     if unit in ("", "-", "1"):
         return ()
-    hint = f"use an SI unit without prefix, e.g. {LENGTH.unit} or {STIFFNESS.unit}."
+    hint = f"use an SI unit without a prefix, e.g. {LENGTH.unit} or {STIFFNESS.unit}."
     try:
         size = _registry().Quantity(1.0, unit).to_base_units()
         dimension = _registry().get_dimensionality(size.units)
@@ -706,7 +706,7 @@ def parse_temperature(value: str, where: str = "temperature") -> float:
 def _length_unit(value: object) -> float:
     """Metres in the unit of a file or outline: ``mm`` -> 0.001."""
     if not isinstance(value, str) or not re.fullmatch(_ATOM, value):
-        hint = "write the unit alone: mm."
+        hint = "write only the unit: mm."
         raise InputError("unit", got=f"'{value}'", expected="a unit of length", hint=hint)
     return parse_quantity(f"1 {value}", LENGTH)
 

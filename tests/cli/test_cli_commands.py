@@ -171,7 +171,7 @@ def test_bad_arguments_give_one_message_and_exit_2(name, capsys, tmp_path):
         ("needle.tip", "needle.tipp", ":42: contact.between[0]", "did you mean 'tip'"),
         ("count: 20", "count: 0", ":45: reduction.modes.needle.count", "0 modes"),
         ("gap: 0", "gap: -2 um", ":43: contact.gap", "already penetrate"),
-        ("title:", "title: a\ntitle:", ":3: title", "a second time"),
+        ("title:", "title: a\ntitle:", ":3: title", "for the second time"),
         ("klack: 1", "hello", ":1", "without 'key: value'"),  # where it stands
     ],
 )

@@ -94,7 +94,7 @@ def test_a_stroke_agrees_with_itself(result, tmp_path, capsys):
         "opening stop #1",
         f"Excellent agreement of 'wet' with {STROKES} measured strokes",
         "Rule: the agreement is excellent if",
-        "Later impacts and the lift between the stops are shown, not counted.",
+        "Later impacts and the lift between the stops are shown, but not judged.",
     ):
         assert part in out
 
@@ -142,7 +142,7 @@ def test_one_stroke_has_no_scatter(result, tmp_path):
 
     assert found["strokes"] == 1
     assert "times the reading error" in found["verdict"]
-    assert "does not show the scatter of strokes" in found["verdict"]
+    assert "does not show the scatter between strokes" in found["verdict"]
     for impact in found["impacts"]:
         assert impact["time_scatter_s"] is None
         expected = impact["time_difference_s"] / impact["time_reading_error_s"]

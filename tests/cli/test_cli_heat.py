@@ -79,7 +79,7 @@ def test_soaked_strokes_with_their_causes(case, tmp_path, capsys):
 WRONG = {
     "no unit": (["--soak", "20"], "without unit"),
     "below zero": (["--soak", "-300 degC"], "one above 0 K"),
-    "both": (["--soak", "20 degC", "--duration", "1 s"], "a duration beside --soak"),
+    "both": (["--soak", "20 degC", "--duration", "1 s"], "a duration together with --soak"),
     "no time": (["--duration", "0 s"], "above 0 s"),
 }
 

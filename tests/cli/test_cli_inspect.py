@@ -399,7 +399,7 @@ def test_a_valve_shows_travels_pairs_and_a_first_speed(tmp_path: Path, capsys):
     assert "needle 1.25 g, travels from 0 m (seat) to 60 um (pole)" in shown
     assert "armature 1.6 g, travels from 0 m (seat and rest) to 100 um (pole)" in shown
     assert (
-        "gap 0 m, opens to 60 um, at most 100 um if it flies on" in shown
+        "gap 0 m, opens to 60 um, at most 100 um if it continues in flight" in shown
     )  # the needle to the pole
     assert "carry needle.collar on armature.top: gap 40 um, opens to 40 um" in shown
     assert "rest armature.bottom on needle.ring: gap 0 m, opens to 40 um" in shown

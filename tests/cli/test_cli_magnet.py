@@ -166,7 +166,7 @@ def test_doubts_and_a_gap_that_opens_the_other_way(pot, capsys, tmp_path):
     said = " ".join(capsys.readouterr().out.split())
     assert "beyond the last measured point" in said
     # two currents on the knee: linkages give another force than the fields, and that is told
-    assert "a stroke takes the force from the linkages" in said
+    assert "a stroke derives the force from the linkages" in said
     assert "Try: more currents there, or more gaps." in said
 
     # iron far away, whose force is that of the mesh

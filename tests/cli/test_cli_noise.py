@@ -270,7 +270,7 @@ def _older(impact: Path, heard: Path, folder: Path) -> list[str]:
         (_no_result, ["neither a file nor a shipped case"]),
         (_its_own, ["klack noise study", "the result of an impact or a stroke"]),
         (_no_level, ["'ful'", "reduced", "lumped"]),
-        (_variant, ["level: got 'wet'", "impacts have levels, variants are of strokes: --level"]),
+        (_variant, ["level: got 'wet'", "impacts have levels, strokes have variants: --level"]),
         (_older, ["an earlier version of klack", "run the case again"]),
     ],
 )

@@ -83,9 +83,9 @@ def test_the_far_point_is_told_and_asked_for(capsys):
     [
         (("--current", "1 A"), "--current: got a value without --steady"),
         (("--steady", "--over", "coil force"), "--over: got a value without --sweep"),
-        (("--steady", "--duration", "1 ms"), "--duration: got a value beside --steady"),
+        (("--steady", "--duration", "1 ms"), "--duration: got a value together with --steady"),
         (("--steady", "--current", "1"), "unit"),
-        (("--steady", "--variant", "dry,dry"), "2 variants beside --steady"),
+        (("--steady", "--variant", "dry,dry"), "2 variants together with --steady"),
         (("--steady", "--sweep", "lift", "0 um", "90 um", "1"), "2 or more"),
         (("--steady", "--sweep", "lift", "0 um", "90 um", "3", "--show", "coil"), "did you mean"),
     ],

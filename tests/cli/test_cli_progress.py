@@ -83,7 +83,7 @@ def test_waiting_for_another_process_is_told_as_waiting(screen, monkeypatch):
         progress("run", 0.0)
         with event.trigger_event("numba:compile"):  # of a function that calls the other's
             with event.trigger_event("klack:wait"):
-                assert screen.shows("run: waiting for another process that compiles")
+                assert screen.shows("run: waiting while another process compiles")
             assert screen.shows("run: compiling (once)")
 
 
@@ -97,7 +97,7 @@ def test_lines_tell_compiling_and_waiting_once_each(capsys):
                 pass
 
     told = [line.partition(";")[0] for line in capsys.readouterr().err.splitlines()]
-    assert told == ["waiting for another process that compiles", "compiling (once)"]
+    assert told == ["waiting while another process compiles", "compiling (once)"]
 
 
 def test_a_stage_that_lasts_is_told_at_its_beginning_and_again(monkeypatch, capsys):

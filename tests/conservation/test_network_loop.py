@@ -477,7 +477,7 @@ def test_memory_of_the_records_is_asked_for_before_the_run(monkeypatch: pytest.M
     small = memory.AvailableMemory(size=100e6, bound="as in this test")
     monkeypatch.setattr(memory, "available_memory", lambda: small)
     with pytest.raises(
-        InputError, match=r"record: got \d+ records of \d+ channels that takes about 9 GB"
+        InputError, match=r"record: got \d+ records of \d+ channels needing about 9 GB"
     ):
         simulate_network(switched_valve(), duration=60.0, step=50e-9, record=0.8e-6)
 

@@ -168,7 +168,7 @@ def flux_maps(draw) -> FluxMap:
 
 @st.composite
 def rough_maps(draw) -> FluxMap | None:
-    """Any table that rises with the current; None where it is refused."""
+    """Any table that increases with the current; None where it is refused."""
     count, gaps = draw(st.integers(2, 6)), draw(st.integers(3, 6))
     rises = st.lists(log_range(0.1, 1.0), min_size=gaps, max_size=gaps)
     table = np.cumsum([draw(rises) for _ in range(count)], axis=0)

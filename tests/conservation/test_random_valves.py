@@ -117,7 +117,10 @@ def test_every_component_type_is_drawn():
     ("words", "told"),
     [
         ("coil: the gap is -17 um at 711.68 us, far outside its range.\nTry: a longer gap.", True),
-        ("before, at the start: the pressures find no steady flow.\nTry: state them.", True),
+        (
+            "before, at the start: no steady flow was found for the pressures.\nTry: state them.",
+            True,
+        ),
         ("the forces at the ports did not converge at 711.68 us.\nTry: a smaller step.", False),
         ("coil: the gap is -17 um, far outside its range.\nTry: a longer gap.", False),
         ("coil: the gap is -17 um at 711.68 us.", False),

@@ -217,7 +217,12 @@ def bodies_of(draw: np.random.Generator, damped: bool) -> list[CraigBampton]:
     return found
 
 
-REFUSED = ("no response of the receiver", "no freedom that source", "got feet", " feet, expected")
+REFUSED = (
+    "no response of the receiver",
+    "no degree of freedom that source",
+    "got feet",
+    " feet, expected",
+)
 
 
 @pytest.mark.filterwarnings("ignore::klack.errors.AccuracyWarning")
@@ -288,5 +293,5 @@ def test_100_random_bodies_that_stand_on_machines() -> None:
         size = np.abs(source.free_velocity[:, here]).max(axis=0)
         assert (np.abs(velocity - coupled.source_velocity).max(axis=0) <= 1e-6 * size).all(), seed
     assert len(told) < 40
-    parts = (*REFUSED, "feet that turn it", "an element on an infinite plate")
+    parts = (*REFUSED, "feet that rotate it", "an element on an infinite plate")
     assert all(any(part in text for part in parts) for text in told)

@@ -126,7 +126,7 @@ def test_the_end_of_a_run_cuts_off_what_still_grows():
     rising = impact(1e-3, restitution=nan, peak_time=1.005e-3)
     (change,) = impact_changes([impact(1e-3)], [rising])
     assert isnan(change.peak_force)
-    assert (change.time, change.reason) == (0.0, "not over when the run ends")
+    assert (change.time, change.reason) == (0.0, "not finished when the run ends")
 
 
 @pytest.mark.parametrize(("end", "grows"), [(0.3, True), (0.95, True), (1.5, False)])
@@ -459,7 +459,7 @@ def test_a_stroke_tells_its_changes_after_storing(tmp_path):
     (change,) = made.reference.changes
     assert loaded.reference.changes == made.reference.changes
     assert loaded.reference.halvings == made.reference.halvings == 6
-    assert "50 ns; halved, since impacts depended on them: 6 times" in steps_told(loaded.reference)
+    assert "50 ns; halved because impacts depended on them: 6 times" in steps_told(loaded.reference)
     (event,) = STROKE.to_json(loaded)["events"]
     assert event["doubled_steps"]["peak_force_change"] == change.peak_force
     assert event["doubled_steps"]["promised"]

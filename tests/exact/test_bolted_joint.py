@@ -320,8 +320,8 @@ def test_ends_that_cannot_press_are_refused():
     profiles = plates()
     for ends, message in (
         (("head", "over"), r"joint 'joint'.*the same side of the joint"),
-        (("head", "joint"), "'joint' is no straight edge of one part"),
-        (("head", "nut"), "'nut' is no straight edge of one part"),
+        (("head", "joint"), "'joint' is not a straight edge of one part"),
+        (("head", "nut"), "'nut' is not a straight edge of one part"),
     ):
         with pytest.raises(InputError, match=message):
             clamped(profiles, dict.fromkeys(profiles, STEEL), 1e-3, ends=ends)

@@ -121,7 +121,7 @@ def test_elements_too_large_for_the_wave_are_refused() -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda nodes: nodes[::-1], "air to its left"),
+        (lambda nodes: nodes[::-1], "air on its left"),
         (lambda nodes: nodes[3:], "not closed"),
         (lambda nodes: nodes * (-1.0, 1.0), "negative or unknown radius"),
         (lambda nodes: nodes[:2], "array of shape"),
@@ -163,5 +163,5 @@ def test_triangles_that_do_not_close() -> None:
     whole = box(0.5)
     with pytest.raises(InputError, match="edges without a neighbour"):
         replace(whole, corners=whole.corners[1:])
-    with pytest.raises(InputError, match="normals into the body"):
+    with pytest.raises(InputError, match="normals that point into the body"):
         replace(whole, corners=whole.corners[:, ::-1])

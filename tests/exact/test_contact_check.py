@@ -322,8 +322,12 @@ def test_a_set_of_faces_in_a_mesh_is_known_by_its_name():
 @pytest.mark.parametrize(
     ("needed", "words"),
     [
-        (0.4e9, "stay elastic from a yield stress of about 400 MPa on"),
-        (5.5e9, "would yield: elastic ones need a yield stress of 5.5 GPa, and hardened steel has"),
+        (0.4e9, "stay elastic if the yield stress is at least about 400 MPa"),
+        (
+            5.5e9,
+            "would yield: to stay elastic they need a yield stress of 5.5 GPa, and hardened "
+            "steel has",
+        ),
         (float("nan"), ""),
     ],
 )

@@ -213,7 +213,7 @@ def test_a_form_that_does_not_fit_is_one_clear_error(tmp_path, contact, solid, w
 @pytest.mark.parametrize("key", ["crown: 1 um", "roughness: {curve: [[1 um, 1 MPa]]}"])
 def test_a_deck_of_calculix_has_no_form(tmp_path, key):
     """It holds the meshes alone, which stay plane."""
-    with pytest.raises(InputError, match="which the meshes do not have"):
+    with pytest.raises(InputError, match="which the meshes do not contain"):
         calculix_impact(case(tmp_path, key, solid=True), silent)
 
 

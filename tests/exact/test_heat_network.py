@@ -193,7 +193,7 @@ def test_a_step_ends_at_every_corner_of_a_table():
 def test_heat_without_a_way_out_is_refused_unless_it_ends():
     network = made({"part": HeatCapacity(capacity=2.0)}, [])
 
-    with pytest.raises(InputError, match="4 W into 'part', from where no path leads to ambient"):
+    with pytest.raises(InputError, match="4 W into 'part', without a path to ambient"):
         warm_up(network, lambda T: np.full(1, 4.0))
     found = warm_up(network, lambda T: np.full(1, 4.0), SlowSettings(duration=10.0))
 

@@ -81,7 +81,7 @@ def slopes_by_differences(row, p_a, p_b, state=None, change=10.0, **numbers):
 def test_parts_without_a_viscosity_law_say_so():
     oil = FluidChoice(name="ISO VG 46", viscosity_law="barus").at(313.15)
     rows = Rows(ambient=AMBIENT, fluid=oil, component="pipe", handles=HANDLES)
-    with pytest.warns(AccuracyWarning, match="pipe: its laminar flow has the viscosity at one"):
+    with pytest.warns(AccuracyWarning, match="pipe: its laminar flow uses the viscosity at one"):
         PipeFriction(diameter=3e-3, length=1.0).add_rows(rows)
 
 

@@ -435,7 +435,7 @@ def test_a_source_is_the_same_after_its_file(tmp_path: Path) -> None:
         read_source(tmp_path / "bad.nc")
     with scipy.io.netcdf_file(tmp_path / "other.nc", "w") as file:
         file.createDimension("x", 2)
-    with pytest.raises(InputError, match="a source that klack noise wrote"):
+    with pytest.raises(InputError, match="a source written by klack noise"):
         read_source(tmp_path / "other.nc")
 
 

@@ -514,7 +514,7 @@ def test_contradicting_force_is_reported_and_not_used():
     linkage = CURRENT[:, None] * inductance(GAP)
     force = 0.5 * np.array([[-(i**2) * 1e-8 / (x + 50e-6) ** 2 for x in GAP] for i in CURRENT])
 
-    with pytest.warns(AccuracyWarning, match="only one of them can conserve energy"):
+    with pytest.warns(AccuracyWarning, match="only it conserves energy"):
         made = FluxMap.of(current=CURRENT, gap=GAP, linkage=linkage, force=1.3 * force)
 
     assert made.force_at(10 * inductance(60e-6), 60e-6) == pytest.approx(
@@ -567,7 +567,7 @@ def test_a_table_that_jumps_between_two_gaps_is_refused():
     current, gap = [1.0, 2.0, 3.0], [1e-5, 2e-5, 3e-5, 4e-5, 5e-5]
     rise = np.array([[1.0, 1.0, 1.0, 1.0, 1.0], [5e-3, 5e-3, 1.0, 5e-3, 5e-3], [1.0] * 5])
 
-    with pytest.raises(InputError, match="so abruptly between the gaps 10 um and 20 um"):
+    with pytest.raises(InputError, match="too abruptly between the gaps 10 um and 20 um"):
         FluxMap.of(current=current, gap=gap, linkage=1e-3 * np.cumsum(rise, axis=0), force=None)
 
 

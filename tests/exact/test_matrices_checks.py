@@ -180,7 +180,7 @@ def test_wrong_units_are_named_with_those_that_fit(body, taken, right):
     assert f"in {taken.name}" in text
     assert "with units:" in text or "unit of the coordinates" in text
     if taken.name == "m kg s":
-        assert "with units: mm t s it would be 7850 kg/m^3 and 282.7 GPa" in text
+        assert "with units: mm t s they would be 7850 kg/m^3 and 282.7 GPa" in text
 
 
 def test_a_wrong_unit_of_the_coordinates_shows_in_density_and_wave_speed(body):

@@ -516,5 +516,5 @@ def test_a_stop_against_what_cannot_give_way_is_refused(other):
         parts["second"], low = LIFT_MOTION, "second.body"
     ends = [["needle.body", "spring.end"], ["lift.body", "stop.upper"], [low, "stop.lower"]]
 
-    with pytest.raises(InputError, match="nothing that gives way"):
+    with pytest.raises(InputError, match="nothing that can yield"):
         Network(parts, ends).rows()

@@ -112,5 +112,5 @@ def test_read_at_the_port_it_is_the_reciprocal_impact():
 
 def test_a_node_that_moves_against_the_load_is_refused():
     body = two_modes()
-    with pytest.raises(InputError, match="take a node at the contact surface"):
+    with pytest.raises(InputError, match="use a node on the contact surface"):
         run(body, body.port_shapes[:, 0] * [1.0, -3.0], 12e-6)

@@ -371,7 +371,7 @@ def test_parts_that_are_glued_otherwise_are_refused():
     }
     with pytest.raises(InputError, match="joints that meet in a corner"):
         pressed(parts, dict.fromkeys(parts, STEEL), {"low": 1e-6, "high": 2e-6}, 0.4e-3)
-    with pytest.raises(InputError, match=r"joint 'low': got a part of the faces where"):
+    with pytest.raises(InputError, match=r"joint 'low': got only part of the faces where"):
         pressed(parts, dict.fromkeys(parts, STEEL), {"low": 1e-6}, 0.4e-3)
 
 

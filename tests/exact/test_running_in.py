@@ -159,7 +159,7 @@ def test_elastic_faces_say_that_all_impacts_are_alike():
     study = run_impact(_case("run_in: true", ""), levels=("reduced",), certify=False)
 
     assert study.running_in is None
-    assert any("all impacts are like the first" in text for text in study.warnings)
+    assert any("all impacts equal the first" in text for text in study.warnings)
 
 
 CASES = Path(__file__).parents[2] / "cases" / "demo-valve-axisymmetric"

@@ -92,9 +92,9 @@ def test_forces_and_reactions_are_minus_the_momentum() -> None:
 
 def test_reactions_without_a_place_are_named() -> None:
     """All of them at once."""
-    with pytest.raises(InputError, match=r"no place for the reaction of coil, weight"):
+    with pytest.raises(InputError, match=r"no surface for the reaction of coil, weight"):
         run()
-    with pytest.raises(InputError, match=r"no place for the reaction of weight, expected"):
+    with pytest.raises(InputError, match=r"no surface for the reaction of weight, expected"):
         run(coil=SurfaceName("oscillator", "mass"))
 
 

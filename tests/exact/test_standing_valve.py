@@ -173,7 +173,7 @@ def test_what_has_no_law_in_time_is_refused() -> None:
     cases: list[tuple[Receiver, dict, str]] = [
         (plate, {"flange": Spring(values={3: 1e6})}, "an element on an infinite plate"),
         (plate, {"flange": Spring(values={3: 1e6}, loss_factor=0.1)}, "a loss factor"),
-        (InfinitePlate(plate=SHEET, points=(FLANGE,), radius=5e-3), {}, "feet that turn it"),
+        (InfinitePlate(plate=SHEET, points=(FLANGE,), radius=5e-3), {}, "feet that rotate it"),
     ]
     for receiver, isolators, says in cases:
         missing = {"flange.rx": "free", "flange.ry": "free"}
@@ -210,7 +210,7 @@ def test_the_matrices_of_a_body_are_that_body_as_a_receiver(tmp_path: Path) -> N
     assert machine.causal
     assert np.abs(found - exact).max() <= 1e-9 * np.abs(exact).max()
     given["rows"] = {"flange.z": "z", "flange.ry": 5}
-    with pytest.raises(InputError, match="the row 5, which another freedom has"):
+    with pytest.raises(InputError, match="the row 5, which belongs to another degree of freedom"):
         machine_of(CaseNoise.model_validate(data, context={}), {}, (FLANGE,))
     given["rows"] = {"flange.z": "x"}
     with pytest.raises(InputError, match="a number from 1 to 6, or one of: q0"):
@@ -496,7 +496,7 @@ def test_stops_that_are_joined_by_a_law_push_their_bodies(sheet: StrokeStudy) ->
 def test_a_variant_without_what_it_needs_is_refused() -> None:
     text = CASE.read_text()
     broken = {
-        "no place for the reaction of spring": ("spring: pole.top, ", ""),
+        "no surface for the reaction of spring": ("spring: pole.top, ", ""),
         "'magnet', which has no second end": ("magnet: outside", "magnet: pole.top"),
         "'dry-mounted' without a machine": (text[text.index("  receiver:") :], ""),
     }

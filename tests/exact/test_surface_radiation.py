@@ -256,7 +256,7 @@ def test_a_solid_over_frequency() -> None:
 
 
 def test_solids_that_cannot_be_used() -> None:
-    with pytest.raises(InputError, match="bodies of revolution beside solids"):
+    with pytest.raises(InputError, match="bodies of revolution together with solids"):
         surface_radiation([block(0.5), cup()], C)
     with pytest.raises(InputError, match=r"faces on the outside(.|\n)*more coarsely"):
         solid_outline([block(0.06)])

@@ -88,7 +88,7 @@ def test_a_prefix_is_a_power_of_ten_in_tables_of_units_as_well(data, unit):
 @each("kind", KINDS)
 def test_beyond_the_sizes_that_there_are_it_is_asked(kind):
     for value in (0.5 * kind.smallest, -0.5 * kind.smallest, 2.0 * kind.largest):
-        with pytest.raises(InputError, match="of a size between"):
+        with pytest.raises(InputError, match="of a magnitude between"):
             parse_quantity(repr(value) if kind.bare else f"{value!r} {kind.unit}", kind)
 
 

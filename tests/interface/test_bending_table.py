@@ -249,7 +249,7 @@ def test_the_chart_names_node_and_correction(study_node):
     chart = node_chart(study_node.nodes[0])
 
     assert "attachment modes shifted to -30 kHz and 90 kHz" in chart.note
-    assert "100 um from the place in the case" in chart.note
+    assert "100 um from the position in the case" in chart.note
     assert len(chart.panels[0].curves) == 5
     assert np.all(chart.panels[0].curves[0].y > 0)
 

@@ -167,7 +167,7 @@ DAMAGE = {
     ),
     "diverged": (lambda text: text.replace("1.021255E+01", "NaN"), "shorter step"),
     "words": (lambda text: text.replace("1.021255E+01", "ten"), "'ten'"),
-    "two runs": (lambda text: text + text, "do not grow"),
+    "two runs": (lambda text: text + text, "do not increase"),
     "less energies": (
         lambda text: text.replace("total kinetic energy for set UPPER", "skipped", 1),
         "35 entries of the kinetic energy of UPPER, 36",

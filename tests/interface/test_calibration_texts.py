@@ -97,7 +97,7 @@ def test_parameters_are_resolved_in_si():
         (
             "guide.coulomb, lower: 0 N, upper: 1.5 N",
             "spring.preload, lower: 0 N, upper: 15 N",
-            r"which 'preload' fits as well",
+            r"which 'preload' also fits",
         ),
         (
             "[network.components.stop.gap]",

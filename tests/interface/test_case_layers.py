@@ -58,8 +58,8 @@ def rows(*numbers, **more):
          r"joint\.frequency: got frequency together with a single stiffness"),
         ([(*JOINT, "frequency", None)], r"joint: got a table without 'frequency', expected .*100"),
         ([(*JOINT, "frequency", "2 MHz")], r"joint\.frequency: got 2 MHz, expected .*to 1 MHz"),
-        ([(*JOINT, "loss_factor", 0.1)], r"joint\.loss_factor: got loss_factor beside a table"),
-        ([(*JOINT, "modulus", "1 GPa")], r"joint\.modulus: got modulus beside a table"),
+        ([(*JOINT, "loss_factor", 0.1)], r"loss_factor: got loss_factor together with a table"),
+        ([(*JOINT, "modulus", "1 GPa")], r"joint\.modulus: got modulus together with a table"),
         ([(*JOINT, "table", 1, "modulus", None)],
          r"joint\.table\[1\]: got shear_modulus with a thickness"),
         ([(*JOINT, "table", 1, "frequency", "100 Hz")],
@@ -75,7 +75,7 @@ def test_a_mistake_in_a_layer_is_one_error_with_its_place(tmp_path, changes, mes
 
 def test_bodies_without_parts_and_with_fits_have_no_layers(tmp_path):
     with pytest.raises(
-        InputError, match=r"\d: bodies\.needle\.layers: got a layer beside a press fit"
+        InputError, match=r"\d: bodies\.needle\.layers: got a layer together with a press fit"
     ):
         changed_case(tmp_path, "pressed_armature.yaml", (*LAYERS, {"joint": STIFF}))
     given = {
@@ -106,10 +106,12 @@ def test_doubts_of_a_layer_are_told(tmp_path):
 
     assert not doubts(STIFF)
     (said,) = doubts(rows((1e3, 1e12, 1e12, 0), (1e6, 4e12, 4e12, 0), frequency="500 kHz"))
-    assert "its stiffness is that at 500 kHz; that at 36" in said
-    assert "would move the mode there by about -18 %" in said
+    assert "its stiffness was taken at 500 kHz; the stiffness at 36" in said
+    assert "would shift the mode there by about -18 %" in said
     (said,) = doubts(rows((10, 2e12, 1e12, 0), (1e3, 2e12, 1e12, 0), frequency="100 Hz"))
-    assert "modes that strain it are beyond its table, such as that at 28.1 kHz with 94 %" in said
+    assert (
+        "modes that strain it are beyond its table, such as the mode at 28.1 kHz with 94 %" in said
+    )
     (said,) = doubts({**STIFF, "loss_factor": 0.5})
     assert "it gives a mode a loss factor of 0.47" in said
 

@@ -111,7 +111,7 @@ MISTAKES = {
     "no unit": (area("= 12 * n"), "48 without unit, from '= 12 * n'", "a force"),
     "empty": (area("="), "no expression", "arithmetic"),
     "zero division": (area("= 12 N / (n - 4)"), "divides by zero (n = 4, SI units)", "finite"),
-    "range of the kind": (area("= 1e20 N"), "", "of a size between"),
+    "range of the kind": (area("= 1e20 N"), "", "of a magnitude between"),
 }
 
 
@@ -138,8 +138,8 @@ def test_a_value_out_of_the_bounds_of_its_key_tells_its_expression():
 @pytest.mark.parametrize(
     ("parameters", "got"),
     [
-        ("a: = b, b: = a", "expressions in a circle"),
-        ("a: 2 * a", "expressions in a circle: a needs a"),
+        ("a: = b, b: = a", "expressions that form a loop"),
+        ("a: 2 * a", "expressions that form a loop: a needs a"),
         ("pi: 3", "'pi', which is a function or pi"),
         ("min: 3 mm", "'min', which is a function or pi"),
         ("a-b: 3 mm", ""),
@@ -238,7 +238,7 @@ def test_another_kind_of_value_for_a_parameter_is_refused(value):
 def test_a_parameter_without_use_is_refused_where_it_is_varied():
     tree = tree_of(with_parameters("a: 2 mm"), SMALL)
 
-    with pytest.raises(CaseProblem, match="which no value of the case follows from"):
+    with pytest.raises(CaseProblem, match="on which no value of the case depends"):
         quantity_at(tree.case(), ("parameters", "a"))
 
 
@@ -368,7 +368,7 @@ def test_every_command_names_parameters_without_effect(command, tmp_path, capsys
     assert main([command[0], str(case), *command[1:], *own]) == 0
 
     told = "".join(capsys.readouterr())
-    assert told.count("Note: parameters.spare: nothing in this case follows from it.") == 1
+    assert told.count("Note: parameters.spare: nothing in this case depends on it.") == 1
     assert told.count("Note: parameters.other:") == 1
 
 

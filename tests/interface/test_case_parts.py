@@ -226,7 +226,11 @@ MISTAKES = {
     "home": (changed(MAIN, "mass.yaml", "~/mass.yaml"), MASS, "'~/mass.yaml'"),
     "null": (changed(MAIN, "mass.yaml", '"a\\x01.yaml"'), MASS, "that does not exist"),
     "folder": (changed(MAIN, "mass.yaml", "."), MASS, "'.'"),
-    "unknown argument": (changed(MAIN, "m: 3 g", "mas: 3 g"), MASS, "'mas', no parameter"),
+    "unknown argument": (
+        changed(MAIN, "m: 3 g", "mas: 3 g"),
+        MASS,
+        "'mas', which is not a parameter",
+    ),
     "argument of another kind": (changed(MAIN, "m: 3 g", "m: 3 mm"), MASS, "'3 mm' for 'm'"),
     "argument missing": (changed(MAIN, "k: k, ", ""), MASS, "no 'k', a parameter of"),
     "argument unknown name": (changed(MAIN, "k: k,", "k: kk,"), MASS, "unknown name 'kk'"),
@@ -242,17 +246,17 @@ MISTAKES = {
     "name twice": (
         changed(MAIN, "    wall:", "    left_body: {type: gravity}\n    wall:"),
         MASS,
-        "'left_body' a second time",
+        "'left_body' for the second time",
     ),
     "copy is a component": (
         changed(MAIN, "    wall:", "    left: {type: gravity}\n    wall:"),
         MASS,
-        "'left' a second time",
+        "'left' for the second time",
     ),
     "copy twice": (
         changed(MAIN, "network:", "  - {file: mass.yaml, as: left, with: {k: k}}\nnetwork:"),
         MASS,
-        "'left' a second time",
+        "'left' for the second time",
     ),
     "list without count": (changed(MAIN, "m: 3 g", "m: [3 g]"), MASS, "a list of 1"),
     "too many": (changed(MAIN, "as: left", "as: left, count: 1001"), MASS, "1001"),
@@ -328,7 +332,7 @@ def test_a_link_out_of_the_folder_is_refused(tmp_path):
     (tmp_path / "in" / "mass.yaml").unlink()
     (tmp_path / "in" / "mass.yaml").symlink_to(outside)
 
-    with pytest.raises(InputError, match="a link out of the folder"):
+    with pytest.raises(InputError, match="a link that leaves the folder"):
         load_valve_case(path)
 
 
@@ -441,7 +445,7 @@ def test_texts_of_parts_without_an_include_are_refused(tmp_path):
     include = "include:\n  - {file: mass.yaml, as: left, with: {k: k, m: 3 g}}\n"
     path = written(tmp_path, changed(MAIN, include, "", "left.tip, ", "") + "parts: {a: b}\n")
 
-    with pytest.raises(InputError, match="texts of parts that nothing includes"):
+    with pytest.raises(InputError, match="texts of parts that are not included"):
         load_valve_case(path)
 
 
@@ -454,7 +458,7 @@ def test_an_argument_is_varied_and_a_key_of_a_part_is_not(tmp_path):
     assert tree.case({place.key: "4 g"}).network.components["left_body"].mass == 4e-3
     assert case.behind(place.key) == (("network", "components", "left_body", "mass"),)
     assert rewritten(tree, {place.key: "4 g"}).startswith(changed(MAIN, "m: 3 g", "m: 4 g"))
-    with pytest.raises(CaseProblem, match="stands in the part 'left'"):
+    with pytest.raises(CaseProblem, match="is in the part 'left'"):
         quantity_at(case, ("network", "components", "left_body", "mass"))
 
 

@@ -82,7 +82,7 @@ MISTAKES = {
     ),
     "no unit": (("0.5 m/s", "0.5"), "valve.yaml:44: motion.speed", ["without unit", '"0.5 m/s"']),
     "negative size": (("size: 1.2 mm", "size: -1 mm"), "mesh.size", ["'-1 mm'", "above 0"]),
-    "decimal comma": (("1.2 mm", "1,2 mm"), "valve.yaml:23", ["decimal sign"]),
+    "decimal comma": (("1.2 mm", "1,2 mm"), "valve.yaml:23", ["decimal point"]),
     "unknown key": (
         ("density:", "densty:"),
         "valve.yaml:6: materials.steel.densty",
@@ -150,7 +150,7 @@ MISTAKES = {
     "held needle": (
         ("[needle.tip, housing.seat]", "[housing.seat, needle.tip]"),
         "valve.yaml:40: bodies.housing.fixed",
-        ["the body that moves", "swap"],
+        ["the moving body", "swap"],
     ),
     "mixed dimensions": (
         (
@@ -160,7 +160,11 @@ MISTAKES = {
         "needle.geometry.model",
         ["both axisymmetric or both three-dimensional"],
     ),
-    "layers of no sweep": (("model: swept", "model: solid"), "geometry.layers", ["only swept"]),
+    "layers of no sweep": (
+        ("model: swept", "model: solid"),
+        "geometry.layers",
+        ["only a swept body"],
+    ),
     "swept without layers": (("      layers: 18\n", ""), "needle.geometry", ["layers"]),
     "unknown model": (("swept", "sweept"), "geometry.model", ["did you mean 'swept'"]),
     "two shapes": (
@@ -175,7 +179,7 @@ MISTAKES = {
     ),
     "sectors beyond the circle": (("count: 3,", "count: 10,"), "sectors.width", ["360 deg"]),
     "unknown support": (("surface: rim", "surface: rm"), "fixed[0].surface", ["'rim'"]),
-    "arc without centre": ((", centre: [0, 4]", ""), "edges[0]", ["without centre"]),
+    "arc without centre": ((", centre: [0, 4]", ""), "edges[0]", ["without a centre"]),
     "arc off its circle": (
         ("[1.2, 2.4]", "[1.2, 2.9]"),
         "valve.yaml:14: bodies.needle.geometry.profile.parts.stem",
@@ -217,14 +221,14 @@ MISTAKES = {
     "duplicate key": (
         ("title:", "title: one\ntitle:"),
         "valve.yaml:3: title",
-        ["a second time", "once"],
+        ["for the second time", "once"],
     ),
     "duplicate key in a section": (
         ("  gap: 0", "  gap: 0\n  gap: 1 um"),
         "valve.yaml:44: gap",
-        ["'gap' a second time"],
+        ["'gap' for the second time"],
     ),
-    "misplaced key": (("motion: {", "gap: 1 um\nmotion: {"), "gap", ["its place is contact.gap"]),
+    "misplaced key": (("motion: {", "gap: 1 um\nmotion: {"), "gap", ["it belongs in contact.gap"]),
     "name instead of a mapping": (
         ("fixed: [{surface: rim, sectors: {count: 3, width: 40 deg}}]", "fixed: [rim]"),
         "fixed[0]",
@@ -240,15 +244,19 @@ MISTAKES = {
     "coordinates with a unit": (
         ("start: [0, ", "start: [0 mm, "),
         "start[0]",
-        ["got '0 mm'", "write the number alone"],
+        ["got '0 mm'", "write only the number"],
     ),
     "deeper line": (("  gap: 0", "     gap: 0"), "valve.yaml", ["same indentation"]),
     "no blank behind a colon": (("  gap: 0", "  gap:0"), "valve.yaml", ["a line without 'key: v"]),
-    "open quote": (("title: ", "title: '"), "valve.yaml:2", ["a quote that is not closed"]),
+    "open quote": (
+        ("title: ", "title: '"),
+        "valve.yaml:2",
+        ["a quotation mark that is not closed"],
+    ),
     "comma in a number": (
         ("poisson: 0.3", "poisson: 0,3"),
         "materials",
-        ["a point as decimal sign"],
+        ["a decimal point"],
     ),
     "word as a count": (("count: 20", "count: twenty"), "count", ["write digits"]),
     "hole": (("motion: {", "motion: "), "valve.yaml:44", ["not YAML"]),
@@ -259,7 +267,7 @@ MISTAKES = {
     "no blank behind the colon": (
         ("mesh: {size: 1 mm}", "mesh: {size:1 mm}"),
         "bodies.housing.mesh",
-        ["write a blank behind the colon: size: 1 mm"],
+        ["put a space after the colon: size: 1 mm"],
     ),
     "no colon in a section": (
         ("mesh: {size: 1 mm}", "mesh:\n      size 1 mm"),
@@ -267,18 +275,18 @@ MISTAKES = {
         ["write 'size: 1 mm', with a colon"],
     ),
     "round brackets": (("mesh: {size: 1 mm}", "mesh: (size: 1 mm)"), "valve.yaml:39", ["round"]),
-    "bracket too many": (("{size: 1 mm}", "{size: 1 mm}}"), "valve.yaml:", ["a bracket too many"]),
+    "bracket too many": (("{size: 1 mm}", "{size: 1 mm}}"), "valve.yaml:", ["a surplus bracket"]),
     "no blank behind a dash": (
         ("- {line: [1.2, 20], name: shaft}", "-{line: [1.2, 20], name: shaft}"),
         "valve.yaml:17",
-        ["a dash without a blank"],
+        ["a dash without a space"],
     ),
     "no dash": (
         ("- {line: [1.2, 20], name: shaft}", "{line: [1.2, 20], name: shaft}"),
         "valve.yaml:17",
         ["without its dash"],
     ),
-    "comma behind": (("{size: 1 mm}", "{size: 1 mm},"), "valve.yaml:", ["a comma behind"]),
+    "comma behind": (("{size: 1 mm}", "{size: 1 mm},"), "valve.yaml:", ["a comma after"]),
     "a list of keys": (
         ("mesh: {size: 1 mm}", "mesh:\n      - size: 1 mm"),
         "bodies.housing.mesh",

@@ -50,7 +50,7 @@ def test_the_same_pulse_is_found_again(result, tmp_path, capsys):
     assert code == 0
     text = " ".join(capsys.readouterr().out.split())
     assert "Against 2 recordings" in text
-    assert "the height of a pulse is no prediction" in text
+    assert "the height of a pulse is not a prediction" in text
     found = json.loads(table.read_text())
     assert found["schema"] == "klack-compare-impact/1"
     for pulse, factor in zip(found["pulses"], (1.5, 1.6), strict=True):
@@ -128,7 +128,7 @@ def test_a_record_without_a_plateau_or_with_volts_is_an_error(result, tmp_path, 
     ("unit", "factor", "said", "not_said"),
     [
         ("um/m", -1.5, "If the recordings are absolute, the speeds were", "without a unit"),
-        ("", -1.5, "A recording without a unit, or with a scale that is not known", "absolute"),
+        ("", -1.5, "A recording without a unit, or with an unknown scale", "absolute"),
         ("um/m", -4000.0, "The recordings are not absolute", "If the recordings"),
     ],
 )
@@ -146,9 +146,9 @@ def test_a_speed_is_said_only_where_it_can_be_true(
 @pytest.mark.parametrize(
     ("row", "text", "said"),
     [
-        (51, None, "a time that does not rise: .* at row 51 of its numbers"),
-        (51, "2e6,1", "a time that does not rise: .* at row 52 of its numbers"),
-        (51, "nan,1", "a time that does not rise: no value at row 51 of its numbers"),
+        (51, None, "a time that does not increase: .* at row 51 of its numbers"),
+        (51, "2e6,1", "a time that does not increase: .* at row 52 of its numbers"),
+        (51, "nan,1", "a time that does not increase: no value at row 51 of its numbers"),
     ],
 )
 def test_a_time_that_cannot_be_is_told_with_its_row(result, tmp_path, capsys, row, text, said):

@@ -280,7 +280,7 @@ def test_what_is_called_tried_had_the_refinements_of_the_run():
     with pytest.raises(InputError) as caught:
         meshed_for_case("pin", at_size(2e-3), mesher, at_size)
 
-    assert "bodies.pin.mesh.size: 700 um (tried, it does)" in caught.value.hint
+    assert "bodies.pin.mesh.size: 700 um (tested, the shape meshes)" in caught.value.hint
     assert tried[-1] == at_size(0.7e-3)
 
 
@@ -480,7 +480,7 @@ def test_such_a_material_is_refused_until_it_is_confirmed_and_then_noted_once(
     assert main(["impact", str(case)]) == 2
     refused = "".join(capsys.readouterr())
     assert "soft.yaml:4: materials.steel: got a Young's modulus of 0.21 GPa at 7850" in refused
-    assert "'unusual: true' at the head of the case" in refused
+    assert "'unusual: true' at the top of the case" in refused
 
     case.write_text(f"unusual: true\n{soft}")
     assert main(["impact", str(case), "--no-report", "--no-certify"]) == 0
@@ -579,4 +579,4 @@ def test_a_command_asks_before_it_meshes(tmp_path, capsys):
     words = ["impact", str(tmp_path / "rods.yaml"), "--no-report", "--out", str(tmp_path / "out")]
 
     assert main(words) == 2
-    assert "is the unit of its shape right?" in capsys.readouterr().err
+    assert "check the unit of its shape;" in capsys.readouterr().err

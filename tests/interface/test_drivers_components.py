@@ -66,7 +66,7 @@ PEAK_HOLD = {
         (lambda: VoltageTable(time=(0.0, 1e-3), voltage=(1.0,)), "2 times for 1 voltages"),
         (lambda: VoltageTable(time=(1e-3, 0.0), voltage=(1.0, 2.0)), "decreasing times"),
         (lambda: DriveProfile(time=(0.0, 1e-3)), "neither current nor voltage"),
-        (lambda: DriveProfile(time=(0.0, 1e-3), current=(1.0, 1.0)), "that the current is raised"),
+        (lambda: DriveProfile(time=(0.0, 1e-3), current=(1.0, 1.0)), "that raises the current"),
         (
             lambda: DriveProfile(time=(0.0, 1e-3), current=(1.0, -1.0), supply_voltage=14.0),
             "not negative, one of them above zero",

@@ -325,7 +325,7 @@ def test_inverted_element_is_named_with_its_place():
     with pytest.raises(InputError, match="solid 'needle', tet10 element 7") as error:
         assemble(bad, {"needle": STEEL})
     assert ", ".join(f"{c:.4f}" for c in centre) in str(error.value)
-    for words in ("a Jacobian of -1 ", "wrong order", "1 of 48 elements"):
+    for words in ("a Jacobian of -1 ", "order of the element is wrong", "1 of 48 elements"):
         assert words in str(error.value)
 
 

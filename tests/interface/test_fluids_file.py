@@ -92,7 +92,7 @@ def test_a_table_makes_a_fluid():
         (OWN | {"sound_speed": "1200 m/s"}, "bulk_modulus and sound_speed together"),
         (OWN | {"bulk_modulus": "5 bar"}, "check the unit"),
         (OWN | {"release_pressure": "1 bar"}, "leave both out"),
-        (OWN | {"release_time": "1 ms"}, "one of the two times alone"),
+        (OWN | {"release_time": "1 ms"}, "only one of the two times"),
         (OWN | {"release_time": "1 ms", "absorption_time": "5 s"}, "no release_pressure"),
         (OWN | {"release_pressure": "2 bar", "saturation_pressure": "1 bar"}, "leave both out"),
         (OWN | {"density": 780}, "add a unit"),
@@ -262,7 +262,7 @@ def test_its_range_is_stated_and_other_temperatures_are_refused():
     choice = read_file("fluid_dodecane.csv")
     known = choice.at(313.15).pressure_range
     assert 500e5 < known.highest < 525e5
-    assert "goes from 1 to 500 bar" in known.source
+    assert "covers 1 to 500 bar" in known.source
     with pytest.raises(InputError, match=r"got 120 degC, expected 0 to 100 degC"):
         choice.at(393.15)
 
@@ -292,7 +292,7 @@ def test_a_viscosity_that_is_no_exponential_is_a_visible_doubt(tmp_path):
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        (f"{HEAD}\n20, 1, 749, 1.5\n20, 100, 748, 1.7\n", "rise with pressure"),
+        (f"{HEAD}\n20, 1, 749, 1.5\n20, 100, 748, 1.7\n", "increase with pressure"),
         (f"{HEAD}\n20, 1, 749, 1.5\n40, 100, 756, 1.7\n", "every pressure once"),
         (f"{HEAD}\n{ROWS}20, 100, 756, 1.7\n", "every pressure once"),
         (f"{HEAD}\n20, 1, 749, 1.5\n", "at least two pressures"),

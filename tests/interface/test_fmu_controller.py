@@ -199,7 +199,7 @@ def test_the_command_names_mistakes(given, words, case, capsys):
 
 
 def test_a_component_is_given_once():
-    with pytest.raises(InputError, match="the second one of that component"):
+    with pytest.raises(InputError, match="the second controller of that component"):
         controller_files(["a=x.fmu", "a=y.fmu"])
 
 

@@ -70,7 +70,7 @@ WRONG = {
     "twice": (
         "[{loss: coil ohmic, node: copper}]",
         "[{loss: coil, node: copper}, {loss: coil ohmic, node: copper}]",
-        "counts some heat twice",
+        "would count some heat twice",
     ),
     "grown": ("of: [stop.gap, coil.gap]", "of: [stop.gp]", "did you mean 'stop.gap'"),
     "grown number": ("of: [stop.gap, coil.gap]", "of: [coil.turns]", "coil.gap"),
@@ -239,7 +239,7 @@ def test_a_fluid_of_fixed_numbers_does_not_follow_and_says_so():
 
     warm = warm_valve(valve, {a: COLD for a in aspects_of(valve.case)})
 
-    assert "'own' has the same numbers at every temperature" in warm.doubts[0]
+    assert "'own' has the same properties at every temperature" in warm.doubts[0]
 
 
 def test_viscosity_and_density_are_two_aspects():
@@ -438,4 +438,4 @@ def test_gas_stands_apart_from_the_heat_of_the_fluid_and_says_so():
     assert np.array_equal(gas.parameters, cold.parameters)
     assert warm.fluid.temperature == pytest.approx(353.15)
     found = heated_stroke(valve, find_roles(case), "wet", {a: COLD for a in aspects_of(case)})
-    assert any("gas stands apart from the heat network" in text for text in found.doubts)
+    assert any("gas is separate from the heat network" in text for text in found.doubts)

@@ -194,7 +194,7 @@ def test_no_file_leaves_the_folder(name: str, spring_damper_fmu: Build, tmp_path
     with zipfile.ZipFile(path, "a") as archive:
         archive.writestr(name, "x")
 
-    with pytest.raises(InputError, match="leads out of its folder"):
+    with pytest.raises(InputError, match="whose path leaves its folder"):
         ImportedFmu(file=path, **GIVEN)
 
 

@@ -228,7 +228,7 @@ def test_a_cut_fine_record_is_said_everywhere(
     table = stroke_table(study)
     assert "is full and ends early" in table.about["warnings"]
     axis = next(axis for axis in table.runs[0].axes if axis.name == "stop_time")
-    assert axis.meaning.endswith("cut off, the record was full")
+    assert axis.meaning.endswith("truncated because the record was full")
 
 
 def test_a_case_of_a_minute_is_accepted(tmp_path: Path):

@@ -105,7 +105,7 @@ class TestMade:
     @pytest.mark.parametrize(
         ("text", "words"),
         [
-            (STUDY, "no scatter of made valves"),
+            (STUDY, "no scatter of manufactured valves"),
             (STUDY + ROBUST.replace("lift: 2", "lft: 2"), "'lift'"),
             (STUDY + ROBUST.replace("lift: 2 um", f"{GAP}: 2 um"), "follows from parameters"),
             (STUDY + ROBUST.replace("0.3 N", "0.3 mm"), "0.3 mm"),
@@ -169,7 +169,7 @@ class TestRobustSearch:
         told = found[1].record.optimum
         assert told.objectives == ("opening.peak_force (mean + 2 sd)",)
         assert told.bounds == ("opening_time (mean + 2 sd) at most 165 us",)
-        assert "8 valves made after each design" in told.algorithm
+        assert "8 manufactured valves per design" in told.algorithm
 
     @pytest.mark.slow
     def test_a_design_with_a_valve_that_fails_has_no_value(self, tmp_path):

@@ -78,7 +78,10 @@ def test_a_position_that_grows_while_the_gap_closes(tmp_path):
         (lambda r: r[:1], "no row of numbers"),
         (lambda r: r[:1] + [x for x in r if ",0.02," in x or ",0.06," in x], "and 2 gaps"),
         (lambda r: [r[0], *("-" + line for line in r[1:])], "currents from 0|more than one point"),
-        (lambda r: [r[0], *(r[1:5][::-1]), *r[5:-1], "4,0.16,0.001,-1"], "rises with the current"),
+        (
+            lambda r: [r[0], *(r[1:5][::-1]), *r[5:-1], "4,0.16,0.001,-1"],
+            "increases with the current",
+        ),
     ],
 )
 def test_faults_are_named(tmp_path, change, words):

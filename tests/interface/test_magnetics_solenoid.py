@@ -359,7 +359,7 @@ def test_a_bias_coil_is_a_current_that_stays():
     [
         ({"coil": None}, "expected a coil"),
         ({"gap": {"kind": "air", "between": ["c", "a"], "length": 1e-4, "area": 1e-5}}, "moves"),
-        ({"core": {**IRON, "between": ["a", "B"]}}, "nothing leads back|not joined"),
+        ({"core": {**IRON, "between": ["a", "B"]}}, "no path leads back|not joined"),
         ({"core": {**IRON, "between": ["a", "a"]}}, "'a' twice"),
         ({"more": {**IRON, "between": ["x", "y"]}}, "2 parts that are not joined"),
         ({"more": {**IRON, "between": ["c", "y"]}}, "no flux through more"),
@@ -487,7 +487,7 @@ def test_a_ring_aside_is_no_element_of_a_network():
         "off_axis": {"height": 1e-2},
     }
 
-    with pytest.raises(ValueError, match=r"(?s)kind: ring.*a matter of 'solenoid'"):
+    with pytest.raises(ValueError, match=r"(?s)kind: ring.*only in the component 'solenoid'"):
         MagneticNetwork.model_validate(data)
     del data["elements"]["ring"]["off_axis"]
     MagneticNetwork.model_validate(data)

@@ -171,7 +171,10 @@ def test_a_damaged_ansys_file_is_refused(tmp_path):
             "%%MatrixMarket matrix coordinate real general\n2 2 4\n1 1 2\n2 2 1\n1 2 1\n2 1 3\n",
             "|A - A^T| / |A| = 0.73",
         ),
-        ("%%MatrixMarket matrix coordinate real general\n2 2 2\n1 1 2\n1 1 1\n", "given twice"),
+        (
+            "%%MatrixMarket matrix coordinate real general\n2 2 2\n1 1 2\n1 1 1\n",
+            "duplicate entries",
+        ),
         ("%%MatrixMarket matrix coordinate real general\n2 2 2\n1 1 nan\n2 2 1\n", "not finite"),
         ("%%MatrixMarket matrix coordinate real general\n2 2 2\n1 1 2\n2 3 1\n", "row or column 3"),
         ("1,1, 1,1, 5.0\n-2,1, 1,1, 3.0\n", "internal node -2"),

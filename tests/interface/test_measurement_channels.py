@@ -178,7 +178,7 @@ def test_needed_channels_must_be_there_and_clear(tmp_path):
             find_channels(recording, needed=("pressure",))
     with (
         open_recording(some(tmp_path / "volts.csv", "out [V]")) as recording,
-        pytest.raises(InputError, match=r"scale: 1\}\}\}, with the um that one V stands for"),
+        pytest.raises(InputError, match=r"scale: 1\}\}\}, with the um per V"),
     ):
         find_channels(recording, needed=("lift",))
 
@@ -265,7 +265,7 @@ def test_a_few_missing_values_are_bridged_and_many_refused(tmp_path):
     lift = lift_of(time)
     lift[100:104] = np.nan
     path = table(tmp_path / "a.csv", ["t [s]", "lift [um]"], [time, lift])
-    with pytest.warns(AccuracyWarning, match="4 missing values of 'lift' filled"):
+    with pytest.warns(AccuracyWarning, match="4 missing values of 'lift' were filled"):
         series, _ = read(path)
     np.testing.assert_allclose(series["lift"].values, 1e-6 * lift_of(time), atol=1e-9)
     lift[100:110] = np.nan
@@ -277,12 +277,24 @@ def test_a_few_missing_values_are_bridged_and_many_refused(tmp_path):
 @pytest.mark.parametrize(
     ("spoil", "message"),
     [
-        (lambda t: t.__setitem__(30, t[28]), r"does not rise: 2.8e-05 s at row 31 of its numbers"),
-        (lambda t: t.__setitem__(30, t[29]), r"does not rise: 2.9e-05 s at row 31 of its numbers"),
-        (lambda t: t.__setitem__(30, 2e6), r"does not rise: 3.1e-05 s at row 32 of its numbers"),
+        (
+            lambda t: t.__setitem__(30, t[28]),
+            r"does not increase: 2.8e-05 s at row 31 of its numbers",
+        ),
+        (
+            lambda t: t.__setitem__(30, t[29]),
+            r"does not increase: 2.9e-05 s at row 31 of its numbers",
+        ),
+        (
+            lambda t: t.__setitem__(30, 2e6),
+            r"does not increase: 3.1e-05 s at row 32 of its numbers",
+        ),
         (lambda t: t.__setitem__(slice(30, 50), t[30:50] + 2.0), "a gap of 2 s .* before row 31"),
         (lambda t: t.__setitem__(49, 2e6), "a gap of 2e.06 s .* before row 50 of its numbers"),
-        (lambda t: t.__setitem__(30, np.nan), "does not rise: no value at row 31 of its numbers"),
+        (
+            lambda t: t.__setitem__(30, np.nan),
+            "does not increase: no value at row 31 of its numbers",
+        ),
     ],
 )
 def test_times_that_cannot_be_are_refused_with_their_row(tmp_path, spoil, message):
@@ -305,7 +317,7 @@ def test_a_time_that_starts_again_is_cut_into_segments(tmp_path, name):
     found = load_stroke_set([path], section)
 
     assert len(found.strokes) == 3
-    assert any("time starts again; cut into 3 parts" in note for note in found.notes)
+    assert any("the time restarts; the record is cut into 3 parts" in note for note in found.notes)
     np.testing.assert_array_equal(found.matrix("current").mean(axis=1), [-1.0, -2.0, -3.0])
     with open_recording(path) as recording:
         assert [c.name for c in recording.channels][:3] == ["lift #1", "lift #2", "lift #3"]

@@ -151,7 +151,7 @@ def test_the_header_tells_a_decimal_comma_from_two_columns(tmp_path, header, nam
 def test_no_header_at_all(tmp_path):
     with open_recording(written(tmp_path / "a.csv", "")) as recording:
         assert [c.name for c in recording.channels] == ["column 2", "column 3"]
-        assert any("column 1 rises evenly" in note for note in recording.notes)
+        assert any("column 1 increases evenly" in note for note in recording.notes)
         time, values = recording.read("column 2")
     np.testing.assert_allclose(time, TIME, rtol=1e-9)
     np.testing.assert_allclose(values, LIFT, rtol=1e-9)
@@ -176,7 +176,7 @@ FAULTS = {
     "no number": ("t [s],lift [um]\n0,1\n1,2\n2,3\n3,x4\n", r"a.csv:5, column 2: got 'x4'"),
     "too many": (
         "t [s],lift [um]\n0,1\n1,2\n2,3\n3,4,5\n",
-        r"a.csv:5, column 3: got a value '5' too many, expected 2 values \(commas, decimal point",
+        r"a.csv:5, column 3: got a surplus value '5', expected 2 values \(commas, decimal point",
     ),
     "only words": ("time,lift\na,b\n", "got no line of numbers"),
     "empty": ("", "got an empty file"),
@@ -235,7 +235,7 @@ def test_a_damaged_first_row_is_told_and_names_nothing(tmp_path, first):
             ("lift", "um", 49),
             ("current", "A", 49),
         ]
-        assert "1 row above the first whole ones, from line 2 on, left out" in recording.notes[0]
+        assert "1 row above the first complete rows, from line 2, left out" in recording.notes[0]
 
 
 STEP, START, COUNT = 1e-5, -1e-3, 300
@@ -394,7 +394,7 @@ def notes_of(path, text):
 def test_rows_above_a_faulty_one_are_told(tmp_path):
     lines = YOKOGAWA.splitlines(keepends=True)
     lines[13] = "1.0,2..0\n"  # of the made time, two rows would be missing without a word
-    assert "3 rows above the first whole ones, from line 12 on, left out" in notes_of(
+    assert "3 rows above the first complete rows, from line 12, left out" in notes_of(
         tmp_path / "a.csv", "".join(lines)
     )
 
@@ -404,11 +404,11 @@ def test_rows_above_a_faulty_one_are_told(tmp_path):
     [SIGLENT, TEKTRONIX_MSO, YOKOGAWA, KEYSIGHT_INFINIIUM, SCOPY, LABVIEW_NONE, LABVIEW_ONE],
 )
 def test_a_table_shorter_than_its_header_says_is_told(tmp_path, text):
-    assert "the header speaks of" not in notes_of(tmp_path / "a.csv", text)
+    assert "the header states" not in notes_of(tmp_path / "a.csv", text)
     lines = text.splitlines(keepends=True)
     del lines[-7:]
     said = notes_of(tmp_path / "a.csv", "".join(lines))
-    assert "the header speaks of 300 rows, the table has 293" in said
+    assert "the header states 300 rows, but the table has 293" in said
 
 
 def test_names_of_traces_are_those_of_the_header(tmp_path):
@@ -461,7 +461,7 @@ def test_a_header_in_a_file_of_its_own(tmp_path):
     with pytest.raises(InputError, match=r"give a\.Wfm\.csv, whose header this is"):
         open_recording(words)
     table.write_text(2 * rows(FIRST))
-    with pytest.raises(InputError, match=r"got 600 rows, where the header says 300"):
+    with pytest.raises(InputError, match=r"got 600 rows, but the header states 300"):
         open_recording(table)
 
 
@@ -470,5 +470,5 @@ def test_a_recording_of_over_range_alone_says_so(tmp_path, sign):
     (tmp_path / "a.csv").write_text(
         "time [s],lift [um]\n" + "".join(f"{t},{sign}\n" for t in TIME_SCOPES)
     )
-    with pytest.raises(InputError, match="missing or signs of over range"):
+    with pytest.raises(InputError, match="missing or marked as over range"):
         open_recording(tmp_path / "a.csv")

@@ -309,7 +309,7 @@ def test_start_times_of_tdms_waveforms_count(tmp_path, groups):
 def test_a_tdms_waveform_without_a_start_time_is_told(tmp_path):
     for first in (None, np.datetime64("1904-01-01")):  # nothing, and what LabVIEW writes for it
         series, notes = read(tdms_starts(tmp_path / "a.tdms", first=first))
-        assert any("lift without a start time; taken to start with" in note for note in notes)
+        assert any("lift without a start time; assumed to start with" in note for note in notes)
         assert series["lift"].values.size == COUNT_STARTS
 
 
@@ -427,7 +427,7 @@ def test_different_starts_beside_one_stored_time_are_refused(tmp_path):
         for name, unit, values, later in CHANNELS:
             file[name] = values
             file[name].attrs.update({"unit": unit, "t0": later})
-    with pytest.raises(InputError, match=r"beside one stored time: '\w+' 0.*'\w+' 0"):
+    with pytest.raises(InputError, match=r"with one stored time: '\w+' 0.*'\w+' 0"):
         open_recording(tmp_path / "a.h5")
 
 

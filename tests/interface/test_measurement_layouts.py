@@ -101,8 +101,8 @@ def test_mdf_samples_that_are_texts_among_numbers_are_missing(tmp_path, texts, a
         expected[7] = np.nan
         np.testing.assert_array_equal(recording.values("lift"), expected)
         notes = "\n".join(recording.notes)
-    assert "a.mf4: lift: samples that are texts are missing." in notes
-    assert alone or "'state' left out: its values stand for texts" in notes
+    assert "a.mf4: lift: text samples are treated as missing." in notes
+    assert alone or "'state' left out: its values are codes of texts" in notes
     assert alone or "'remark' left out: no numbers" in notes
 
 

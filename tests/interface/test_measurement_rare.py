@@ -128,7 +128,7 @@ def test_tdms_without_a_time(tmp_path):
     write(("time", TIME), lift)
     read, notes = opened(tmp_path / "a.tdms")
     np.testing.assert_array_equal(read["lift"][1], TIME)
-    assert "the time has no unit; taken as seconds" in notes
+    assert "the time has no unit and is taken as seconds" in notes
 
 
 def test_hdf5_leaves_out_what_is_no_channel_and_says_so(tmp_path):
@@ -175,9 +175,7 @@ def test_one_sample_far_outside_all_others_is_told(tmp_path):
     lift = LIFT.copy()
     lift[20] = 4e6
     path = hdf5_of(tmp_path / "a.h5", lift)
-    with pytest.warns(
-        AccuracyWarning, match="1 of the values of 'lift_um' far outside.* at 0.0002 s"
-    ):
+    with pytest.warns(AccuracyWarning, match="1 values of 'lift_um' are far outside.* at 0.0002 s"):
         load_stroke_set([path])
     # a pulse of several samples and the last digit of a converter are signals
     pulse = np.where(np.arange(50) // 3 == 7, 4e6, LIFT)
@@ -191,7 +189,9 @@ def test_one_sample_far_outside_all_others_is_told(tmp_path):
 def test_values_beyond_any_instrument_are_missing(tmp_path):
     lift = LIFT.copy()
     lift[[20, 21]] = 1e308, np.inf
-    with pytest.warns(AccuracyWarning, match=r"2 missing values of 'lift_um' filled.* at 0.0002 s"):
+    with pytest.warns(
+        AccuracyWarning, match=r"2 missing values of 'lift_um' were filled.* at 0.0002 s"
+    ):
         found = load_stroke_set([hdf5_of(tmp_path / "a.h5", lift)])
     assert np.isfinite(found.matrix("lift")).all()
 
@@ -253,7 +253,7 @@ def test_mdf_files_that_are_cut_within_their_records(tmp_path):
     with open_recording(tmp_path / "a.mf4") as recording:
         group = recording._mdf.groups[0]
         group.channel_group.cycles_nr += 20  # as if the header said more than there is
-        with pytest.raises(InputError, match="got 50 values from sample 1 on, expected 70"):
+        with pytest.raises(InputError, match="got 50 values from sample 1, expected 70"):
             recording._values(recording.channel("lift"), 0, 70)
         with pytest.raises(InputError, match="less than the 70 records declared"):
             recording._group_time(tmp_path / "a.mf4", 0, None, False)
@@ -375,7 +375,7 @@ def test_netcdf_is_unpacked_and_its_fill_values_are_missing(tmp_path, write):
     with open_recording(write(tmp_path / "a.nc", about, stored)) as recording:
         values = recording.values("lift")
     assert np.flatnonzero(np.isnan(values)).tolist() == [5, 7, 9]
-    with pytest.warns(UserWarning, match="3 missing values of 'lift' filled"):
+    with pytest.warns(UserWarning, match="3 missing values of 'lift' were filled"):
         check(tmp_path / "a.nc")
 
 

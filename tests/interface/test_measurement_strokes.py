@@ -219,7 +219,7 @@ def test_every_resampled_channel_is_named(tmp_path):
 
     text = "\n".join(found.notes)
     assert "'lift' (step 1e-05 s) resampled to steps of 7e-06 s by linear interpolation" in text
-    assert "lift, current: samples moved onto one time from the trigger" in text
+    assert "lift, current: samples interpolated onto a common time from the trigger" in text
     current = found.matrix("current")
     assert (current.min(), current.max()) == (0.0, 5.0)
 

@@ -100,7 +100,7 @@ def test_the_message_says_estimate_bound_and_way_out(small_machine):
         require_memory("thing", 12e9, what="a large one", hint="a small one.")
 
     assert str(caught.value) == (
-        "thing: got a large one that takes about 12 GB of memory, expected at most 9.5 GB "
+        "thing: got a large one needing about 12 GB of memory, expected at most 9.5 GB "
         "(free memory of this machine).\nTry: a small one."
     )
 
@@ -209,7 +209,7 @@ def test_too_many_modes_are_refused(small_machine):
     with Flexibility(held) as flexibility:
         eigenmodes(held, count=20, flexibility=flexibility)
         small_machine(100e3)
-        with pytest.raises(InputError, match=r"20 modes of .* degrees of freedom that takes"):
+        with pytest.raises(InputError, match=r"20 modes of .* degrees of freedom needing"):
             eigenmodes(held, count=20, flexibility=flexibility)
 
 
@@ -229,7 +229,7 @@ def test_a_contact_of_too_many_points_is_refused(small_machine):
     space = contact_space(upper.mesh, faces[0], lower.mesh, faces[1])
     with Flexibility(upper) as a, Flexibility(lower) as b:
         small_machine(100e3)
-        with pytest.raises(InputError, match=r"contact points that takes .* of memory"):
+        with pytest.raises(InputError, match=r"contact points needing .* of memory"):
             contact_compliance(space, a, b)
 
 
@@ -253,7 +253,7 @@ def test_the_rows_that_condensing_keeps_are_counted(small_machine):
     # 5000 points on 200 000 unknowns: 0.8 GB of matrices, 0.5 GB of rows, 0.3 GB of blocks
     large = csr_array((5000, 200_000))
     small_machine(1.4e9)
-    with pytest.raises(InputError, match=r"5000 contact points that takes about 1.64 GB"):
+    with pytest.raises(InputError, match=r"5000 contact points needing about 1.64 GB"):
         statics._require_memory(large[:, :10], large)
 
 
@@ -296,7 +296,7 @@ def test_a_size_by_mistake_is_refused_at_once(small_machine, sizing, blamed, fit
         mesher({"bar": bar()}, sizing)
 
     text = str(caught.value)
-    assert f"{mesher.__name__}: {blamed}: got {fits}, which gives some " in text
+    assert f"{mesher.__name__}: {blamed}: got {fits}, which gives about " in text
     assert f"Try: a 'mesh: {blamed}' of " in text
 
 
@@ -375,7 +375,7 @@ def test_klack_impact_refuses_and_leaves_nothing(tmp_path):
 
     assert done.returncode == 2, done.stderr
     key = "bodies.needle.mesh.contact.size"
-    assert f"{key}: got 4 nm, which gives some " in done.stderr
+    assert f"{key}: got 4 nm, which gives about " in done.stderr
     assert f"Try: a {key} of" in done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["case.yaml"]
 
@@ -441,7 +441,7 @@ def test_where_double_precision_does_not_fit_single_precision_is_refined(machine
 
     assert np.abs(found - expected).max() < 1e-9 * np.abs(expected).max()
     assert len(lines) == 2
-    assert "taken in single precision, and solutions are refined" in lines[0]
+    assert "computed in single precision, and solutions are refined" in lines[0]
     assert "factor in single precision" in lines[1]
 
 
@@ -458,7 +458,7 @@ def test_what_follows_counts_as_well(machine, block):
     text = str(caught.value)
     for words in (
         "in single precision and with",
-        "for 50 modes, that takes about",
+        "for 50 modes, needing about",
         "Try: elements",
     ):
         assert words in text
@@ -483,7 +483,7 @@ def test_a_body_too_slender_for_single_precision_names_what_double_takes(machine
 
 def test_other_solvers_have_one_precision(machine, block):
     machine.available = 10e6  # copies of the matrix fit
-    with pytest.raises(FactorMemoryError, match=r"\(superlu\) that takes"):
+    with pytest.raises(FactorMemoryError, match=r"\(superlu\) needing"):
         Flexibility(block, backend="superlu")
 
 

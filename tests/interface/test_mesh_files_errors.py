@@ -68,11 +68,11 @@ NASTRAN = {
     "material": (bdf(TETRA, "MAT1,1,2.1e11"), "MAT1: got less than two of E, G and nu"),
     "inverted": (bdf("CTETRA,77,1,1,3,2,4"), "element 77 (tet4, solid 'psolid_1')"),
     "no elements": (bdf(), "got no solid elements"),
-    "cut off": (bdf(TETRA).removesuffix("ENDDATA"), "got no ENDDATA behind its last line ('CTE"),
+    "cut off": (bdf(TETRA).removesuffix("ENDDATA"), "got no ENDDATA after its last line ('CTE"),
     "element twice": (bdf(TETRA, TETRA), "got element 1 for the second time"),
     "place twice": (
         bdf(TETRA, "CTETRA,9,2,2,3,1,4"),
-        "element 9: got the corners of element 1 again, expected every element once",
+        "element 9: got the same corners as element 1, expected every element once",
     ),
 }
 
@@ -163,7 +163,7 @@ GMSH = {
         msh(["1 4 2 1 1 1 2 3 4", "2 4 2 9 1 1 2 3 4"]),
         "element 1: got an element that is in two physical groups",
     ),
-    "surface only": (msh(["1 2 2 1 1 1 2 4"]), "got elements of dimension 2 at most"),
+    "surface only": (msh(["1 2 2 1 1 1 2 4"]), "got only elements of dimension 2 or less"),
     "left of the axis": (
         msh(["1 2 2 1 1 1 2 3"], ((-1, 0, 0), (1, 0, 0), (0, 1, 0))),
         "node 1: got r = x = -1 mm",
@@ -307,7 +307,7 @@ FAULTS = {
     "no type": (NODES + "*ELEMENT\n", "x.inp:6: .ELEMENT: got no parameter TYPE"),
     "shell": (
         DECK + "*NODE\n9, 5, 5, 5\n*ELEMENT, TYPE=S3\n2, 1, 2, 9\n",
-        "element 2: got 1 surface elements that are no faces",
+        "element 2: got 1 surface elements that are not faces",
     ),
     "unknown set": (DECK + "*NSET, NSET=a\nb, 1\n", "x.inp:9: got node set 'b', expected a number"),
     "unknown member": (DECK + "*ELSET, ELSET=a\n1, 5\n", "x.inp:9: got element 5, which"),
@@ -315,7 +315,7 @@ FAULTS = {
     "face number": (DECK + "*SURFACE, NAME=s\nbody, S5\n", r"x.inp:9: got face 'S5'.*S1 to S4"),
     "surface set": (DECK + "*SURFACE, NAME=s\nboby, S1\n", r"'boby'.*defined above \(body\)"),
     "surface type": (DECK + "*SURFACE, NAME=s, TYPE=CUTTING\n1\n", "got TYPE=CUTTING"),
-    "generated": (DECK + "*NGEN\n1, 4\n", "x.inp:8: .NGEN: got a keyword that makes nodes"),
+    "generated": (DECK + "*NGEN\n1, 4\n", "x.inp:8: .NGEN: got a keyword that generates nodes"),
     "cylindrical": ("*NODE, SYSTEM=C\n1,1,1,1\n", "got SYSTEM=C"),
     "frame without plane": (
         "*SYSTEM\n0.,0.,0.,0.,0.,1.\n*NODE\n1,1,1,1\n",
@@ -348,7 +348,7 @@ FAULTS = {
     ),
     "place twice": (
         DECK + "*ELEMENT, TYPE=C3D4, ELSET=body\n7, 4, 2, 1, 3\n",
-        "x.inp: element 7: got the corners of element 1 again",
+        "x.inp: element 7: got the same corners as element 1",
     ),
     "end only": (DECK + "*END PART\n", "x.inp:8: .END PART: got an end without a start"),
     "parts without assembly": (
@@ -481,7 +481,7 @@ def test_members_of_all_sets_are_limited(tmp_path, monkeypatch):
     monkeypatch.setattr("klack.mesh.files.abaqus.sets.LARGEST_MEMBERS", 5)
     (tmp_path / "x.inp").write_text(DECK + "*NSET, NSET=a\n1, 2\n*NSET, NSET=b, ELSET=body\n")
 
-    with pytest.raises(InputError, match=r"x.inp:10: got sets of 6 members"):
+    with pytest.raises(InputError, match=r"x.inp:10: got sets with a total of 6 members"):
         read_abaqus(tmp_path / "x.inp", 1.0)
 
 
@@ -532,7 +532,7 @@ def make(*edges: Line | Arc) -> Profile:
             (Line((2, 0), "a"), Line((2, 1)), Line((1, 0), "c"), Line((0, 1)), Line((0, 0))),
             "got a common point at",
         ),
-        ((Line((1, 0)), Line((1, 0), "nothing"), Line((1, 1)), Line((0, 0))), "without length"),
+        ((Line((1, 0)), Line((1, 0), "nothing"), Line((1, 1)), Line((0, 0))), "zero length"),
         ((Line((3, 0)), Arc((3, 2), (3, 1), "half"), Line((0, 0))), "half circle.*clockwise"),
     ],
     ids=["open", "one edge", "nan", "left", "radius", "crossing", "touch", "length", "half"],

@@ -336,7 +336,7 @@ def test_cards_behind_the_end_are_refused(tmp_path: Path) -> None:
     last = next(k for k, line in enumerate(lines) if line.startswith("CHEXA"))
     path = tmp_path / "a.bdf"
     path.write_text("\n".join([*lines[:last], "ENDDATA", *lines[last:-1]]), "latin-1")
-    with pytest.raises(InputError, match="CHEXA behind ENDDATA"):
+    with pytest.raises(InputError, match="CHEXA after ENDDATA"):
         read_mesh_file(path, 1e-3)
     path.write_text(BDF + "\nsome words\n", "latin-1")
     read_mesh_file(path, 1e-3)

@@ -117,7 +117,7 @@ VTK = "\n".join(
     ]
 )
 
-SHELLS = "surface elements on no solid"
+SHELLS = "surface elements that are not on a solid"
 DECKS: dict[str, tuple[str, dict[str, int], str]] = {
     "abaqus.inp": (
         ABAQUS,

@@ -90,12 +90,12 @@ WRONG = {
     "joined twice": (
         {**VALVE, "force": ConstantForce(force=1.0)},
         [*JOINED, ["needle.body", "force.end"]],
-        "needle.body a second time (first in connections[0])",
+        "needle.body for the second time (first in connections[0])",
         "list all ports that meet there together",
     ),
     "alone": (VALVE, [*JOINED, ["spring.base"]], "only spring.base", "all ports"),
     "empty": (VALVE, [*JOINED, []], "an empty connection", "all ports"),
-    "only words": (VALVE, [*JOINED, ["ground", "ground"]], "no port beside", "remove"),
+    "only words": (VALVE, [*JOINED, ["ground", "ground"]], "no port other than", "remove"),
     "dangling": (
         {**VALVE, "force": ConstantForce(force=1.0)},
         JOINED,
@@ -248,7 +248,7 @@ def test_what_does_not_converge_at_the_start_names_its_component():
     parts = {"coil": Unsettled(stiffness=1e3, preload=0.0), "m": RigidMass(mass=1.0)}
     network = Network(parts, [["coil.end", "m.body"]])
 
-    with pytest.raises(ConvergenceError, match=r"^coil, at the start: the fluxes do not settle"):
+    with pytest.raises(ConvergenceError, match=r"^coil, at the start: the fluxes do not converge"):
         network.rows()
 
 
@@ -280,7 +280,7 @@ def test_an_interface_closed_at_the_start_is_refused():
         [["needle.body", "spring.end", "seat.upper"], ["seat.lower", "ground"]],
     )
 
-    assert error.got == "a gap of -1 um at the start: closed already"
+    assert error.got == "a gap of -1 um at the start: already closed"
 
 
 def test_hydraulics_needs_a_fluid():

@@ -150,7 +150,7 @@ def test_a_contact_around_the_axis_has_no_ring():
     central = section.points * [0.0, 1.0] + [1e-6, 0.0]
     object.__setattr__(section, "points", central)
     gap = np.repeat(section.gap[:, None], 8, axis=1)
-    with pytest.raises(InputError, match="no ring to put points on"):
+    with pytest.raises(InputError, match="no ring for contact points"):
         RingSpace.within(section, gap, 1.0)
 
 

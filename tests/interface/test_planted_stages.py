@@ -102,7 +102,7 @@ def test_a_link_to_the_home_of_somebody_moves_nothing(planted: str, tmp_path: Pa
     assert (tree(home), tree(shared / ".klack-x")) == before
     said = capsys.readouterr().err
     assert said.count("'.klack-x'") == said.count("note") == 1
-    assert ("a symbolic link" if planted == "stage" else "without the seal") in said
+    assert ("a symbolic link" if planted == "stage" else "without klack's seal") in said
 
 
 @pytest.mark.parametrize("forged", [False, True], ids=["plain", "forged manifest"])
@@ -130,7 +130,7 @@ def test_a_stage_out_of_an_archive_does_nothing(forged: bool, tmp_path: Path):
     before = tree(project)
 
     for step in (lambda: completed(project), lambda: write_one(project)):
-        with pytest.warns(LeftAloneWarning, match="without the seal of klack"):
+        with pytest.warns(LeftAloneWarning, match="without klack's seal"):
             step()
     assert tree(project) == before | {"out": "mine"}
 
@@ -166,9 +166,9 @@ def dead_stage_in(folder: Path, content: str = "new") -> Path:
     [
         (lambda stage: (stage / "more").write_text(""), "unknown entry 'more'"),
         (lambda stage: stage.chmod(0o777), "others may write to it"),
-        (lambda stage: (stage / "seal").chmod(0o644), "without the seal"),  # its time of change
-        (lambda stage: (stage / "manifest").write_text("[" * 100_000), "without the seal"),
-        (lambda stage: os.link(stage / "seal", stage.parent / "seal"), "without the seal"),
+        (lambda stage: (stage / "seal").chmod(0o644), "without klack's seal"),  # its time of change
+        (lambda stage: (stage / "manifest").write_text("[" * 100_000), "without klack's seal"),
+        (lambda stage: os.link(stage / "seal", stage.parent / "seal"), "without klack's seal"),
     ],
 )
 def test_a_stage_that_somebody_changed_is_left_alone(change, reason: str, tmp_path: Path):
@@ -260,7 +260,7 @@ def test_a_folder_of_the_user_in_the_place_of_the_stage_keeps_its_files(
             (tmp_path / "project").rename(tmp_path / name)
 
     monkeypatch.setattr(HeldFolder, "make", swapped)
-    with pytest.raises(InputError, match="in the place of klack's own"):
+    with pytest.raises(InputError, match="has replaced klack's own"):
         write_one(tmp_path)
     (moved,) = tmp_path.glob(STAGES)
     assert tree(moved) == {"work": "mine"}

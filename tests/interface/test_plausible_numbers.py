@@ -48,7 +48,7 @@ def test_every_command_refuses_a_speed_that_cannot_be(command, tmp_path, monkeyp
 
     said = capsys.readouterr().err
     assert "fast.yaml:39: motion.speed: got 300 m/s, expected 100 m/s or less" in said
-    assert "'unusual: true' at the head of the case computes it all the same" in said
+    assert "with 'unusual: true' at the top of the case it is computed nevertheless" in said
     assert list(tmp_path.iterdir()) == [tmp_path / "fast.yaml"]
 
 

@@ -163,7 +163,7 @@ class TestCurves:
         pytest.importorskip("xarray")
         with pytest.raises(KeyError, match="short_velocity, long_velocity"):
             _ = rods["velocity"]
-        with pytest.raises(InputError, match="does not have, expected one of: contact_force"):
+        with pytest.raises(InputError, match="does not contain, expected one of: contact_force"):
             _ = rods["conact_force"]
         assert {"contact_force", "short_velocity", "peak_force"} <= set(rods)
         assert "force" in rods

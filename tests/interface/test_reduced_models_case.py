@@ -494,7 +494,7 @@ def test_wrong_units_stop_the_case_with_those_that_fit(folder):
         build_bodies(case, silent)
 
     assert "bodies.needle.matrices" in str(error.value)
-    assert "with units: mm t s it would be 7854 kg/m^3" in str(error.value)
+    assert "with units: mm t s they would be 7854 kg/m^3" in str(error.value)
 
 
 @pytest.mark.slow

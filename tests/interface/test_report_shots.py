@@ -181,7 +181,7 @@ def test_the_answer_comes_first(content: Content) -> None:
     answer = plain(content.answer)
     assert answer.startswith("Of 40 shots, shot 17 rebounds highest, 44.0 µm")
     assert (
-        "right for this valve, judged by 1 % of restitution: the restitution is off by 0.00 %"
+        "right for this valve, judged by 1 % of restitution: the restitution is wrong by 0.00 %"
         in answer
     )
     assert content.subtitle.startswith("40 shots")

@@ -289,7 +289,7 @@ def test_the_full_order_alone_tells_what_its_steps_do(impact_study: ImpactStudy)
     )
 
     assert plain_estimate(estimate_sentence(study)).startswith(
-        "The steps of the full order put it off by"
+        "The steps of the full order shift it by"
     )
     assert (
         plain_estimate(estimate_sentence(study)).count("-0.20 %".replace("-", "\N{MINUS SIGN}"))

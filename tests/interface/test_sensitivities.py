@@ -185,7 +185,7 @@ class TestCommand:
         assert main(["sensitivities", str(SMALL), "--study", str(STUDY), "--json", str(file)]) == 0
         told = capsys.readouterr().out
         assert "elasticity" in told
-        assert "Impacts, and how strongly their times answer" in told
+        assert "Impacts, and the sensitivity of their times" in told
         numbers = json.loads(file.read_text())
         assert numbers["schema"] == "klack-sensitivities/1"
         slope = numbers["measures"]["opening_time"]["slopes"][PRELOAD]

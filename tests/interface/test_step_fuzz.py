@@ -80,7 +80,7 @@ def test_a_lost_or_doubled_entity_is_named(whole: bytes, tmp_path: Path):
             require_readable_step(path)
     assert found > 100
     path.write_bytes(b"\n".join([*lines[:n], line, *lines[n:]]))
-    with pytest.raises(InputError, match=f"entity {number.decode()} is there twice"):
+    with pytest.raises(InputError, match=f"entity {number.decode()} is defined twice"):
         require_readable_step(path)
 
 
@@ -97,7 +97,7 @@ def test_a_face_without_area_is_refused(tmp_path: Path):
     seam = "#82 = CARTESIAN_POINT('',(0.,0.,0.));"
     assert seam in text
     path.write_text(text.replace(seam, seam.replace("(0.", "(5.")))
-    with pytest.raises(InputError, match=r"face 'face\d' without area"):
+    with pytest.raises(InputError, match=r"face 'face\d' with zero area"):
         read_step(path)
 
 

@@ -221,7 +221,7 @@ def outside(rows):
     ("change", "words"),
     [
         (levels, "2 different values in 40 points"),
-        (crowded, "the squared discrepancy of random ones"),
+        (crowded, "the squared discrepancy of random points"),
         (outside, "lift: 1 values such as"),
     ],
 )

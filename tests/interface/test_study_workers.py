@@ -401,7 +401,7 @@ class TestRefused:
 
         small = AvailableMemory(size=1e9, bound="a test")
         monkeypatch.setattr("klack.machine.memory.available_memory", lambda: small)
-        with pytest.raises(InputError, match=r"4 processes that takes about 2 GB .* \(a test\)"):
+        with pytest.raises(InputError, match=r"4 processes needing about 2 GB .* \(a test\)"):
             klack.run_many(SMALL, [{}], ["impacts"], workers=4)
 
     def test_a_cluster_without_dask(self, monkeypatch: pytest.MonkeyPatch):
@@ -414,7 +414,7 @@ class TestRefused:
     def test_a_scheduler_that_does_not_answer(self, address: str, monkeypatch: pytest.MonkeyPatch):
         pytest.importorskip("distributed")
         monkeypatch.setattr(dask_workers, "_PATIENCE", 1.0)
-        with pytest.raises(InputError, match="expected the address of a running scheduler"):
+        with pytest.raises(InputError, match="expected the address of a running Dask scheduler"):
             klack.run_many(SMALL, [{}], ["impacts"], dask=address)
 
     def test_another_version_of_klack(self, cluster: str, monkeypatch: pytest.MonkeyPatch):
@@ -461,7 +461,7 @@ class TestRefused:
         file.write_bytes(file.read_bytes() + b"** changed\n")
         found = answered(sent, order)
         assert isinstance(found, Failure)
-        assert "files or components of the case with another content" in found.parts[1]
+        assert "files or components of the case with different contents" in found.parts[1]
         file.unlink()
         found = answered(sent, order)
         assert isinstance(found, Failure)
@@ -519,7 +519,7 @@ class TestRefused:
             if fraction > 0.05 and not closed:
                 closed.append(cluster.close())
 
-        with pytest.raises(ConvergenceError, match="the scheduler of dask is lost"):
+        with pytest.raises(ConvergenceError, match="the connection to the Dask scheduler is lost"):
             klack.run_study(
                 SMALL,
                 study,

@@ -186,7 +186,7 @@ def test_scripts_stay_when_a_later_model_fails(tmp_path):
 def test_refused_models(tmp_path, write):
     (tmp_path / "file").write_text("")
     for models, place, words in (
-        ([_body(), _body("Rod")], "", "2 models of the name 'rod'"),
+        ([_body(), _body("Rod")], "", "2 models with the name 'rod'"),
         ([body_model(fixed_body("wall"), provenance=ORIGIN, step=1e-8)], "", "no modes"),
         ([_body("a" * 56)], "", "at most 55"),
         ([_pair(HuntCrossley(LinearLaw(1e9), 0.2))], "", "dissipation"),

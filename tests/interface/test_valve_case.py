@@ -103,7 +103,7 @@ MISTAKES = {
     "stop upside down": (
         changed("[needle.tip, housing.seat]", "[housing.seat, needle.tip]"),
         "stops.seat.between",
-        "the upper surface comes first",
+        "the upper surface must come first",
     ),
     "one surface for two stops": (
         changed("between: [pole.stop, needle.land]", "between: [pole.stop, needle.tip]"),
@@ -123,7 +123,7 @@ MISTAKES = {
             "seat: {type: end-stop, gap: 0 um, law: {kind: linear, stiffness: 1e9 N/m}}",
         ),
         "stops.seat.friction",
-        "the only one with friction",
+        "the only law with friction",
     ),
     "friction beside a restitution": (
         changed(

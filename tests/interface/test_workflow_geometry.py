@@ -138,7 +138,7 @@ def test_bodies_that_overlap_as_drawn_are_refused():
     text = WELDED.replace(", gap: 0 um", "").replace("start: [0, 1]", "start: [0, -1]")
     text = text.replace("arc: [2, 3], centre: [0, 3]", "arc: [2, 1], centre: [0, 1]")
     case = read_case(text, Path("drawn.yaml"))
-    with pytest.raises(InputError, match=r"penetrate by 1000 um as drawn"):
+    with pytest.raises(InputError, match=r"overlap by 1000 um as drawn"):
         build_bodies(case, silent)
 
 

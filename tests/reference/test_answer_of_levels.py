@@ -211,7 +211,9 @@ def test_a_comparison_that_fails_is_a_note(error):
     def refuse() -> None:
         raise error
 
-    with pytest.warns(AccuracyWarning, match="a number was left out, which is for comparison only"):
+    with pytest.warns(
+        AccuracyWarning, match="a number, which is computed only for comparison, was left out"
+    ):
         assert for_comparison("a number", refuse) is None
     assert for_comparison("a number", lambda: 3.0) == 3.0
 

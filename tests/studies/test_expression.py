@@ -355,9 +355,9 @@ def test_another_unit_does_not_fit(text, unit):
     ("text", "said"),
     [
         ("r + F", "'r' is a length [m] and 'F' is a force [N]"),
-        ("r - 5e-6", "'r' is a length [m] and '5e-6' is a number without unit"),
+        ("r - 5e-6", "'r' is a length [m] and '5e-6' is a number without a unit"),
         ("max(r, g, t)", "'t' is a time [s]"),
-        ("phi + 10", "'phi' is an angle [rad] and '10' is a number without unit"),
+        ("phi + 10", "'phi' is an angle [rad] and '10' is a number without a unit"),
         ("x + phi", "'phi' is an angle [rad]"),
         ("f + rate", "'f' is a frequency [Hz] and 'rate' is a rate [1/s]"),
         ("exp(r)", "a length [m] in 'exp(r)'"),
@@ -419,7 +419,7 @@ def test_a_circle_is_named(texts, circle):
     with pytest.raises(InputError) as caught:
         ordered(expressions, {"a"})
 
-    found = caught.value.got.removeprefix("expressions in a circle: ").split(" needs ")
+    found = caught.value.got.removeprefix("expressions that form a loop: ").split(" needs ")
     wanted = circle.split(" needs ")
     assert found[0] == found[-1]
     start = wanted.index(found[0])

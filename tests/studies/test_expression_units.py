@@ -152,7 +152,7 @@ def test_value_and_unit(text, value, unit):
     ("text", "said"),
     [
         ("1 mm + 1 bar", "'1 mm' is a length [m] and '1 bar' is a pressure [Pa]"),
-        ("2 + 1 mm", "'2' is a number without unit and '1 mm' is a length [m]"),
+        ("2 + 1 mm", "'2' is a number without a unit and '1 mm' is a length [m]"),
         ("max(1 mm, 2 N)", "'2 N' is a force [N]"),
         ("sqrt(2 mm) + 1 mm", "a quantity in m^"),
         ("exp(1 mm)", "a length [m] in 'exp(1 mm)'"),

@@ -136,8 +136,8 @@ def measured_signal(
     refuse_if(
         even > 1e-3 or not np.all(np.diff(np.round(place)) == 1.0),
         "time signal",
-        got=f"lines of frequency that are no multiples of {apart:.4g} Hz",
-        expected="lines at even distances, multiples of that distance",
+        got=f"frequency lines that are not multiples of {apart:.4g} Hz",
+        expected="evenly spaced lines at multiples of the spacing",
         hint="use the spectra, or export the responses on an even grid from 0 Hz.",
     )
     joined = coupling(source(frequency, 0.0))
@@ -209,8 +209,8 @@ def _judge(name: str, values: Matrix, last: int, cause: int, apart: float) -> No
         f"time signal of the {name}",
         got=f"{100 * late:.2g} % of the energy in the last tenth of {1.0 / apart:.3g} s and "
         f"{100 * early:.2g} % before its cause",
-        expected=f"less than {100 * _RINGING:g} % and {100 * _BEFORE:g} %: all of the ringing "
-        "inside the record, and none before its cause",
+        expected=f"less than {100 * _RINGING:g} % and {100 * _BEFORE:g} %: ringing decays within "
+        "the record, and none precedes its cause",
         hint="measure lines closer together (or with the damping of the mounted machine), or use "
-        "the spectra, which hold all the same.",
+        "the spectra, which remain valid.",
     )

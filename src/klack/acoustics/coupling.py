@@ -343,7 +343,7 @@ def transformation(
             f"mount '{freedom.point}'",
             got=f"the point '{name}' of the receiver",
             expected=f"one of: {', '.join(points) or '(none)'}",
-            hint="say where the mount stands (placement: point).",
+            hint="state where the mount is (placement: point).",
         )
         row, rest = _row(freedom, mounts[freedom.point], points[name], receiver.freedoms, place)
         if rest > _ALONG:
@@ -361,12 +361,12 @@ def transformation(
     refuse_if(
         not kept,
         "coupling",
-        got="no freedom that source and receiver share",
+        got="no degree of freedom that source and receiver share",
         expected="at least one",
         hint="do not set them all free.",
     )
     notes = tuple(
-        f"{', '.join(names)}: the receiver is not known there; taken as {wanted}."
+        f"{', '.join(names)}: the receiver is not known there and is taken as {wanted}."
         for wanted, names in taken.items()
     )
     if idle:
@@ -410,8 +410,8 @@ def _refuse_open(open_ones: list[str], receiver: Receiver) -> None:
         got=f"no response of the receiver at {', '.join(open_ones)}",
         expected="the receiver's mobility at every freedom of the source; it has "
         f"{', '.join(map(str, receiver.freedoms)) or 'none'}",
-        hint="measure them, or say for each what the receiver does: missing: "
-        f"{{{open_ones[0]}: blocked}} (does not move) or free (takes up no force).",
+        hint=f"measure them, or state for each what the receiver does: missing: {{{open_ones[0]}: "
+        "blocked} (does not move) or free (takes up no force).",
     )
 
 
@@ -482,8 +482,8 @@ def _solved(Z: Complexes, right: Complexes) -> Complexes:
     )
     if worst > _WORST_CONDITION:
         warnings.warn(
-            f"The interface forces lose {np.log10(worst):.0f} of 16 digits: two freedoms of the "
-            "mounts move alike. Take fewer freedoms.",
+            f"The interface forces lose {np.log10(worst):.0f} of 16 digits: two degrees of "
+            "freedom of the mounts move alike. Use fewer degrees of freedom.",
             AccuracyWarning,
             stacklevel=5,
         )

@@ -61,7 +61,7 @@ def cumulative_energy(density: Spectrum, *, low: float, high: float) -> Cumulati
         not 0.0 <= low < high <= frequency[-1] * (1.0 + 1e-12),
         f"cumulative_energy of '{density.name}'",
         got=f"{low:g} to {high:g} Hz",
-        expected=f"limits in rising order within 0 and {frequency[-1]:g} Hz",
+        expected=f"limits in ascending order between 0 and {frequency[-1]:g} Hz",
         hint="20 Hz to 200 kHz covers valves.",
     )
     inner = (frequency > low) & (frequency < high)

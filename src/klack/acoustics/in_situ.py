@@ -133,7 +133,7 @@ def blocked_force_in_situ(
         "in-situ blocked force",
         got=f"{m} indicators for {n} unknown forces",
         expected=f"at least {n}, better {2 * n}",
-        hint="add indicators, or leave out freedoms of the mounts.",
+        hint="add indicators, or leave out degrees of freedom of the mounts.",
     )
     scale = _scale(freedoms, length)
     solved = np.linalg.pinv(assembly * scale, rcond=1e-13) @ velocity[..., None]

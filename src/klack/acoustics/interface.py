@@ -65,7 +65,8 @@ class Freedom:
             f"freedom of '{self.point}'",
             got=f"direction {self.direction}",
             expected="1 to 6 for x, y, z, rx, ry, rz, with a minus where it is reversed",
-            hint="a scalar (direction 0) can be a pressure at an ear, no freedom of a mount.",
+            hint="a scalar (direction 0) can be a pressure at an ear, but not a degree of "
+            "freedom of a mount.",
         )
 
     @property
@@ -133,7 +134,7 @@ class InterfacePoint:
             f"axes of '{self.name}'",
             got="left-handed axes" if square else "no three unit vectors at right angles",
             expected="x, y and z = x cross y, each of length 1",
-            hint="give x and y alone: z follows from them.",
+            hint="give only x and y: z follows from them.",
         )
 
 

@@ -84,7 +84,7 @@ class Spring:
             not self.loss_factor >= 0.0 or any(not c >= 0.0 for c in self.damping.values()),
             "isolator: damping",
             got="a value below 0",
-            expected="0 or more: an element gives no energy",
+            expected="0 or more: an element creates no energy",
             hint="check the sign.",
         )
 
@@ -131,9 +131,9 @@ class MeasuredIsolator:
                 f = self.frequency[int(np.argmax(high))]
                 warnings.warn(
                     f"{self.name}: the transfer stiffness in direction {direction} is twice its "
-                    f"value of {self.frequency[0]:.3g} Hz at {f:.3g} Hz: the element resonates "
-                    "inside. Give k11 and k22 as well, or do not trust the coupling above "
-                    f"{f / 3.0:.3g} Hz.",
+                    f"value of {self.frequency[0]:.3g} Hz at {f:.3g} Hz: the element has an "
+                    "internal resonance. Give k11 and k22 as well, or do not trust the coupling "
+                    f"above {f / 3.0:.3g} Hz.",
                     AccuracyWarning,
                     stacklevel=2,
                 )
@@ -168,7 +168,7 @@ def measured_frequency(name: str, known: Vector, s: Complexes) -> Vector:
         bool(np.any(s.real != 0.0)),
         name,
         got="a time signal on a shifted contour",
-        expected="a model: measured values exist on the axis of frequency alone",
+        expected="a model: measured values exist only on the frequency axis",
         hint="use klack.acoustics.coupled_signal.measured_signal.",
     )
     f = s.imag / (2.0 * np.pi)

@@ -20,7 +20,7 @@ _STEP, _EVERY = 2e-3, 4  # [s] of the loudness given, steps of 0.5 ms
 _BARK = 0.1  # [Bark] steps of the specific loudness
 _QUIET = 0.1  # [sone] below this sharpness is not defined in DIN 45692
 _SILENT = "below the threshold of hearing: 0 sone"
-_FAINT = "fainter than 0.1 sone at its loudest: no sharpness is given"
+_FAINT = "less than 0.1 sone at its loudest: no sharpness is given"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -63,7 +63,7 @@ def time_varying_loudness(pressure: TimeSeries) -> Loudness:
         abs(pressure.rate / _RATE - 1.0) > 1e-6,
         f"time_varying_loudness of '{pressure.name}'",
         got=f"a rate of {pressure.rate:.6g} Hz",
-        expected=f"{_RATE} Hz, which the filters of ISO 532-1 are made for",
+        expected=f"{_RATE} Hz, for which the filters of ISO 532-1 are defined",
         hint="make the sound with click_pressure(..., rate=48000).",
     )
     total, specific = _zwicker(pressure.values)

@@ -56,8 +56,8 @@ def moved_mass(structure: Structure, mount: Mount | None) -> float:
         raise InputError(
             f"mount of '{structure.name}': mass",
             got=f"{mass:g} kg",
-            expected=f"more than {carried:g} kg, which the modes of the body move",
-            hint=f"the body alone has {structure.mass:g} kg; leave the mass out to take that.",
+            expected=f"more than {carried:g} kg, the mass that the modes of the body move",
+            hint=f"the body alone has {structure.mass:g} kg; leave the mass out to use that.",
         )
     return mass
 

@@ -201,7 +201,7 @@ def _require_transfer(frequency: NDArray[np.float64], transfer: NDArray[np.float
         np.any(np.diff(frequency) <= 0.0) or frequency[0] < 0.0,
         where,
         got="frequencies out of order",
-        expected="increasing frequencies from 0 Hz up",
+        expected="ascending frequencies from 0 Hz",
         hint="sort both arrays by frequency.",
     )
     if not np.all(transfer >= 0.0) or not np.any(transfer[frequency > 0.0] > 0.0):

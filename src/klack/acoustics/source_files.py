@@ -41,7 +41,7 @@ def read_source(path: Path) -> SourceAtMounts:
         not wanted <= set(held),
         str(path),
         got=f"no {', '.join(sorted(wanted - set(held)))}",
-        expected="a source that klack noise wrote",
+        expected="a source written by klack noise",
         hint="give the source.nc of a case with noise.mounts.",
     )
     spectra = {name: held[f"{name}_real"] + 1j * held[f"{name}_imag"] for name in _SPECTRA}

@@ -178,7 +178,7 @@ def single_equivalents(
         "single_equivalents",
         got=f"mounts {np.ptp(height) * 1e3:.3g} mm apart along the normal of the plate",
         expected="mounts in one plane",
-        hint="give axes: the drawing's x, y, z in the frame of the plate.",
+        hint="give axes: x, y, z of the drawing in the frame of the plate.",
     )
     points = tuple(InterfacePoint(name=name, position=place) for name, place in places.items())
     lacking: dict[str, Missing] = {

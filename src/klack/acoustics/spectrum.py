@@ -97,7 +97,7 @@ def impulse_spectrum(
             f"impulse_spectrum of '{series.name}'",
             got=f"a series whose ends reach {edge / peak:.2g} of its peak",
             expected=f"ends below {_ENDS_AT_ZERO:g} of the peak",
-            hint="record longer, or apply half_cosine_tail and say so.",
+            hint="record longer, or apply half_cosine_tail and report it.",
         )
     if not resolution > 0.0:
         raise InputError(
@@ -145,7 +145,7 @@ def change_spectrum(
             f"spectrum of '{series.name}' up to {high:g} Hz",
             got=f"a step of {series.step * 1e6:.3g} us",
             expected=f"at most {1e6 / (_COARSE * high):.3g} us",
-            hint="record in finer steps, or request less.",
+            hint="record in finer steps, or request a lower frequency.",
         )
     many = max(int(1.0 / (_FINE * high * series.step)), 1)
     step = many * series.step

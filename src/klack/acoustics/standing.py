@@ -144,7 +144,7 @@ def standing_valve(
         "noise.elements",
         got="an element on an infinite plate",
         expected="a rigid joint, or a plate of finite size, for a run in time",
-        hint="give the plate its sides: a point of it has no mass of its own.",
+        hint="give the plate its sides: a point on an infinite plate has no mass of its own.",
     )
     squares, X = scipy.linalg.eigh(Z.T @ K @ Z, Z.T @ M @ Z)
     X = Z @ X
@@ -202,9 +202,9 @@ def _receiver(receiver: Receiver) -> tuple[Vector, Vector, Matrix, Matrix, Vecto
         refuse_if(
             receiver.radius > 0.0 or len(receiver.points) > 1,
             "noise.receiver: infinite_plate",
-            got="feet that turn it" if receiver.radius > 0.0 else f"{len(receiver.points)} feet",
+            got="feet that rotate it" if receiver.radius > 0.0 else f"{len(receiver.points)} feet",
             expected="one foot without a radius, for a run in time",
-            hint="its answer at other places has a memory; give the plate its sides.",
+            hint="its response at other places depends on the past; give the plate its sides.",
         )
         impedance = np.array([1.0 / receiver.plate.mobility])
         zero = np.zeros(1)
@@ -214,7 +214,8 @@ def _receiver(receiver: Receiver) -> tuple[Vector, Vector, Matrix, Matrix, Vecto
         "noise.receiver",
         got="measured responses",
         expected="a plate, a body, springs or matrices, for a run in time",
-        hint="responses over frequency are no law in time: leave out the variant dry-mounted.",
+        hint="responses over frequency do not define a law in time: leave out the variant "
+        "dry-mounted.",
     )
     assert isinstance(receiver, ModalReceiver)
     return receiver.omega, receiver.damping, receiver.shapes, receiver.residual, np.zeros(0)
@@ -230,7 +231,7 @@ def _elements(
         refuse_if(
             element is not None and (not isinstance(element, Spring) or element.loss_factor > 0.0),
             f"noise.elements.{freedom.point}",
-            got="an element of a loss factor or of measured stiffness",
+            got="an element with a loss factor or a measured stiffness",
             expected="stiffness and damping, for a run in time",
             hint="give the damping in N s/m instead: loss factor x stiffness / (2 pi f).",
         )

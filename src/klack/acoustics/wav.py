@@ -71,7 +71,7 @@ def wav_bytes(pressure: TimeSeries, *, full_scale: float) -> bytes:
         f"write_wav: '{pressure.name}'",
         got=f"a peak of {peak:.4g} Pa",
         expected=f"at most the full scale of {full_scale:.4g} Pa",
-        hint="take full_scale_of all sounds that are to be compared.",
+        hint="use full_scale_of all sounds that are to be compared.",
     )
     buffer = BytesIO()
     with soundfile.SoundFile(

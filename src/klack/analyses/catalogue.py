@@ -118,8 +118,8 @@ def analysis_in(folder: Path) -> "StoredAnalysis[Any]":
             f"result {folder}",
             got=f"a Zarr store with format {name!r}",
             expected="a result of klack",
-            hint="give the result folder of a klack command; a later version of "
-            "klack may have other kinds.",
+            hint="give the result folder of a klack command; a later version of klack may "
+            "support further kinds.",
         )
     found: StoredAnalysis[Any] = named(places[name])
     return found

@@ -60,7 +60,7 @@ CONTACT = JsonForm(
     Key(
         "needed_yield_Pa",
         Real,
-        "Yield stress from which on both bodies stay elastic, about.",
+        "Approximate yield stress from which both bodies stay elastic.",
         "needed_yield",
     ),
 )
@@ -79,11 +79,11 @@ def elastic_above(contact: MeshedContact) -> str:
         return ""
     if contact.needed_yield > _HARDEST:
         return (
-            f"The faces {contact.surfaces} would yield: elastic ones need a yield stress of "
-            f"{format_si(contact.needed_yield, 'Pa', 2)}, and hardened steel has about 2 GPa. "
-            "Try: 'yield' or 'hardness' of the material, with which klack computes it."
+            f"The faces {contact.surfaces} would yield: to stay elastic they need a yield stress "
+            f"of {format_si(contact.needed_yield, 'Pa', 2)}, and hardened steel has about 2 GPa. "
+            "Try: 'yield' or 'hardness' of the material, with which klack computes the yielding."
         )
     return (
-        f"The faces {contact.surfaces} stay elastic from a yield stress of about "
-        f"{format_si(contact.needed_yield, 'Pa', 2)} on."
+        f"The faces {contact.surfaces} stay elastic if the yield stress is at least about "
+        f"{format_si(contact.needed_yield, 'Pa', 2)}."
     )

@@ -93,7 +93,7 @@ def _no_report(folder: Path, error: OSError) -> InputError:
         f"report in {folder}",
         got=f"an error: {error.strerror or error}",
         expected="a writable folder, and one for temporary files",
-        hint="the result itself is kept: free space, then run klack report on it.",
+        hint="the result itself is kept: free some space, then run klack report on it.",
     )
 
 

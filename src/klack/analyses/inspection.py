@@ -398,7 +398,9 @@ def _mesh_rows(path: Path, model: MeshModel) -> Iterator[Row]:
     for kind, count in model.left_out.items():
         yield "left out", kind, f"{count} elements; a case needs 'elements: solids-only' for them"
     if format_of(path).open_end:
-        words = "files of this format have no end mark: compare the counts with its program"
+        words = (
+            "files of this format have no end mark: compare the counts in the program that wrote it"
+        )
         yield "note", "", words
 
 
@@ -424,7 +426,11 @@ def _matrix_rows(found: SystemMatrix) -> Iterator[Row]:
     diagonal = A.diagonal()
     yield "diagonal", "", f"{diagonal.min():.6g} to {diagonal.max():.6g} (units of the file)"
     if found.rows is None:
-        yield "rows", "", "the file does not say which: give 'dofs', or x, y, z node after node"
+        yield (
+            "rows",
+            "",
+            "not stated in the file: give 'dofs', or the order is x, y, z node by node",
+        )
     else:
         nodes = found.rows.node
         numbers = f"{len(np.unique(nodes))} nodes, {nodes.min()} to {nodes.max()}"

@@ -39,7 +39,7 @@ _CHECK = JsonForm(
 _WARMED = JsonForm(
     "WarmedJson",
     "One group of compiled functions.",
-    Key("compiled", int, "Functions; 0 if all were there.", "functions"),
+    Key("compiled", int, "Compiled functions; 0 if all were there already.", "functions"),
     Key("compile_time_s", float, of="seconds"),
 )
 _ROW = JsonForm(
@@ -52,7 +52,12 @@ _NODE = JsonForm(
     "One connection of a network.",
     Key("domain", str),
     Key("ports", list[str], "As component.port.", lambda node: list(map(str, node.joints))),
-    Key("fixed", str | None, "ground or ambient, if it is that.", lambda node: node.word or None),
+    Key(
+        "fixed",
+        str | None,
+        "ground or ambient, if connected to one of them.",
+        lambda node: node.word or None,
+    ),
 )
 _PORT = JsonForm(
     "ComponentPortJson", "Port of a component type.", Key("domain", str), Key("optional", bool)
@@ -131,7 +136,7 @@ _COMMANDS = {
         "CacheJson",
         "``klack cache``.",
         schema_key("klack-cache/1"),
-        Key("folder", str | None, "Null where the cache is off."),
+        Key("folder", str | None, "Null if the cache is off."),
         Key("count", int),
         Key("size_B", int),
         Key("limit_B", int),

@@ -94,9 +94,9 @@ def _date_text(created: str) -> str:
 
 
 _NOTE = (
-    "The network of the case: chambers, restrictions and lines of the fluid on the left, bodies in "
-    "the middle, what pushes and stops them on the right, magnets and drivers beside them. (0) is "
-    "the state at the start. A dashed ring is a port in no connection."
+    "The network of the case: chambers, restrictions and lines of the fluid on the left, bodies "
+    "in the middle, springs, forces and stops on the right, magnets and drivers next to them. "
+    "(0) is the state at the start. A dashed ring is a port in no connection."
 )
 _TITLE = "Schematic"
 

@@ -18,7 +18,7 @@ from klack.input.problem import nearest, one_of
 
 __all__ = ["NOT_COMPUTED", "PointColumn", "PointTable", "RunsInterrupted", "column_of"]
 
-NOT_COMPUTED = "not computed: the runs were interrupted before"
+NOT_COMPUTED = "not computed: the runs were interrupted before this point"
 _SHOWN = 10  # rows of a short view
 
 

@@ -62,8 +62,8 @@ _ERROR = Statistic(
     "standard_error",
     "standard error of the mean",
     "standard_error",
-    "Standard deviation of the mean of so many independent values, s/sqrt(n) with n - 1 degrees of "
-    "freedom in s",
+    "Standard deviation of the mean of that many independent values, s/sqrt(n) with n - 1 "
+    "degrees of freedom in s",
     _standard_error,
     fewest=2,
 )

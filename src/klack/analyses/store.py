@@ -100,7 +100,7 @@ def _load(path: Path, form: RecordFormat, largest: int) -> Any:
             f"result {path}",
             got=f"a Zarr store with format {attributes.get('format')!r}",
             expected=f"{form.name!r}",
-            hint=f"give the folder that `{form.command}` wrote its result to.",
+            hint=f"give the folder of a result written by `{form.command}`.",
         )
     version = attributes.get("format_version")
     if version != form.version:
@@ -328,7 +328,7 @@ def _dtype(about: Mapping[str, Any]) -> np.dtype[Any]:
     """Type of the stored numbers; raises for all but numbers."""
     found = np.dtype(about["data_type"])
     if found.kind not in "biufc" or found.name != about["data_type"] or min(about["shape"]) < 0:
-        raise _incomplete("an array of other than numbers")
+        raise _incomplete("an array that does not contain numbers")
     return found.newbyteorder("<")
 
 
@@ -343,7 +343,7 @@ def _read_array(place: Path, about: Mapping[str, Any]) -> np.ndarray:
     fits = all(0 < part <= max(whole, 1) for whole, part in zip(shape, chunk, strict=True))
     endian = about["codecs"][0].get("configuration", {}).get("endian", "little")
     if not fits or [c["name"] for c in about["codecs"]] != ["bytes", "zstd"] or endian != "little":
-        raise _incomplete(f"an array of an unknown kind in '{place.name}'")
+        raise _incomplete(f"an array of an unknown type in '{place.name}'")
     values = np.zeros(shape, _dtype(about))
     for file in (place / "c").glob("/".join("*" * len(shape))):
         part = np.zeros(chunk, values.dtype)

@@ -158,7 +158,7 @@ class UnfinishedLog(Closing, Generic[Key, Part]):
                     str(path),
                     got="a file in use by another process of klack",
                     expected="one process at a time",
-                    hint="wait for it, or choose another folder with --out.",
+                    hint="wait for that process, or choose another folder with --out.",
                 )
             try:
                 if os.path.samestat(path.lstat(), os.fstat(handle)):
@@ -182,8 +182,8 @@ class UnfinishedLog(Closing, Generic[Key, Part]):
             file.truncate(start + sum(len(line) + 1 for line in lines))
         if damaged:
             warnings.warn(
-                f"{self.path}: {len(damaged)} of {len(lines)} lines are damaged, the first is line "
-                f"{damaged[0]}. What they held of {self.form.parts} is computed again.",
+                f"{self.path}: {len(damaged)} of {len(lines)} lines are damaged, the first is "
+                f"line {damaged[0]}. Their {self.form.parts} are computed again.",
                 CacheWarning,
                 stacklevel=2,
             )
@@ -193,8 +193,8 @@ class UnfinishedLog(Closing, Generic[Key, Part]):
             str(path),
             got=f"a file that cannot be written ({error.strerror or error})",
             expected=f"a place for {self.form.parts}",
-            hint="check the folder given to --out and the free space; the "
-            "same command resumes from there.",
+            hint="check the folder given to --out and the free space; the same command then "
+            "resumes.",
         )
 
 

@@ -36,7 +36,7 @@ def valve_rows(case: ValveCase, drawn: Mapping[str, float]) -> Rows:
         and not (part.type == FLEXIBLE_BODY and case.bodies[str(getattr(part, "body", ""))].fixed)
     ]
     lifts = {name: travel.lift(name)[0] for name in bodies}
-    yield "case: bodies that move", tuple(_moving(network, bodies, masses, travel))
+    yield "case: moving bodies", tuple(_moving(network, bodies, masses, travel))
     yield "case: end stops", tuple(_stops(network, meetings, travel))
     if speeds := tuple(_speeds(network, masses, lifts, meetings)):
         yield "case: first estimate of closing", speeds
@@ -86,7 +86,7 @@ def _stops(network: Network, meetings: Mapping[str, Meeting], travel: Travel) ->
             carried = gap + (high if factor > 0.0 else -low)
             if carried < most:
                 far = f"at most {format_si(most, 'm', 4)}" if isfinite(most) else "or further"
-                opens = f"opens to {format_si(carried, 'm', 4)}, {far} if it flies on"
+                opens = f"opens to {format_si(carried, 'm', 4)}, {far} if it continues in flight"
         film = ", film" if getattr(part, "film", None) is not None else ""
         yield END_STOP, name, f"{' on '.join(pair)}: gap {format_si(gap, 'm', 4)}, {opens}{film}"
 
@@ -155,7 +155,7 @@ def _speeds(
         speed = f"{sqrt(2.0 * work / mass):.3g} m/s" if work > 0.0 else "does not close by itself"
         on = f"{1e3 * mass:.4g} g{beside} over {format_si(way, 'm', 4)}"
         above = next((name for name in ways if name != body and body in groups[name]), "")
-        first = f"; faster, as {above} pushes it at first" if above else ""
+        first = f"; faster, because {above} pushes it at first" if above else ""
         yield "speed", body, f"{speed}: {parts} on {on}{first}"
 
 

@@ -62,7 +62,7 @@ class Shapes:
             description="",
             version=__version__,
             bodies=bodies,
-            notes=("Meshed coarsely for this picture alone.",),
+            notes=("Meshed coarsely, only for this picture.",),
         )
         return packed_scene(view)
 

@@ -56,9 +56,9 @@ def assembled_from_matrices(case: CaseFile, name: str, mesh: Mesh | None) -> Ela
     made = assembled_body(case, name, mesh)
     if made.report.strain > _ROUNDED:
         warnings.warn(
-            f"the matrices of '{name}' are rounded: a rigid motion causes {made.report.strain:.1g} "
-            "of the forces that should cancel. Try: write them with more digits, in binary "
-            "form or in double precision.",
+            f"the matrices of '{name}' are rounded: under a rigid motion "
+            f"{made.report.strain:.1g} of the forces remain, which should cancel. Try: write "
+            "them with more digits, in binary form or in double precision.",
             AccuracyWarning,
             stacklevel=2,
         )
@@ -170,7 +170,7 @@ def _turned(
             where,
             got=f"a mesh of {mesh.node_count} nodes",
             expected=f"the {drawn.node_count} nodes of its file",
-            hint="place the mesh of the file, do not change it.",
+            hint="use the mesh of the file unchanged.",
         )
     if mesh.dimension == 2:
         return K, M

@@ -29,9 +29,9 @@ def bending_body(case: CaseFile, name: str, mesh: Mesh) -> FourierBody | None:
     if linear:
         warnings.warn(
             f"the bending frequencies of '{name}' are too high: its mesh has linear elements "
-            f"({', '.join(linear)}), which are too stiff in bending. Two of them across the radius "
-            "make a round bar too high by 2 % (quad4) to 9 % (tri3), whatever its axial modes are. "
-            "Try: elements with mid-side nodes.",
+            f"({', '.join(linear)}), which are too stiff in bending. With two of them across the "
+            "radius, the bending frequencies of a round bar are 2 % (quad4) to 9 % (tri3) too "
+            "high, however accurate its axial modes are. Try: elements with mid-side nodes.",
             AccuracyWarning,
             stacklevel=2,
         )

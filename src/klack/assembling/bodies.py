@@ -472,7 +472,7 @@ def _shift(
     if distance < 0:
         raise InputError(
             f"{case.path or 'case'}: contact",
-            got=f"bodies that penetrate by {-distance * 1e6:.4g} um as drawn",
+            got=f"bodies that overlap by {-distance * 1e6:.4g} um as drawn",
             expected="a distance of 0 or more between the two surfaces",
             hint="give contact.gap (for example 0 um): the upper body is then moved there.",
         )

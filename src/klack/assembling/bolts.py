@@ -110,8 +110,8 @@ class BoltedJoint:
             return ""
         return (
             f"bolts {self.body}.{self.joint}: the joint may open: contact forces may pull at it "
-            f"with up to {format_si(self.carried, 'N', 3)}, twice their largest, at a preload of "
-            f"{format_si(self.preload, 'N', 3)}; it was taken as glued. Try: more preload."
+            f"with up to {format_si(self.carried, 'N', 3)}, twice their peak, at a preload of "
+            f"{format_si(self.preload, 'N', 3)}; the joint was taken as glued. Try: more preload."
         )
 
     @property
@@ -123,8 +123,8 @@ class BoltedJoint:
         if not low <= self.length <= high:
             found.append(
                 f"{where}: a length of {format_si(self.length, 'm', 3)} between ends that are "
-                f"{format_si(self.distance, 'm', 3)} apart. Try: check its unit; it is the length "
-                "that is stretched."
+                f"{format_si(self.distance, 'm', 3)} apart. Try: check its unit; the length is "
+                "the stretched part of the bolt."
             )
         limit = self.bolt_yield or _STRONGEST
         if self.bolt_stress > limit:
@@ -136,8 +136,8 @@ class BoltedJoint:
         if self.open_share > _OPEN:
             found.append(
                 f"{where}: {100 * self.open_share:.2g} % of the joint is open under the preload; "
-                "the impact takes it as glued all over, which is stiffer. "
-                + ("Its largest pressure is rough. " if self.open_share > _MOSTLY else "")
+                "the impact takes the whole joint as glued, which is stiffer. "
+                + ("Its largest pressure is approximate. " if self.open_share > _MOSTLY else "")
                 + "Try: a joint that ends where the pressure does."
             )
         found += yield_doubts(where, self.stress, self.yield_stress, "the preload", "preload")
@@ -159,7 +159,7 @@ class BoltedJoint:
             (
                 "preload",
                 f"{told(self.preload, 'N', 3)}"
-                + (f", of {self.count} bolts together" if self.count > 1 else ""),
+                + (f", {self.count} bolts together" if self.count > 1 else ""),
             ),
             ("stress of a bolt", told(self.bolt_stress, "Pa", 3) + beside),
             ("mean pressure", told(self.pressure, "Pa", 3)),
@@ -183,7 +183,7 @@ class BoltedJoint:
         if self.carried is not None:
             rows.append(
                 (
-                    "pulls in the impact, at most",
+                    "largest pull in the impact",
                     f"{told(self.carried, 'N', 3)}, twice the peak force: "
                     + ("the joint may open" if self.opens else "the joint stays closed"),
                 )

@@ -120,20 +120,21 @@ class PressFit:
         found = []
         if self.interference > 2.0 * _LARGE * self.radius:
             found.append(
-                f"{where}: an interference of {format_si(self.interference, 'm', 3)} is more than "
-                f"a thousandth of the diameter, {format_si(2.0 * self.radius, 'm', 4)}. "
-                "Try: check its unit; it is on the diameter."
+                f"{where}: an interference of {format_si(self.interference, 'm', 3)} is more "
+                f"than a thousandth of the diameter, {format_si(2.0 * self.radius, 'm', 4)}. "
+                "Try: check its unit; interference is measured on the diameter."
             )
         if self.least_pressure < -1e-9 * abs(self.largest_pressure):
             found.append(
                 f"{where}: the joint opens: its pressure would be "
-                f"{format_si(self.least_pressure, 'Pa', 3)} at one place. The numbers of this fit "
-                "are those of a joint that pulls. Try: a joint that ends there, or stiffer parts."
+                f"{format_si(self.least_pressure, 'Pa', 3)} at one place. The numbers of this "
+                "fit assume that the joint can pull. Try: a joint that ends there, or stiffer "
+                "parts."
             )
         found += yield_doubts(where, self.stress, self.yield_stress, "the pressure", "interference")
         if self.stiffening > _STIFFENED:
             found.append(
-                f"{where}: its stress moves frequencies by up to {100 * self.stiffening:.2g} %, "
+                f"{where}: its stress shifts frequencies by up to {100 * self.stiffening:.2g} %, "
                 "which the impact leaves out. Try: less interference."
             )
         return tuple(found)
@@ -160,7 +161,7 @@ class PressFit:
                 f"{told(self.axial_force, 'N', 3)} along the axis or "
                 f"{told(self.torque, 'N*m', 3)} around it",
             ),
-            ("its stress moves frequencies by up to", f"{100 * self.stiffening:.2g} %"),
+            ("its stress shifts frequencies by up to", f"{100 * self.stiffening:.2g} %"),
         )
 
 

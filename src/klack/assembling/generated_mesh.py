@@ -101,7 +101,7 @@ def _finer(
             continue
         except InputError:
             break
-        return f"{key}.size: {format_si(size, 'm')} (tried, it does)."
+        return f"{key}.size: {format_si(size, 'm')} (tested, the shape meshes)."
     return (
         f"a {key}.size below the radius of the smallest round face, or a {key}.grading below "
         f"{sizing.grading:g}."
@@ -189,7 +189,7 @@ def meshed_step(step: StepFile, sizing: MeshSizing) -> Mesh:
             raise InputError(
                 str(step.file),
                 got="a file that changed while it was meshed",
-                expected="the same file to the end",
+                expected="a file that stays the same until the end",
                 hint="run the command again.",
             )
         return mesh

@@ -40,7 +40,7 @@ def reduced_from_file(case: CaseFile, name: str) -> ReducedBody:
     if model is None:
         raise InputError(
             f"{case.path or 'case'}: bodies.{name}",
-            got="a body without a reduced model",
+            got="a body with no reduced model",
             expected="the key 'reduced'",
             hint="name the file of the reduced model there.",
         )
@@ -104,7 +104,7 @@ def _check_mass(where: str, found: float, mass: float) -> None:
         raise InputError(
             f"{where}: mass",
             got=f"{found:.6g} kg",
-            expected=f"{mass:.6g} kg, as the case says, within 1 %",
+            expected=f"{mass:.6g} kg within 1 %, as in the case",
             hint="correct 'mass', or choose the right file.",
         )
 
@@ -236,7 +236,7 @@ def _check_units(model: ReducedModel, held: FileModalData) -> None:
             raise InputError(
                 f"{model.file}: units",
                 got=f"a unit of {own:.6g} {unit} (dataset 164)",
-                expected=f"{asked:.6g} {unit}, as 'units: {units.name}' says",
+                expected=f"{asked:.6g} {unit}, as stated by 'units: {units.name}'",
                 hint="correct 'units' in the case.",
             )
 
@@ -268,7 +268,7 @@ def _columns(model: ReducedModel, place: int | str, held: FileModalData) -> list
                 f"{model.file}: port at '{place}'",
                 got=f"no displacement '{label}'",
                 expected="numbers of nodes and a direction, e.g. '17 z' or '17 18 19 z'",
-                hint=nearest(label, held.labels[:1000], "see which nodes were exported."),
+                hint=nearest(label, held.labels[:1000], "check which nodes were exported."),
             )
     return [held.labels.index(label) for label in dict.fromkeys(labels)]
 

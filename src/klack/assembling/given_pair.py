@@ -156,9 +156,9 @@ def _note_missing(given: CaseBody, reduced: ReducedBody) -> None:
     kind = given.reduced.kind if given.reduced is not None else ""
     if kind in ("state-space", "modal") and reduced.correction == "none":
         warnings.warn(
-            f"the model of '{reduced.name}' has no residual compliance: it has to "
-            "be in the local law, or the contact is too stiff. Try: export D, or the responses "
-            "(dataset 58) of the port.",
+            f"the model of '{reduced.name}' has no residual compliance: unless the local law "
+            "contains it, the contact is too stiff. Try: export D, or the responses (dataset "
+            "58) of the port.",
             AccuracyWarning,
             stacklevel=2,
         )

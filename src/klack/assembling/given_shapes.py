@@ -138,11 +138,11 @@ def tell_effort(
         size = format_si(sizings[worst].smallest, "m", 2)
         time = f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.2g} h"
         _tell(
-            f"bodies.{worst}.mesh: elements of {size} to {format_si(sizings[worst].size, 'm', 2)} "
-            f"make a mesh of about {total:.1g} nodes in all; a first run takes some "
-            f"{time} on two cores and at least "
-            f"{in_words(element_memory(dimension, total / 2))} of memory. Try: larger sizes, or a "
-            "smaller extent of the refinement.",
+            f"bodies.{worst}.mesh: elements of {size} to "
+            f"{format_si(sizings[worst].size, 'm', 2)} make a mesh of about {total:.1g} nodes in "
+            f"all; a first run takes about {time} on two cores and at least "
+            f"{in_words(element_memory(dimension, total / 2))} of memory. Try: larger sizes, or "
+            "a smaller extent of the refinement.",
             progress,
         )
 
@@ -200,7 +200,8 @@ def _question(case: CaseFile, name: str, extent: float, expected: str) -> InputE
         place_of(case, ("bodies", name, "geometry"), on_key=True),
         got=f"a body '{name}' of {size} (longest side)",
         expected=expected,
-        hint=f"is the unit of its shape right? If it is, confirm it: geometry: {{extent: {size}}}.",
+        hint="check the unit of its shape; if it is right, confirm it: geometry: {extent: "
+        f"{size}}}.",
     )
 
 

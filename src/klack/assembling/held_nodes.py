@@ -53,7 +53,7 @@ def sector_nodes(
         raise InputError(
             "sector_nodes: width_rad",
             got=f"{count} sectors of {np.degrees(width_rad):.6g} deg",
-            expected=f"up to {np.degrees(pitch):.6g} deg each, so that they do not overlap",
+            expected=f"up to {np.degrees(pitch):.6g} deg each, to avoid overlap",
             hint="make the sectors narrower, or hold the whole surface.",
         )
     nodes = mesh.surface(surface).nodes
@@ -69,7 +69,7 @@ def sector_nodes(
             f"sector_nodes: surface '{surface}'",
             got=f"nodes in {len(filled)} of {count} sectors",
             expected="nodes in every sector",
-            hint="mesh finer around the circumference, or make the sectors wider.",
+            hint="refine the mesh around the circumference, or make the sectors wider.",
         )
     return nodes[inside]
 

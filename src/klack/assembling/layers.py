@@ -105,23 +105,24 @@ class LayerState:
             worst = int(np.argmax(np.abs(self.shift)))
             at = format_si(float(self.frequency[worst]), "Hz", 3)
             found.append(
-                f"{where}: its stiffness is that at {format_si(self.taken, 'Hz', 3)}; that at {at} "
-                f"would move the mode there by about {100 * self.shift[worst]:+.2g} %. Try: "
-                f"frequency: {at}, and compare the results."
+                f"{where}: its stiffness was taken at {format_si(self.taken, 'Hz', 3)}; the "
+                f"stiffness at {at} would shift the mode there by about "
+                f"{100 * self.shift[worst]:+.2g} %. Try: frequency: {at}, and compare the "
+                "results."
             )
         outside = ~self.covered & (self.share > _STRAINED)
         if outside.any():
             worst = int(np.argmax(np.where(outside, self.share, 0.0)))
             found.append(
                 f"{where}: {np.sum(outside)} modes that strain it are beyond its table, such as "
-                f"that at {format_si(float(self.frequency[worst]), 'Hz', 3)} with "
-                f"{100 * self.share[worst]:.2g} % of its energy there; stiffness and loss factor "
-                "of the nearest row were taken. Try: rows at these frequencies."
+                f"the mode at {format_si(float(self.frequency[worst]), 'Hz', 3)} with "
+                f"{100 * self.share[worst]:.2g} % of its energy there; the stiffness and loss "
+                "factor of the nearest row were used. Try: rows at these frequencies."
             )
         if self.largest_loss > _LOSSY:
             found.append(
-                f"{where}: it gives a mode a loss factor of {self.largest_loss:.2g}; modal damping "
-                f"is of first order, right to some per cent up to {_LOSSY:g}."
+                f"{where}: it gives a mode a loss factor of {self.largest_loss:.2g}; modal "
+                f"damping is of first order, accurate to a few per cent up to {_LOSSY:g}."
             )
         return tuple(found)
 
@@ -149,7 +150,7 @@ class LayerState:
         if self.taken is not None:
             rows.append(
                 (
-                    "its stiffness at other frequencies moves modes by up to",
+                    "its stiffness at other frequencies shifts modes by up to",
                     f"{100 * self.largest_shift:.2g} %",
                 )
             )

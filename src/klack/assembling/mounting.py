@@ -82,8 +82,9 @@ def at_mounts(
         return tuple(parts)
     if case.bodies[body.name].matrices is not None:
         warnings.warn(
-            f"mounts of '{body.name}': only the motion along the axis is known, as its matrices "
-            "are those of axisymmetric motion. Try: a body that klack meshes, or a solid one.",
+            f"mounts of '{body.name}': only the motion along the axis is known, because its "
+            "matrices describe axisymmetric motion. Try: a body that klack meshes, or a solid "
+            "one.",
             AccuracyWarning,
             stacklevel=2,
         )

@@ -140,8 +140,9 @@ def _at_gap(
             return gap, placement
         placement = placement + np.array([0.0, 0.0, lift, 0.0, 0.0, 0.0])
     raise ConvergenceError(
-        "contact: placing the moving body off-axis did not converge, the last move was "
-        f"{lift * 1e6:.3g} um.\nTry: a smaller motion.placement."
+        "contact: placing the moving body off-axis did not converge; the last correction was "
+        f"{lift * 1e6:.3g} um.\n"
+        "Try: a smaller motion.placement."
     )
 
 
@@ -194,8 +195,8 @@ def turning_body(case: CaseFile, name: str, mesh: Mesh) -> Callable[[int], Fouri
         raise InputError(
             f"{case.path or 'case'}: bodies.{name}.matrices",
             got="the axial motion of a body of revolution, off-axis",
-            expected="a body that klack assembles, which then moves in every way",
-            hint="remove 'matrices', or give those of a solid.",
+            expected="a body that klack assembles, which can move in every direction",
+            hint="remove 'matrices', or give the matrices of a solid.",
         )
     linear = sorted({block.family for block in mesh.blocks if not block.topology.quadratic})
     if linear:

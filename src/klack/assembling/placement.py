@@ -81,7 +81,7 @@ def _curves_of(profiles: Iterable[Profile], name: str) -> list[Curve]:
         known = ", ".join(dict.fromkeys(n for p in profiles for n in p.names)) or "none"
         raise InputError(
             f"surface '{name}'",
-            got="a name that no edge of the profile has",
+            got="a name of no edge of the profile",
             expected=f"one of: {known}",
             hint="check the spelling in contact.between, or name the edge.",
         )

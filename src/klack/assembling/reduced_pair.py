@@ -172,9 +172,9 @@ def own_pair(
     if selection != asked:
         counts = [f"{elastic_count(b)} of '{b.name}'" for b in (pair.upper, pair.lower)]
         warnings.warn(
-            f"contact: only {' and '.join(counts)} of the requested modes are kept: more "
-            "of them would have more than the static compliance of this contact and leave none "
-            "to the local law. The interface level keeps them all.",
+            f"contact: only {' and '.join(counts)} of the requested modes are kept: more modes "
+            "would exceed the static compliance of this contact and leave none to the local "
+            "law. The interface level keeps them all.",
             AccuracyWarning,
             stacklevel=2,
         )
@@ -307,12 +307,12 @@ def friction_doubt(case: Case, *, has_memory: bool, correction: str = "none") ->
         )
         why = "only the consistent local law has friction"
         if _rubs(case, correction):
-            why = "faces that lock have no law, nor have loops that it cannot follow"
+            why = "faces that lock have no law, and neither have loops that it cannot represent"
         return f"it leaves out contact.{left}: {why}. Try: level interface."
     if not faces.is_constant:
         return (
-            f"its law takes contact.friction {faces.kinetic:g} at every speed of slip and leaves "
-            f"out static_friction {faces.static:g}. Try: level interface."
+            f"its law uses contact.friction {faces.kinetic:g} at every slip speed and leaves out "
+            f"static_friction {faces.static:g}. Try: level interface."
         )
     return ""
 

@@ -85,9 +85,9 @@ def fitted_loops(rubbing: RubbingContact, local: LocalLaw, *, key: str) -> Rubbi
         return None
     if fit.error > _FAIR_LOOP:
         warnings.warn(
-            f"{key}: the law of the reduced level loses {100 * fit.error:.2g} % of its "
-            f"work more or less than the full bodies, which lose {100 * fit.loss:.2g} %. Keep "
-            "fewer modes, or take the interface level.",
+            f"{key}: the law of the reduced level misses the loss of the full bodies, "
+            f"{100 * fit.loss:.2g} % of the work, by {100 * fit.error:.2g} % of the work. Keep "
+            "fewer modes, or use the interface level.",
             AccuracyWarning,
             stacklevel=2,
         )

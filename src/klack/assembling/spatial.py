@@ -459,15 +459,15 @@ def _check_bore(
             raise InputError(
                 at,
                 got=f"radii of '{name}' and of '{on[0]}' in it of {radii}, as drawn",
-                expected="a bore that is wider than the shaft in it",
+                expected="a bore wider than its shaft",
                 hint="check the surfaces in 'surface' and 'on', and the drawings.",
             )
         if drawn > nominal and abs(drawn - guide.clearance) > max(nominal, _AS_DRAWN * drawn):
             warnings.warn(
-                f"{at}: the clearance is {format_si(guide.clearance, 'm')}, which is computed "
-                f"with, but {format_si(drawn, 'm', 3)} as '{name}' and '{on[0]}' are drawn, with "
-                f"radii of {radii}. Try: the drawn one for guides.{name}.clearance; or both drawn "
-                "with one radius.",
+                f"{at}: the clearance is {format_si(guide.clearance, 'm')}in the run, but "
+                f"{format_si(drawn, 'm', 3)} as '{name}' and '{on[0]}' are drawn, with radii of "
+                f"{radii}. Try: the drawn value for guides.{name}.clearance, or one radius for "
+                "both drawings.",
                 AccuracyWarning,
                 stacklevel=2,
             )
@@ -534,7 +534,8 @@ def check_heights(case: ValveCase, roles: ValveRoles, bodies: Mapping[str, Elast
                     got=f"a force across the axis at z = {format_si(outside[0], 'm')}",
                     expected=f"a height of '{needle}' as drawn, {format_si(low, 'm')} to "
                     f"{format_si(high, 'm')}",
-                    hint="height counts along z in the drawing of the needle, as guide.heights.",
+                    hint="heights are measured along z in the drawing of the needle, as in "
+                    "guide.heights.",
                 )
 
 

@@ -182,8 +182,9 @@ def _meeting(
         np.tile(open_by.gap[:, None], count),
         inf,
         where=f"stop '{contact.name}'",
-        more="where the guide lets the needle touch there, smaller elements on both surfaces "
-        "(mesh.surfaces), a smaller guide.clearance, or guiding heights farther apart. Else ",
+        more="where the guide allows the needle to touch there, smaller elements on both "
+        "surfaces (mesh.surfaces), a smaller guide.clearance, or guiding heights farther "
+        "apart. Else ",
     )
     meeting = Meeting(
         name=contact.name,
@@ -245,8 +246,8 @@ def _tell_stiff(body: RevolvedPoints) -> None:
         name, free = body.body.name, body.body.rigid.shape[1] > 0
         moves = "moves as a rigid body" if free else "does not vibrate"
         warnings.warn(
-            f"'{name}' keeps no elastic mode of order 1: across its axis it {moves}, and yields "
-            f"statically. Try: more modes in reduction.modes.{name}.",
+            f"'{name}' keeps no elastic mode of order 1: across its axis it {moves}, and deforms "
+            f"only statically. Try: more modes in reduction.modes.{name}.",
             AccuracyWarning,
             stacklevel=2,
         )

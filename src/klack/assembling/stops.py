@@ -230,7 +230,7 @@ def stop_law(contact: StopContact, upper: ReducedBody, lower: ReducedBody) -> St
     beside = without_bulk(local, D)
     if rubbing is None or not isinstance(law, RubbingLaw):
         return StopFaces(local=local, law=law, faces=beside.law, bulk=D)
-    fit = fitted_loops(rubbing, beside, key=f"{key} beside a film")
+    fit = fitted_loops(rubbing, beside, key=f"{key} together with a film")
     return StopFaces(local=local, law=law, faces=beside.law if fit is None else fit.law, bulk=D)
 
 

@@ -312,9 +312,9 @@ def _surface_port(case: ValveCase, body: str, mesh: Mesh, point: str) -> Port:
     if abs(abs(axial) - 1.0) > 1e-6:
         raise InputError(
             f"bodies.{body}.ports.{point}",
-            got=f"a pressure whose resultant is {abs(axial):.3g} N along z for 1 N in all",
+            got=f"a pressure whose resultant is {abs(axial):.3g} N along z for a total of 1 N",
             expected="a resultant along the axis",
-            hint="name a surface all round the axis, or use load: axial.",
+            hint="name a surface all the way round the axis, or use load: axial.",
         )
     return Port(point, np.sign(axial) * port.pattern)
 

@@ -201,7 +201,7 @@ def law_loops(
         return None
     if beside:
         warnings.warn(
-            f"{_LEFT_OUT}: faces have either yield or {beside}. Try: the case without the latter.",
+            f"{_LEFT_OUT}: faces have either yield or {beside}. Try: leave the latter out.",
             AccuracyWarning,
             stacklevel=2,
         )
@@ -318,7 +318,8 @@ def tell_elastic(case: CaseFile, what: str) -> None:
     listed = " and ".join(f"'{name}'" for name in soft)
     warnings.warn(
         f"{what} elastic bodies: the yield stress of {listed} is left out. Try: klack impact "
-        "--level reduced, which has it and says from which force on faces yield.",
+        "--level reduced, which includes yield and states the force at which faces begin to "
+        "yield.",
         AccuracyWarning,
         stacklevel=3,
     )

@@ -105,7 +105,7 @@ class Hardness(Section):
 
     @model_validator(mode="after")
     def _one(self) -> Self:
-        self._exactly_one(("HV", "HRC"), "how hard the material is")
+        self._exactly_one(("HV", "HRC"), "the hardness of the material")
         return self
 
     @property
@@ -129,7 +129,7 @@ class CaseMaterial(NamedSection):
     """Isotropic material: elastic, and when it yields; a bare text is a name of the library."""
 
     name: Text | None = Field(
-        default=None, description="Of the library; keys beside it replace its numbers."
+        default=None, description="Name in the library; further keys replace its numbers."
     )
     young: Modulus = Field(gt=0, description="Young's modulus; steel 210 GPa.")
     poisson: Ratio = Field(gt=-1, lt=0.5, description="Poisson's ratio; steel 0.3.")
@@ -138,10 +138,12 @@ class CaseMaterial(NamedSection):
         default=None,
         alias="yield",
         gt=0,
-        description="Yield stress; soft magnetic steel 280 MPa. Without it always elastic.",
+        description="Yield stress; soft magnetic steel 280 MPa. Default: always elastic.",
     )
     hardness: Hardness | None = Field(
-        default=None, description="Instead of a yield stress: HV or HRC; an estimate."
+        default=None,
+        description="HV or HRC, from which the yield stress is estimated; instead of a yield "
+        "stress.",
     )
     hardening: HardeningSlopes | None = Field(
         default=None, description="Linear hardening; without it perfectly plastic."
@@ -174,7 +176,9 @@ class CaseMaterial(NamedSection):
     @model_validator(mode="after")
     def _one_yield(self) -> Self:
         if self.yield_stress is not None:
-            self._refuse_with(("hardness",), "a yield stress", "it is an estimate of it")
+            self._refuse_with(
+                ("hardness",), "a yield stress", "the hardness is used to estimate it"
+            )
         if self.yield_stress is None and self.hardness is None:
             self._refuse_with(("hardening",), "no yield stress", "give 'yield' or 'hardness'")
         limit = LARGEST_YIELD * self.young
@@ -256,8 +260,8 @@ class Fit(Section):
     interference: Length = Field(
         ge=0,
         examples=["8 um"],
-        description="Overlap before joining, on the diameter: that of the inner part less the bore "
-        "of the outer one.",
+        description="Overlap before joining, on the diameter: the diameter of the inner part "
+        "minus the bore of the outer part.",
     )
     friction: Ratio = Field(
         ge=0,
@@ -271,17 +275,19 @@ class Bolts(Section):
     """Bolts that press two parts together along the axis, or a nut on a thread round the axis."""
 
     ends: tuple[Name, Name] = Field(
-        description="Edges or faces that they press, one of either part: under the head, and at "
-        "the thread.",
+        description="Edges or faces that the bolts press, one on each part: under the head, and "
+        "at the thread.",
     )
-    preload: Force = Field(gt=0, examples=["8 kN"], description="Of each bolt, after tightening.")
+    preload: Force = Field(
+        gt=0, examples=["8 kN"], description="Preload of each bolt after tightening."
+    )
     area: Area = Field(
-        gt=0, examples=["20.1 mm^2"], description="Of each bolt's section that is stretched."
+        gt=0, examples=["20.1 mm^2"], description="Stretched cross-section of each bolt."
     )
     length: Length = Field(
         gt=0,
         examples=["22 mm"],
-        description="That is stretched: clamped length and a part of head and thread.",
+        description="Stretched length: clamped length and part of head and thread.",
     )
     modulus: Modulus = Field(
         gt=0, examples=["205 GPa"], description="Young's modulus of the bolts."
@@ -291,7 +297,8 @@ class Bolts(Section):
         default=None,
         alias="yield",
         gt=0,
-        description="Of the bolts; class 8.8 640 MPa. Without it 1.1 GPa, class 12.9.",
+        description="Yield stress of the bolts; class 8.8 has 640 MPa. Default: 1.1 GPa, class "
+        "12.9.",
     )
 
 
@@ -302,7 +309,8 @@ class CaseBody(Section):
         default=Geometry.absent(), description="Shape: profile, step, mesh or nodes."
     )
     material: Name | dict[Name, Name] | None = Field(
-        default=None, description="Name of a material, or solid: material for a body of several."
+        default=None,
+        description="Name of a material, or solid: material for a body of several solids.",
     )
     matrices: Matrices | None = Field(
         default=None,
@@ -315,11 +323,13 @@ class CaseBody(Section):
         default=None, description="Element sizes; needed unless the geometry is a finished mesh."
     )
     fixed: tuple[Support, ...] | None = Field(
-        default=None, min_length=1, description="Held surfaces; none: the body is free."
+        default=None, min_length=1, description="Held surfaces; without any the body is free."
     )
     non_reflecting: Name | None = Field(
         default=None,
-        description="Surface at which a long bar continues: axial waves leave there; level full.",
+        description="Surface at which a long bar continues: axial waves leave the body there; "
+        "only at "
+        "level full.",
     )
     damping: BodyDamping = Field(
         default=BodyDamping(loss_factor=0.0), description="Losses inside the body; none by default."
@@ -332,8 +342,9 @@ class CaseBody(Section):
     bolts: dict[Name, Bolts] | None = Field(
         default=None,
         max_length=1,
-        description="edge or face: bolts that press the two parts that share it, a flat face; "
-        "klack inspect and klack impact show pressure, stiffness and what lifts the joint.",
+        description="edge or face: bolts that press together the two parts that share it, a flat "
+        "face; klack inspect and klack impact show pressure, stiffness and the force that lifts "
+        "the joint.",
     )
     layers: dict[Name, CaseLayer] | None = Field(
         default=None,
@@ -398,9 +409,9 @@ class CaseBody(Section):
                 hint=hint,
             )
         if self.geometry.mesh is not None or self.geometry.nodes is not None:
-            self._refuse_with(("mesh",), "a finished mesh", "its elements are there already")
+            self._refuse_with(("mesh",), "a finished mesh", "its elements exist already")
         elif self.mesh is None:
-            hint = "start with a tenth of the body's length for 'size'."
+            hint = "start with a tenth of the length of the body for 'size'."
             raise CaseProblem((), got="no key 'mesh'", expected="mesh: {size: ...}", hint=hint)
         if self.geometry.dimension == 2:
             for i, support in enumerate(self.fixed or ()):
@@ -408,7 +419,7 @@ class CaseBody(Section):
                     support.sectors is not None,
                     ("fixed", i, "sectors"),
                     got="sectors on an axisymmetric body",
-                    expected="a support all round",
+                    expected="a support around the whole circumference",
                     hint="remove 'sectors', or use 'model: swept' with 'layers: 18'.",
                     on_key=True,
                 )
@@ -426,7 +437,7 @@ class CaseBody(Section):
                     got=f"{kind} of a body that is neither drawn nor a STEP file",
                     expected="geometry.profile or geometry.step with a part for either side of the "
                     "joint",
-                    hint=f"draw the parts, or remove '{key}': the solids are glued then.",
+                    hint=f"draw the parts, or remove '{key}': the solids are then glued.",
                     on_key=True,
                 )
             for name, item in (given or {}).items():
@@ -442,9 +453,9 @@ class CaseBody(Section):
             raise CaseProblem(
                 ("bolts",),
                 got=f"bolts beside {others[0]}",
-                expected="a body with one kind of joint that is not glued",
-                hint=f"remove '{others[0]}' to compute the bolted joint; the other joint is "
-                "glued then.",
+                expected="a body with only one kind of joint that is not glued",
+                hint=f"remove '{others[0]}' to compute the bolted joint; the other joint is then "
+                "glued.",
                 on_key=True,
             )
 
@@ -457,11 +468,11 @@ class CaseBody(Section):
         refuse_key_if(
             no_parts or self.fits,
             ("layers",),
-            got="a layer beside a press fit"
+            got="a layer together with a press fit"
             if self.fits
             else "a layer in a body given by its matrices or as a reduced model",
             expected="a body whose parts klack assembles, without 'fits'",
-            hint="remove 'fits': compute the press fit of the body without its layers."
+            hint="remove 'fits'; compute the press fit of the body without its layers."
             if self.fits
             else "include the layer in that model, and remove 'layers'.",
             on_key=True,
@@ -494,14 +505,14 @@ class ModeChoice(Section):
 
     count: Count | None = Field(default=None, description="Number of lowest elastic modes.")
     frequency: Frequency | None = Field(
-        default=None, gt=0, description="All elastic modes up to here."
+        default=None, gt=0, description="All elastic modes up to this frequency."
     )
     participation: Count | None = Field(
         default=None,
         description="Number of modes of a pool with the largest share of compliance.",
     )
     pool: Count | None = Field(
-        default=None, description="Modes to choose from, with participation."
+        default=None, description="Number of modes to choose from, with participation."
     )
 
     @model_validator(mode="before")
@@ -513,7 +524,7 @@ class ModeChoice(Section):
                 (key,),
                 got="0 modes",
                 expected="1 or more",
-                hint="a rigid body is the level 'lumped'; 20 modes are a good start here.",
+                hint="for a rigid body use the level 'lumped'; 20 modes are a good start here.",
             )
         return value
 
@@ -521,7 +532,7 @@ class ModeChoice(Section):
     def _one(self) -> Self:
         kind = self._exactly_one(("count", "frequency", "participation"), "which modes to keep")
         if kind != "participation":
-            return self._refuse_with(("pool",), kind, "only participation chooses from a pool")
+            return self._refuse_with(("pool",), kind, "only participation selects from a pool")
         refuse_key_if(
             self.pool is None or self.participation is None or self.pool < self.participation,
             ("pool",) if self.pool is not None else (),
@@ -537,17 +548,18 @@ class Reduction(Section):
 
     correction: Literal["consistent", "attachment", "none"] = Field(
         default="consistent",
-        description="Correction for the omitted modes. consistent: the local law carries "
-        "their compliance; attachment: attachment modes, as usual; none: nothing, for comparison.",
+        description="Correction for the omitted modes. consistent: the local law carries their "
+        "compliance; attachment: attachment modes, as usual; none: no correction, for "
+        "comparison.",
     )
     modes: Mapping[Name, ModeChoice] = Field(
-        default_factory=dict, description="Kept modes of each body; 40 where none is given."
+        default_factory=dict, description="Kept modes of each body; default 40."
     )
 
     shifts: Mapping[Name, tuple[Frequency, ...]] = Field(
         default_factory=dict,
-        description="Of a body: shifted instead of residual attachment modes, one per frequency; "
-        "exact there, below zero at an imaginary frequency.",
+        description="Per body, shifted instead of residual attachment modes, one per frequency "
+        "and exact there; negative: an imaginary frequency.",
         examples=[{"needle": ["-20 kHz", "150 kHz"]}],
     )
 
@@ -569,7 +581,7 @@ class Reduction(Section):
                 (body,),
                 got="the same shift twice",
                 expected="different frequencies",
-                hint="each adds one mode per contact; a second one at its place adds nothing.",
+                hint="each adds one mode per contact; a duplicate adds nothing.",
             )
         return shifts
 
@@ -659,8 +671,8 @@ class WrittenCase(Section):
         """Doubtful numbers, and parameters without effect."""
         unused = self._expanded.unused_parameters() if self._expanded is not None else ()
         return self.doubts + tuple(
-            f"parameters.{name}: nothing in this case follows from it. "
-            f"Try: an expression where its value belongs, such as '= {name}'."
+            f"parameters.{name}: nothing in this case depends on it. Try: an expression where "
+            f"its value belongs, such as '= {name}'."
             for name in unused
         )
 
@@ -692,8 +704,8 @@ class CaseFile(WrittenCase):
     unusual: bool = Field(
         default=False,
         strict=True,
-        description="true: numbers that no valve has, such as 300 m/s, are computed with a note; "
-        "else they are an error.",
+        description="true: numbers that no valve has, such as 300 m/s, are computed with a "
+        "note; otherwise they are an error.",
     )
 
     def plausible_numbers(self) -> Iterator[Number]:
@@ -738,7 +750,7 @@ class CaseFile(WrittenCase):
                 raise InputError(
                     f"{self._path or 'case'}: bodies.{body}.material",
                     got=f"no material for the solid '{solid}'",
-                    expected=f"one for each solid (given: {one_of(chosen)})",
+                    expected=f"a material for each solid (given: {one_of(chosen)})",
                     hint=nearest(solid, chosen, f"add '{solid}: ...' there."),
                 )
             name = chosen if isinstance(chosen, str) else chosen[solid]

@@ -69,7 +69,7 @@ class _BoundedComposer(Composer):
         node = super().compose_node(parent, index)
         if is_alias:
             if id(node) not in self.extent:
-                problem = f"the alias '{event.anchor}' inside its own content"
+                problem = f"the alias '{event.anchor}' within its own content"
                 raise UnboundedTree(problem, event.start_mark)
             values, levels = self.extent[id(node)]
             self._require_bounded(values, levels, event.start_mark)
@@ -168,7 +168,7 @@ def _parsed(text: str, path: Path) -> tuple[Any, Lines]:
             f"{path}:{error.problem_mark.line + 1}",
             got=str(error.problem),
             expected="a plain tree of keys and values",
-            hint="close the brackets; write out aliases; shorten numbers.",
+            hint="close the brackets, write out aliases, shorten numbers.",
         ) from None
     except MarkedYAMLError as error:
         raise _syntax_error(error, text, path) from None
@@ -227,11 +227,13 @@ class _Plain:
             if isinstance(node, plain):
                 if LARGEST_NUMBER < abs(node) != inf:
                     hint = "check the power of ten."
-                    self._refuse(key, f"{plain(node)}"[:40], "a number below 1e15 in size", hint)
+                    self._refuse(
+                        key, f"{plain(node)}"[:40], "a number of magnitude below 1e15", hint
+                    )
                 return plain(node)
         # a date, a set, or a value with a tag such as !!python/name
         tag = getattr(getattr(node, "tag", None), "value", None) or type(node).__name__
-        self._refuse(key, f"a value of the kind {tag}", "text, a number, a list or a mapping")
+        self._refuse(key, f"a value of type {tag}", "text, a number, a list or a mapping")
 
     def _name(self, node: CommentedMap, name: Any, key: Key) -> str:
         where = node.lc.data.get(name) if node.lc.data else None
@@ -240,7 +242,7 @@ class _Plain:
             self.lines.keys[path] = where[0] + 1
             self.lines.values[path] = where[2] + 1
         if not isinstance(name, str):
-            hint = 'put it into quotes; a number has a point as decimal sign: 0.3, not "0,3".'
+            hint = 'put it into quotes; a number has a decimal point: 0.3, not "0,3".'
             self._refuse(path, f"the key {name}", "text as a key", hint)
         return self._text(str(name), path)
 
@@ -264,7 +266,7 @@ def _duplicate(error: DuplicateKeyError, text: str, path: Path) -> InputError:
     first = "" if found is None else f" (first in line {found})"
     return InputError(
         f"{path}:{line}: {name}",
-        got=f"the key '{name}' a second time in one mapping{first}",
+        got=f"the key '{name}' for the second time in one mapping{first}",
         expected="each key once",
         hint="remove or rename one of them.",
     )
@@ -286,26 +288,27 @@ _YAML_WORDS = {
         "put text with a colon into quotes; give keys of one section the same indentation.",
     ),
     "cannot start any token": (
-        "a tab or a sign that begins no value",
+        "a tab or a character that cannot begin a value",
         "indent with spaces, not tabs; put text that starts with @, ` or % into quotes.",
     ),
     "expected <block end>": (
-        "a line that is indented differently from its section, or a bracket or quote too many",
+        "a line that is indented differently from its section, or a surplus bracket or "
+        "quotation mark",
         "give all keys of one section the same indentation, in spaces.",
     ),
     "could not find expected ':'": (
         "a line without 'key: value'",
-        "write 'key: value' with a blank behind the colon; close the quote opened before.",
+        "write 'key: value' with a space after the colon; close the quotation mark opened before.",
     ),
     "expected ',' or": (
         "brackets that are not closed, or values without a comma between them",
-        "close the bracket { or [ that was opened here or before; separate values by commas.",
+        "close the bracket { or [ that was opened here or before; separate values with commas.",
     ),
     "found undefined alias": (
-        "a value that begins with *, the sign of a value that is named elsewhere",
+        "a value that begins with *, which marks an alias",
         "write the value itself, or put it into quotes.",
     ),
-    "found unexpected end of stream": ("a quote that is not closed", "close it."),
+    "found unexpected end of stream": ("a quotation mark that is not closed", "close it."),
     "found '<stream end>'": (
         "brackets that are not closed at its end",
         "close each bracket { or [ that was opened.",
@@ -327,13 +330,13 @@ def _mistyped(lines: list[str], line: int, column: int) -> tuple[int, str, str] 
     before = next((k for k in range(line - 1, -1, -1) if lines[k].strip()), None)
     for k in (line, before):
         if k is not None and k < len(lines) and _NO_DASH.match(lines[k]):
-            return k, "a dash without a blank behind it, or another sign", "begin with '- '."
+            return k, "a dash without a space after it, or another sign", "begin with '- '."
     if before is not None and lines[before].lstrip().startswith("- ") and here.lstrip()[:1] == "{":
-        return line, "an item of a list without its dash", "begin with '- '."
+        return line, "a list item without its dash", "begin with '- '."
     if here[column : column + 1] in ("}", "]") and column:
-        return line, "a bracket too many", "remove it."
+        return line, "a surplus bracket", "remove it."
     if here[column : column + 1] == "," and column:
-        meaning = "a comma behind a value that stands in no brackets"
+        meaning = "a comma after a value that is not in brackets"
         return line, meaning, "remove it, or put brackets {...} or [...] around all values."
     if "(" in here[:column] and ")" in here[column:]:
         return line, "round brackets", "write {key: value} or [value, value]."
@@ -342,7 +345,7 @@ def _mistyped(lines: list[str], line: int, column: int) -> tuple[int, str, str] 
             return (
                 before,
                 "a line without 'key: value'",
-                "write a colon and a blank behind the key.",
+                "write a colon and a space after the key.",
             )
     return None
 
@@ -354,7 +357,7 @@ def _syntax_error(error: MarkedYAMLError, text: str, path: Path) -> InputError:
     where = f"{path}:{mark.line + 1}" if mark else str(path)
     column = f" at column {mark.column + 1}" if mark else ""
     said = f"{error.problem or 'unreadable'}{f' {error.context}' if error.context else ''}"
-    hint = "check this line and the one before: indentation by spaces, 'key: value', brackets."
+    hint = "check this line and the previous one: indentation with spaces, 'key: value', brackets."
     for problem, (meaning, advice) in _YAML_WORDS.items():
         if problem in str(error.problem):
             said, hint = meaning, advice

@@ -88,14 +88,14 @@ def check_given(case: ImpactSections) -> None:
         not case.motion.is_straight,
         ("motion",),
         got=f"a motion sideways or a spin with '{name}', {what}",
-        expected="a motion along the axis: a port moves along it alone",
+        expected="a motion along the axis: a port moves only along the axis",
         hint="remove 'sideways_speed' and 'spin'.",
     )
     refuse_key_if(
         not case.motion.placement.is_centred,
         ("motion", "placement"),
         got=f"an off-axis placement with '{name}', {what}",
-        expected="a centred body: a port moves along the axis alone",
+        expected="a centred body: a port moves only along the axis",
         hint="remove 'placement'.",
         on_key=True,
     )
@@ -103,7 +103,7 @@ def check_given(case: ImpactSections) -> None:
         case.run.transfer is not None,
         ("run", "transfer"),
         got=f"transfer functions of the full order with '{name}', {what}",
-        expected="bodies that klack reduces itself",
+        expected="bodies that are reduced by klack",
         hint="remove 'transfer'.",
         on_key=True,
     )
@@ -111,7 +111,7 @@ def check_given(case: ImpactSections) -> None:
         case.reduction.shifts,
         ("reduction", "shifts"),
         got=f"shifts of attachment modes with '{name}', {what}",
-        expected="two meshed bodies: there are no attachment modes without",
+        expected="two meshed bodies: attachment modes need a mesh",
         hint="remove 'shifts'.",
         on_key=True,
     )
@@ -122,8 +122,8 @@ def check_given(case: ImpactSections) -> None:
         not case.contact.faces.is_none,
         ("contact", "friction" if case.contact.friction else "static_friction"),
         got=f"friction with '{name}', {what}",
-        expected="no friction: without a surface nothing is known of its slip",
-        hint="leave it out, or give the body a mesh.",
+        expected="no friction: without a surface the slip is unknown",
+        hint="leave friction out, or give the body a mesh.",
     )
     refuse_key_if(
         form is not None,
@@ -152,8 +152,8 @@ def _check_law(case: ImpactSections, name: str, what: str) -> None:
         else ("contact",),
         got=f"the local law '{law.kind}' with '{name}', {what}",
         expected="a given law: linear or hertz",
-        hint="add 'local_law: {kind: linear, stiffness: 1e9 N/m}': the contact zone alone; "
-        "the static compliance of the bodies is added.",
+        hint="add 'local_law: {kind: linear, stiffness: 1e9 N/m}', for only the contact "
+        "zone; the static compliance of the bodies is added.",
     )
     if law.kind == "hertz" and law.modulus is None:
         for body, given in case.bodies.items():
@@ -208,7 +208,7 @@ def check_consistency(case: ImpactSections) -> None:
     refuse_key_if(
         case.contact.worn is not None and not (centred and case.has_surfaces),
         ("contact", "worn"),
-        got="worn faces of bodies that meet off-axis, or of given models",
+        got="worn faces of off-axis bodies, or of given models",
         expected="a centred impact of bodies with meshes",
         hint="remove 'worn', or the placement, guide or shots.",
         on_key=True,
@@ -256,9 +256,9 @@ def _check_bodies(case: ImpactSections) -> None:
     refuse_key_if(
         case.opposite is not None and case.backing is not None,
         ("backing",),
-        got="a body behind the struck one together with an upper stop",
-        expected="one of them: no level has both",
-        hint="remove 'backing' or 'opposite'; a stroke has both (klack stroke).",
+        got="a body behind the struck body together with an upper stop",
+        expected="only one of them: no level supports both",
+        hint="remove 'backing' or 'opposite'; klack stroke supports both.",
         on_key=True,
     )
     has_third = case.opposite is not None or case.backing is not None
@@ -270,9 +270,9 @@ def _check_bodies(case: ImpactSections) -> None:
             ("bodies",),
             got=f"{len(case.bodies)} bodies ({one_of(case.bodies)})",
             expected=f"exactly {words}",
-            hint="one that moves and one that it hits; a third one as an upper stop ('opposite'), "
-            "or behind the struck one: "
-            f"'backing: {{between: [{names[1]}.SURFACE, {third}.SURFACE]}}'.",
+            hint="a moving body and the one that it hits; a third as an upper stop "
+            f"('opposite'), or behind the struck body: 'backing: {{between: [{names[1]}.SURFACE, "
+            f"{third}.SURFACE]}}'.",
         )
 
 
@@ -299,7 +299,7 @@ def _check_roles(case: ImpactSections) -> None:
     refuse_key_if(
         case.moving_body.fixed,
         ("bodies", moving.body, "fixed"),
-        got=f"supports of '{moving.body}', the body that moves",
+        got=f"supports of '{moving.body}', the moving body",
         expected="no supports there",
         hint="remove 'fixed', or swap the two surfaces in contact.between.",
         on_key=True,
@@ -311,7 +311,7 @@ def _check_roles(case: ImpactSections) -> None:
             ("bodies", flat.body, "geometry", "model"),
             got=f"an axisymmetric '{flat.body}' and a three-dimensional '{solid.body}'",
             expected="both axisymmetric or both three-dimensional",
-            hint=f"take 'model: swept' with 'layers: 18' for '{flat.body}'.",
+            hint=f"use 'model: swept' with 'layers: 18' for '{flat.body}'.",
         )
 
 
@@ -340,7 +340,7 @@ def _check_materials(case: CaseFile, name: str) -> None:
                 raise CaseProblem(
                     key,
                     got=f"no material for the part '{part}'",
-                    expected=f"one for each part: {one_of(parts)}",
+                    expected=f"a material for each part: {one_of(parts)}",
                     hint=f"add '{part}: {next(iter(case.materials))}'.",
                 )
 
@@ -398,7 +398,7 @@ def _check_opposite(case: ImpactSections) -> None:
         ("bodies", stop.body, "geometry", "model"),
         got=f"'{stop.body}' of another dimension than the moving body",
         expected="all bodies axisymmetric or all three-dimensional",
-        hint="take 'model: swept' with 'layers: 18'.",
+        hint="use 'model: swept' with 'layers: 18'.",
     )
 
 
@@ -425,7 +425,7 @@ def _check_backing(case: ImpactSections) -> None:
     if case.contact.gap is None:
         raise CaseProblem(
             ("contact",),
-            got="no gap between the body that moves and one that may shift on the body behind it",
+            got="no gap between the moving body and a body that may shift on the one behind it",
             expected="gap: the distance between them at the start",
             hint="add 'gap: 0 um'.",
             on_key=True,
@@ -435,7 +435,7 @@ def _check_backing(case: ImpactSections) -> None:
         middle.fixed,
         ("bodies", struck.body, "fixed"),
         got=f"supports of '{struck.body}', and a body behind it",
-        expected="no supports there: its contact with the body behind carries it",
+        expected="no supports there: the contact with the body behind carries it",
         hint="remove 'fixed', or 'backing' and the third body.",
         on_key=True,
     )
@@ -444,7 +444,7 @@ def _check_backing(case: ImpactSections) -> None:
         ("bodies", third.body, "geometry", "model"),
         got=f"'{third.body}' of another dimension than the moving body",
         expected="all bodies axisymmetric or all three-dimensional",
-        hint="take 'model: swept' with 'layers: 18'.",
+        hint="use 'model: swept' with 'layers: 18'.",
     )
     if backing.clamp is not None:
         key: Key = ("backing", "clamp", "surface")
@@ -453,14 +453,14 @@ def _check_backing(case: ImpactSections) -> None:
             backing.clamp.surface in (lower.surface, struck.surface),
             key,
             got=f"'{backing.clamp.surface}', where '{struck.body}' meets another body",
-            expected="a surface of its own, such as a shoulder",
+            expected="a separate surface, such as a shoulder",
             hint="split the edge in the drawing.",
         )
         refuse_key_if(
             not last.fixed,
             ("backing", "clamp"),
-            got=f"a clamp, but nothing holds '{third.body}'",
-            expected=f"bodies.{third.body}.fixed: a surface that takes the preload",
+            got=f"a clamp, but '{third.body}' is not held",
+            expected=f"bodies.{third.body}.fixed: a surface that carries the preload",
             hint="add 'fixed: [{surface: NAME}]' to it, or remove 'clamp'.",
             on_key=True,
         )
@@ -502,13 +502,13 @@ def _check_beside_backing(case: ImpactSections) -> None:
         if is_there:
             raise CaseProblem(
                 key,
-                got=f"{what}, and a body behind the struck one",
+                got=f"{what}, and a body behind the struck body",
                 expected="one impact along the axis at 'levels: [reduced]', of smooth faces as "
                 "drawn and with consistent laws",
                 hint="write 'run: {levels: [reduced]}'."
                 if what == "other levels"
-                else f"remove '{key[-1]}', or 'backing' and the third body; klack stroke takes "
-                "three bodies, too (how-to/seat-insert).",
+                else f"remove '{key[-1]}', or 'backing' and the third body; klack stroke also "
+                "supports three bodies (how-to/seat-insert).",
                 on_key=True,
             )
 
@@ -530,8 +530,8 @@ def _check_roughness(case: ImpactSections) -> None:
             raise CaseProblem(
                 ("contact", "roughness"),
                 got=f"rough faces and {what} ({'.'.join(map(str, key))})",
-                expected="one of them: no level has a layer of asperities together with that",
-                hint="remove one of them; contact.crown goes with all.",
+                expected="only one of them: no level combines a layer of asperities with that",
+                hint="remove one of them; contact.crown can be combined with everything.",
                 on_key=True,
             )
 
@@ -544,7 +544,7 @@ def _check_solid_only(case: ImpactSections) -> None:
     straight = waves is not None and waves.direction is not None
     asked: list[tuple[Key, object, str]] = [
         (("guide",), case.guide is not None, "a guide"),
-        (("shots",), case.shots is not None, "shots, which vary in their placement,"),
+        (("shots",), case.shots is not None, "shots, whose placements vary,"),
         (("contact", "tilt"), case.contact.tilt, "a tilt between the faces"),
         (("contact", "waviness", "direction"), straight, "straight waves on the faces"),
     ]
@@ -565,8 +565,8 @@ def _check_off_axis(case: ImpactSections) -> None:
         case.contact.angles is not None and case.dimension == 3,
         ("contact", "angles"),
         got="angles of bodies of three dimensions",
-        expected="axisymmetric bodies: the mesh of a solid has its own points round the ring",
-        hint="remove 'angles'; more 'layers' make a swept mesh finer round the ring.",
+        expected="axisymmetric bodies: the mesh of a solid has its own points around the ring",
+        hint="remove 'angles'; more 'layers' refine a swept mesh around the ring.",
         on_key=True,
     )
     if not case.leaves_axis:
@@ -603,7 +603,7 @@ def _check_oblique(case: ImpactSections) -> None:
             is_there,
             ("motion", key),
             got=f"a motion sideways or a spin, and {what}",
-            expected="one of them: those start along the axis",
+            expected="only one of them: those start along the axis",
             hint=f"remove '{key}', or '{name}'.",
             on_key=True,
         )
@@ -620,7 +620,7 @@ def _check_ends(case: ImpactSections) -> None:
             case.shots is not None or case.opposite is not None,
             key,
             got="a non-reflecting end together with 'shots' or 'opposite'",
-            expected="neither of them: both are for the interface level",
+            expected="neither: both belong to the interface level",
             hint="remove non_reflecting.",
             on_key=True,
         )
@@ -628,8 +628,8 @@ def _check_ends(case: ImpactSections) -> None:
             name != stop.body or not body.has_surfaces or not isinstance(body.material, str),
             key,
             got=f"a non-reflecting end of '{name}'",
-            expected=f"one of '{stop.body}', the body that is hit, meshed and of one material",
-            hint="the body that moves would be braked by it from the start.",
+            expected=f"an end of '{stop.body}', the body that is hit, meshed and of one material",
+            hint="it would brake the moving body from the start.",
             on_key=True,
         )
         check_surface(case, key, SurfaceName(body=name, surface=body.non_reflecting))
@@ -638,15 +638,15 @@ def _check_ends(case: ImpactSections) -> None:
             body.non_reflecting in (stop.surface, *held),
             key,
             got=f"'{body.non_reflecting}', a surface that is hit or held",
-            expected="another surface, the far end of a bar",
-            hint="waves leave where nothing holds the body.",
+            expected="another surface: the far end of a bar",
+            hint="waves leave where the body is not held.",
         )
         others = [level for level in case.run.levels if level != "full"]
         if others:
             raise CaseProblem(
                 ("run", "levels"),
                 got=f"the level '{others[0]}' with a non-reflecting end of '{name}'",
-                expected="the level full alone: modes of a body without an end are not computed",
+                expected="only the level full: a body without an end has no modes",
                 hint="levels: [full].",
             )
 
@@ -694,9 +694,9 @@ def _check_guide(case: ImpactSections) -> None:
             raise CaseProblem(
                 ("guide", "heights", i),
                 got=f"a height of {format_si(height, 'm')}",
-                expected=f"one on '{guide.surface}': {format_si(low, 'm')} to "
+                expected=f"a height on '{guide.surface}': {format_si(low, 'm')} to "
                 f"{format_si(high, 'm')}",
-                hint="heights are z in the drawing of the moving body.",
+                hint="heights are z coordinates in the drawing of the moving body.",
             )
 
 
@@ -708,7 +708,7 @@ def _check_shots(case: ImpactSections) -> None:
         case.guide is None and shots.friction is not None,
         ("shots", "friction"),
         got="friction without a guide",
-        expected="a section 'guide', in which the moving body rubs",
+        expected="a section 'guide' for the moving body",
         hint="add 'guide', or remove 'friction'.",
         on_key=True,
     )
@@ -735,7 +735,7 @@ def check_drawn_place(eccentricity: object, tilt: object) -> None:
         (eccentricity is None) != (tilt is None),
         ("shots", given),
         got=f"{given} without {other}, and a guide",
-        expected="both of them, or none: the guide then limits the placement",
+        expected="both or neither: without them the guide limits the placement",
         hint=f"add '{other}' (0 is possible), or remove '{given}'.",
         on_key=True,
     )
@@ -789,13 +789,13 @@ def check_noise(case: ImpactSections | ValveSections) -> None:
         refuse_key_if(
             surface.body == _moving(case),
             key,
-            got=f"'{surface}', but nothing holds '{surface.body}'",
+            got=f"'{surface}', but '{surface.body}' is not held",
             expected=f"surfaces of held bodies ({one_of(held)})",
             hint="a free body, such as a needle, radiates into the fluid.",
         )
         raise CaseProblem(
             ("bodies", surface.body),
-            got=f"no key 'fixed', but '{surface}' shall radiate sound (noise.surfaces)",
+            got=f"no key 'fixed', although '{surface}' radiates sound (noise.surfaces)",
             expected=f"fixed: the surfaces that hold '{surface.body}'",
             hint="add 'fixed: [{surface: NAME}]' to the body, or remove its surfaces from 'noise'.",
         )
@@ -817,14 +817,14 @@ def _check_mounts(case: ImpactSections | ValveSections, noise: CaseNoise) -> Non
         refuse_key_if(
             (on_mount and place.surface not in supports) or not supports,
             key,
-            got=f"'{place}', which nothing holds",
+            got=f"'{place}', which is not held",
             expected=f"a held surface: {one_of(held)}" if held else "a held body",
             hint=f"add it to bodies.{place.body}.fixed, or name another surface.",
         )
         if on_mount and place in taken:
             raise CaseProblem(
                 key,
-                got=f"'{place}', which mount '{taken[place]}' has already",
+                got=f"'{place}', which belongs to mount '{taken[place]}' already",
                 expected="each held surface in one mount",
                 hint="remove it from one of the two.",
             )
@@ -837,7 +837,7 @@ def _check_mounts(case: ImpactSections | ValveSections, noise: CaseNoise) -> Non
                 ("noise", "mounts"),
                 got=f"no mount at '{body}.{support.surface}', which is held",
                 expected=f"all held surfaces of '{body}'",
-                hint="add a mount, or list the surface beside those that it moves with.",
+                hint="add a mount, or list the surface together with those that it moves with.",
             )
     components = case.network.components if isinstance(case, ValveSections) else {}
     for name in noise.reactions or {}:
@@ -883,9 +883,9 @@ def _check_machine(case: ImpactSections | ValveSections, noise: CaseNoise) -> No
         refuse_key_if(
             getattr(noise, name) is not None,
             ("noise", name),
-            got=f"{name} beside a receiver",
-            expected="one machine below the valve",
-            hint=f"remove '{name}'; a spring below a mount is one of 'elements'.",
+            got=f"{name} together with a receiver",
+            expected="only one machine below the valve",
+            hint=f"remove '{name}'; describe a spring below a mount in 'elements'.",
             on_key=True,
         )
     if receiver.is_plate is not None:
@@ -896,7 +896,7 @@ def _check_machine(case: ImpactSections | ValveSections, noise: CaseNoise) -> No
     refuse_key_if(
         body is not None and body.inertia is None and len(noise.mounts or {}) > 1,
         ("noise", "receiver", "body"),
-        got="no inertia of a body below several mounts",
+        got="no inertia for a body below several mounts",
         expected="inertia: three moments about its centre of mass",
         hint="add 'inertia: [Ixx, Iyy, Izz]' in kg m^2.",
     )
@@ -905,10 +905,12 @@ def _check_machine(case: ImpactSections | ValveSections, noise: CaseNoise) -> No
             raise CaseProblem(
                 ("noise", "indicators", name),
                 got="a place" if isinstance(place, tuple) else f"the node '{place}'",
-                expected="a node of the file, beside the mounts"
+                expected="a node of the file, in addition to the mounts"
                 if receiver.file is not None
-                else "the place [x, y, z] of a sensor from the first mount, beside the mounts",
-                hint="name it other than a mount; write [10 mm, 0 mm, 0 mm] on a model.",
+                else "the position [x, y, z] of a sensor from the first mount, in addition to "
+                "the mounts",
+                hint="give it a name other than that of a mount; for a model write [10 mm, 0 mm, "
+                "0 mm].",
             )
     measured = receiver.file is not None or receiver.pressures is not None
     for ear, place in (noise.ears or {}).items():
@@ -916,9 +918,9 @@ def _check_machine(case: ImpactSections | ValveSections, noise: CaseNoise) -> No
             raise CaseProblem(
                 ("noise", "ears", ear),
                 got="a place" if isinstance(place, tuple) else f"the node '{place}'",
-                expected="a node of a pressure in the file"
+                expected="a node with a pressure in the file"
                 if measured
-                else "the place [x, y, z] of an ear above a plate, or a file of pressures",
+                else "the position [x, y, z] of an ear above a plate, or a file of pressures",
                 hint="write the node of the microphone."
                 if measured
                 else "write [0 m, 0 m, 1 m] for 1 m on the normal of a plate, or add "

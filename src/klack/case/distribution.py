@@ -174,7 +174,7 @@ def _size(value: Any, info: ValidationInfo, kind: Kind, key: tuple[str | int, ..
             key,
             got=format_si(number, kind.unit),
             expected="0 or more",
-            hint="directions are drawn over the whole circle; give sizes here.",
+            hint="directions are drawn over the whole circle; give magnitudes here.",
         )
     return number
 

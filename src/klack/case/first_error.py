@@ -28,7 +28,7 @@ def first_error(case: type[Section], error: ValidationError, found: ExpandedCase
         name = problem.got.split("'")[1]
         if (path := _elsewhere(found.data, name, ())) and path[:-1] != key:
             line = found.origin(path).where(on_key=True).removesuffix(f": {key_text(path)}")
-            hint = f"'{name}' stands in '{key_text(path[:-1])}' ({line}): check its indentation."
+            hint = f"'{name}' is in '{key_text(path[:-1])}' ({line}): check its indentation."
     if more:
         hint += f"\n({more} more {'problem' if more == 1 else 'problems'} in this file.)"
     got, written = problem.got, found.expressions.get(key)
@@ -53,7 +53,7 @@ def _with_its_place(case: type[BaseModel], key: Key, hint: str) -> str:
         return hint
     homes = _homes(case, str(key[-1]))
     if 0 < len(homes) <= _MOST_PLACES:
-        return f"its place is {' or '.join(homes)}; check its indentation."
+        return f"it belongs in {' or '.join(homes)}; check its indentation."
     return hint if len(key) > 1 else nearest(str(key[-1]), ("network",), hint)
 
 
@@ -138,7 +138,7 @@ _BOUNDS = {
 _TYPES = {
     "int_type": ("a whole number", "write it without quotes and without a point."),
     "int_from_float": ("a whole number", "write it without a point."),
-    "float_type": ("a number without unit", "write it without quotes."),
+    "float_type": ("a number without a unit", "write it without quotes."),
     "finite_number": ("a finite number", "write plain digits."),
     "string_type": ("text", 'put it into quotes: "...".'),
     "bool_type": ("true or false", "write it without quotes."),
@@ -155,7 +155,7 @@ _TYPES = {
 
 _PLAIN_NAME = (
     "a name of letters, digits and _, not starting with a digit",
-    "rename it here and where it is used: '-' is the sign of a difference.",
+    "rename it here and where it is used: '-' means a difference.",
 )
 
 
@@ -164,7 +164,7 @@ _MEANT = {
     **dict.fromkeys(("2d", "2-d", "plane", "rotational"), ("axisymmetric",)),
 }
 """Words of other programs, and klack's."""
-_WITHOUT_UNIT = "write the number alone; coordinates have the 'unit' that stands beside them."
+_WITHOUT_UNIT = "write only the number; the unit of coordinates is the 'unit' in the same section."
 
 
 def _is_number(text: str) -> bool:
@@ -181,7 +181,7 @@ def _words(kind: str, context: dict[str, Any], value: Any) -> tuple[str, str]:
         return _PLAIN_NAME
     if kind == "float_type" and isinstance(value, str) and not _is_number(value):
         minus = value.startswith("\N{MINUS SIGN}")
-        return "a number without unit", "write the minus as '-'." if minus else _WITHOUT_UNIT
+        return "a number without a unit", "write the minus sign as '-'." if minus else _WITHOUT_UNIT
     if kind == "int_type" and isinstance(value, str) and not _is_number(value):
         return "a whole number", "write digits, such as 5."
     if kind == "tuple_type" and isinstance(value, dict):
@@ -194,7 +194,7 @@ def _words(kind: str, context: dict[str, Any], value: Any) -> tuple[str, str]:
         name, form = _BOUNDS[kind]
         return (
             f"a value {form.format(f'{context[name]:g}')}",
-            "check the sign, the unit and the size.",
+            "check the sign, the unit and the magnitude.",
         )
     if kind in ("literal_error", "union_tag_invalid"):
         allowed = str(context.get("expected") or context.get("expected_tags"))
@@ -215,12 +215,12 @@ def _words(kind: str, context: dict[str, Any], value: Any) -> tuple[str, str]:
     if kind == "too_long":
         most = context["max_length"]
         commas = most == 2 and len(value) in (3, 4) and any(isinstance(x, int) for x in value)
-        hint = "remove the surplus value." + " A decimal sign is a point: [2.5, 1.9]." * commas
+        hint = "remove the surplus value." + " Use a decimal point: [2.5, 1.9]." * commas
         return f"at most {most} of them", hint
     if kind == "missing":
         return (
             "a list with one more value",
-            "separate values by commas: a point is [r, z], a pair is [first, second].",
+            "separate values with commas: a point is [r, z], a pair is [first, second].",
         )
     if kind == "string_too_short":
         return "some text", "write one line."

@@ -20,7 +20,7 @@ class Matrices(Section):
         description="File of K: ANSYS .full, CalculiX .sti, Matrix Market, Harwell-Boeing, Abaqus "
         ".mtx, Nastran .op4 or .pch, MATLAB .mat, NumPy .npz."
     )
-    mass: InputPath = Field(description="File of M; may be the same as that of K.")
+    mass: InputPath = Field(description="File of M; may be the file of K.")
     stiffness_name: Text | None = Field(
         default=None, description="Name of K in a file of several matrices."
     )
@@ -29,8 +29,8 @@ class Matrices(Section):
     )
     dofs: InputPath | None = Field(
         default=None,
-        description="Node and direction of each row (CalculiX .dof, or a table: node, direction). "
-        "Default: as in the file, else x, y, z node by node.",
+        description="Node and direction of each row (CalculiX .dof, or a table: node, "
+        "direction). Default: as in the file, otherwise x, y, z node by node.",
     )
     units: UnitSystemName = Field(description="Consistent units of the matrices, e.g. mm t s.")
 
@@ -41,7 +41,7 @@ class ModelPort(Section):
     input: Count | Text = Field(description="Number (from 1) or name of the force.")
     output: Count | Text | None = Field(
         default=None,
-        description="Number or name of the displacement; default that of the input.",
+        description="Number or name of the displacement; default: the same as of the input.",
     )
 
 
@@ -60,7 +60,7 @@ class ReducedModel(Section):
         min_length=1, description="name: its force and its displacement, positive along +z."
     )
     mass: Mass | None = Field(
-        default=None, gt=0, description="Mass of the body, to check a free one."
+        default=None, gt=0, description="Mass of the body, to check the model of a free body."
     )
 
     @model_validator(mode="after")

@@ -58,7 +58,7 @@ def free_parameters(case: ValveSections) -> tuple[FreeParameter, ...]:
             if key in used:
                 raise CaseProblem(
                     ("calibration", "parameters", parameter.name, "key", i),
-                    got=f"'{parameter.places[i]}', which '{used[key]}' fits as well",
+                    got=f"'{parameter.places[i]}', which '{used[key]}' also fits",
                     expected="each key in one parameter",
                     hint="remove it from one of them.",
                 )
@@ -112,7 +112,7 @@ def _resolved(case: ValveSections, name: str, item: CalibrationParameter) -> Fre
             where,
             got=f"bounds from {format_si(lower, unit)} to {format_si(upper, unit)}",
             expected=f"bounds around {format_si(first.value, unit)}, the value in the case",
-            hint="the search begins at the value of the case: change it, or the bounds.",
+            hint="the search begins at the value of the case: change the value or the bounds.",
         )
     return FreeParameter(name, tuple(places), lower, upper, first.value)
 

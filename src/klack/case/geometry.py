@@ -43,7 +43,7 @@ class Edge(Section):
     clockwise: bool | None = Field(
         default=None,
         strict=True,
-        description="Sense of an arc; default the shorter arc.",
+        description="Direction of an arc; default: the shorter arc.",
     )
     name: Name | None = Field(
         default=None, description="Name of the surface that the edge forms; edges may share one."
@@ -51,12 +51,12 @@ class Edge(Section):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        kind = self._exactly_one(("line", "arc", "close"), "where the edge goes")
+        kind = self._exactly_one(("line", "arc", "close"), "the end of the edge")
         if kind != "arc":
-            return self._refuse_with(("centre", "clockwise"), kind, "only an arc is curved")
+            return self._refuse_with(("centre", "clockwise"), kind, "only an arc has a centre")
         if self.centre is None:
             hint = "add the point (r, z) with the same distance to both ends."
-            raise CaseProblem((), got="an arc without centre", expected="centre", hint=hint)
+            raise CaseProblem((), got="an arc without a centre", expected="centre", hint=hint)
         return self
 
 
@@ -171,12 +171,13 @@ class MeshFile(Section):
     )
     unit: LengthUnit | None = Field(
         default=None,
-        description="Unit of its coordinates, e.g. mm; required unless the file has it.",
+        description="Unit of its coordinates, e.g. mm; required unless the file states it.",
     )
     elements: Literal["all", "solids-only"] = Field(
         default="all",
-        description="all: the file holds solids only, and surface elements on them; solids-only: "
-        "beams, springs, masses, rigid elements and shells are left out and counted in a note.",
+        description="all: the file contains only solids and surface elements on them; "
+        "solids-only: beams, springs, masses, rigid elements and shells are left out and "
+        "counted in a note.",
     )
 
     @property
@@ -211,16 +212,16 @@ class Geometry(Section):
     step: StepFile | None = Field(default=None, description="CAD file.")
     mesh: MeshFile | None = Field(default=None, description="Finished mesh.")
     nodes: NodeTable | None = Field(
-        default=None, description="Nodes alone, of a body given by its matrices."
+        default=None, description="Only nodes, for a body given by its matrices."
     )
     model: Model | None = Field(
         default=None,
-        description="axisymmetric: the half section alone (fastest); swept: three-dimensional, the "
-        "meshed half section, revolved in layers; solid: three-dimensional, unstructured. Needed "
-        "for a profile; a step file is always solid, a mesh solid by default.",
+        description="axisymmetric: only the half section (fastest); swept: three-dimensional, "
+        "the meshed half section revolved in layers; solid: three-dimensional, unstructured. "
+        "Needed for a profile; a step file is always solid, a mesh solid by default.",
     )
     layers: Count | None = Field(
-        default=None, ge=6, description="Layers round the circle of a swept mesh."
+        default=None, ge=6, description="Layers around the circumference of a swept mesh."
     )
     extent: Length | None = Field(
         default=None,
@@ -231,7 +232,7 @@ class Geometry(Section):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        kind = self._exactly_one(("profile", "step", "mesh", "nodes"), "where the shape comes from")
+        kind = self._exactly_one(("profile", "step", "mesh", "nodes"), "the source of the shape")
         allowed = {
             "profile": ("axisymmetric", "swept", "solid"),
             "step": ("solid",),
@@ -241,7 +242,7 @@ class Geometry(Section):
         refuse_key_if(
             kind == "profile" and self.model is None,
             (),
-            got="a profile without model",
+            got="a profile without a model",
             expected="model: axisymmetric, swept or solid",
             hint="start with axisymmetric; swept for bodies held in sectors.",
         )
@@ -253,10 +254,12 @@ class Geometry(Section):
                 hint="a profile can be turned into any of the three models.",
             )
         if self.model == "swept" and self.layers is None:
-            hint = "use 18: contact of turned parts needs few layers."
+            hint = "use 18: contact of turned parts needs only a few layers."
             raise CaseProblem((), got="a swept body without layers", expected="layers", hint=hint)
         if self.model != "swept":
-            return self._refuse_with(("layers",), f"model {self.model}", "only swept has layers")
+            return self._refuse_with(
+                ("layers",), f"model {self.model}", "only a swept body has layers"
+            )
         return self
 
     @classmethod
@@ -279,12 +282,14 @@ class ContactRefinement(Section):
     """Small elements around the ring or point of first touch."""
 
     size: Length = Field(
-        examples=["5 um"], gt=0, description="Edge length there; half the contact width or less."
+        examples=["5 um"],
+        gt=0,
+        description="Edge length at the contact; half the contact width or less.",
     )
     extent: Length = Field(
         examples=["50 um"],
         gt=0,
-        description="Radius around the point of first touch in which it holds.",
+        description="Radius around the point of first touch within which it applies.",
     )
 
 
@@ -330,7 +335,7 @@ class Sectors(Section):
             raise CaseProblem(
                 ("width",),
                 got=f"{self.count} sectors of {self.width * 360 / tau:g} deg",
-                expected="360 deg or less altogether",
+                expected="360 deg or less in total",
                 hint="leave 'sectors' out to hold the whole surface.",
             )
         return self
@@ -341,5 +346,5 @@ class Support(Section):
 
     surface: Name = Field(description="Name of the surface.")
     sectors: Sectors | None = Field(
-        default=None, description="Held sectors; default the whole surface."
+        default=None, description="Held sectors; default: the whole surface."
     )

@@ -29,7 +29,7 @@ class ConsistentGuideLaw(Section):
 
     kind: Literal["consistent"] = Field(description="Which law: consistent.")
     bore: Stiffness | None = Field(
-        default=None, gt=0, description="Stiffness of the bore in series; default rigid."
+        default=None, gt=0, description="Stiffness of the bore in series; default: rigid."
     )
 
 
@@ -60,10 +60,13 @@ class CaseGuide(Section):
         description="Force against penetration of the bore: consistent or linear.",
     )
     friction: Ratio = Field(
-        default=0.0, ge=0, le=2, description="Coulomb's coefficient, along the shaft and around it."
+        default=0.0,
+        ge=0,
+        le=2,
+        description="Coefficient of Coulomb friction, along the shaft and around it.",
     )
     viscous: DampingCoefficient = Field(
-        default=0.0, ge=0, description="Axial friction per speed, of the film in the guide."
+        default=0.0, ge=0, description="Axial friction of the film in the guide, per speed."
     )
 
     @model_validator(mode="after")
@@ -96,12 +99,12 @@ class Placement(Section):
     """
 
     eccentricity: Length = Field(default=0.0, ge=0, description="Distance from the axis.")
-    direction: Angle = Field(default=0.0, description="Its direction, from x towards y.")
+    direction: Angle = Field(default=0.0, description="Direction of the offset, from x towards y.")
     tilt: Angle = Field(
-        default=0.0, ge=0, le=_LARGEST_TILT, description="Angle between its axis and z."
+        default=0.0, ge=0, le=_LARGEST_TILT, description="Angle between the axis of the body and z."
     )
     tilt_direction: Angle = Field(
-        default=0.0, description="Direction in which its upper end is tilted, from x towards y."
+        default=0.0, description="Direction in which the upper end is tilted, from x towards y."
     )
 
     @property
@@ -124,7 +127,7 @@ class GuideFilm(Section):
     cut_off: Length = Field(
         default=0.3e-6,
         gt=0,
-        description="Height that the roughness leaves where the shaft touches.",
+        description="Film height left by the roughness where the shaft touches.",
     )
 
 
@@ -145,7 +148,7 @@ class BodyGuide(ValveGuide):
     on: BodySurface | None = Field(
         default=None,
         description="Cylindrical surface of a moving body on which it slides, such as "
-        "needle.shaft; default in a fixed bore.",
+        "needle.shaft; default: a fixed bore.",
     )
 
 
@@ -159,6 +162,6 @@ class ValvePlacement(Placement):
     seed: int | None = Field(
         default=None,
         ge=0,
-        description="Draw the position instead: axis uniformly within the clearance at the lowest "
-        "and the highest height of the guide, from this seed.",
+        description="Draw the position at random from this seed: axis uniformly within the "
+        "clearance at the lowest and the highest height of the guide.",
     )

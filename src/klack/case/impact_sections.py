@@ -79,7 +79,8 @@ class CaseOpposite(Section):
         default=None,
         ge=0,
         le=MOST_FRICTION,
-        description="Coulomb's coefficient between the faces here; default as at the contact.",
+        description="Coefficient of Coulomb friction between the faces here; default: as at the "
+        "contact.",
     )
 
     def faces(self, contact: Friction) -> Friction:
@@ -100,10 +101,10 @@ class CaseOpposite(Section):
 class Clamp(Section):
     """What presses the struck body onto the one behind it, such as a sleeve."""
 
-    surface: Name = Field(description="Surface of the struck body that it presses, along -z.")
-    preload: Force = Field(gt=0, description="Its force at the start, a state of rest.")
+    surface: Name = Field(description="Surface of the struck body that the clamp presses along -z.")
+    preload: Force = Field(gt=0, description="Clamping force at the start, at rest.")
     stiffness: Stiffness = Field(
-        default=0.0, ge=0, description="Of the clamp itself; default a constant force."
+        default=0.0, ge=0, description="Stiffness of the clamp itself; default: a constant force."
     )
 
 
@@ -116,8 +117,12 @@ class CaseBacking(Section):
     between: tuple[BodySurface, BodySurface] = Field(
         description="Lower surface of the struck body, then the surface of the third body below."
     )
-    gap: Length = Field(default=0.0, ge=0, description="Between these two at the start.")
-    clamp: Clamp | None = Field(default=None, description="Default none: the struck body is loose.")
+    gap: Length = Field(
+        default=0.0, ge=0, description="Gap between these two surfaces at the start."
+    )
+    clamp: Clamp | None = Field(
+        default=None, description="Clamp of the struck body; without it the body is loose."
+    )
     reach: Length | None = Field(
         default=None, gt=0, description="Largest gap of points that may come into contact."
     )
@@ -143,16 +148,16 @@ class FaceWaviness(Section):
     """Waves on the faces, of both together."""
 
     amplitude: Length = Field(
-        gt=0, description="Half of the height from valley to crest, of both faces together."
+        gt=0, description="Half the height from valley to crest, of both faces together."
     )
     wavelength: Length = Field(gt=0, description="Distance from crest to crest.")
     direction: Angle | None = Field(
         default=None,
-        description="Along which straight waves follow each other, from x towards y; default "
-        "round the centre of the face, as turning leaves them.",
+        description="Direction in which straight waves follow each other, from x towards y; "
+        "default: waves around the centre of the face, as left by turning.",
     )
     phase: Angle = Field(
-        default=0.0, description="Of the centre of the face: 0 deg a crest, 180 deg a valley."
+        default=0.0, description="Phase at the centre of the face: 0 deg a crest, 180 deg a valley."
     )
 
     @model_validator(mode="after")
@@ -196,7 +201,8 @@ class FaceRoughness(Section):
     )
     curve: tuple[tuple[Length, Pressure], ...] | None = Field(
         default=None,
-        description="Instead: measured pairs of closure and pressure, both rising from 0.",
+        description="Measured pairs of closure and pressure, both rising from 0; instead of the "
+        "other keys.",
     )
 
     @model_validator(mode="after")
@@ -218,9 +224,9 @@ class FaceRoughness(Section):
         if given:
             raise CaseProblem(
                 (given[0],),
-                got=f"'{given[0]}' beside a measured 'curve'",
+                got=f"'{given[0]}' together with a measured 'curve'",
                 expected="one of them",
-                hint="the curve says all; remove the other keys.",
+                hint="the curve is sufficient; remove the other keys.",
                 on_key=True,
             )
         points = ((0.0, 0.0), *self.curve) if self.curve[:1] != ((0.0, 0.0),) else self.curve
@@ -238,7 +244,7 @@ class FaceRoughness(Section):
     def in_words(self) -> str:
         """For example ``asperities of 200 nm rms``."""
         if self.rms is None:
-            return "asperities by a measured curve"
+            return "asperities with a measured curve"
         return f"asperities of {format_si(self.rms, 'm', 3)} rms"
 
     def _with_round_summits(self) -> Self:
@@ -276,7 +282,7 @@ class LinearLocalLaw(Section):
 
     kind: Literal["linear"] = Field(description="Which law: linear.")
     stiffness: Stiffness = Field(
-        examples=["1e10 N/m"], gt=0, description="Stiffness of the contact zone alone."
+        examples=["1e10 N/m"], gt=0, description="Stiffness of only the contact zone."
     )
 
 
@@ -288,8 +294,8 @@ class HertzLocalLaw(Section):
     modulus: Modulus | None = Field(
         default=None,
         gt=0,
-        description="Effective modulus E*: 1/E* = (1-nu1^2)/E1 + (1-nu2^2)/E2; default "
-        "that of the materials.",
+        description="Effective modulus E*: 1/E* = (1-nu1^2)/E1 + (1-nu2^2)/E2; default: from "
+        "the materials.",
     )
 
 
@@ -310,14 +316,15 @@ class CaseWorn(Section):
     """Set that earlier impacts have left in both faces; the bodies are elastic from there on."""
 
     force: Force = Field(
-        gt=0, description="Highest force of those impacts, up to which the faces stay elastic."
+        gt=0,
+        description="Highest force of the earlier impacts, up to which the faces stay elastic.",
     )
     radius: tuple[Length, ...] = Field(
-        min_length=2, description="Distances from the axis of motion, rising."
+        min_length=2, description="Distances from the axis of motion, ascending."
     )
     opening: tuple[Length, ...] = Field(
         min_length=2,
-        description="Gap that has stayed between both faces at each radius, along their normal.",
+        description="Permanent gap between the faces at each radius, along their normal.",
     )
 
     @model_validator(mode="after")
@@ -334,7 +341,7 @@ class CaseWorn(Section):
                 raise CaseProblem(
                     ("radius", i + 1),
                     got=f"{format_si(above, 'm')} after {format_si(below, 'm')}",
-                    expected="radii that rise, from 0 on",
+                    expected="ascending radii from 0",
                     hint="sort them, each with its opening.",
                 )
         if max(self.opening) - min(self.opening) > _MOST_WORN * self.radius[-1]:
@@ -343,7 +350,7 @@ class CaseWorn(Section):
                 got=f"a set of {format_si(max(self.opening) - min(self.opening), 'm', 3)} at "
                 f"{format_si(self.radius[-1], 'm', 3)} from the axis",
                 expected=f"at most {_MOST_WORN:g} of the radius",
-                hint="check the units: a set is 0.01 to 10 um as a rule.",
+                hint="check the units: a permanent set is usually 0.01 to 10 um.",
             )
         return self
 
@@ -361,7 +368,7 @@ class CaseContact(Section):
     )
     gap: Length | None = Field(
         default=None,
-        description="Initial distance to first touch along z; default as drawn.",
+        description="Initial distance to first touch along z; default: as drawn.",
     )
     reach: Length | None = Field(
         default=None, gt=0, description="Largest gap of points that may come into contact."
@@ -370,29 +377,33 @@ class CaseContact(Section):
         default=None,
         ge=8,
         le=512,
-        description="Contact points round each ring of axisymmetric bodies that meet off-axis; "
-        "default 48.",
+        description="Contact points around each ring of axisymmetric bodies that meet off-axis; "
+        "default: 48.",
     )
     worn: CaseWorn | None = Field(
-        default=None, description="Set of both faces after earlier impacts; default as made."
+        default=None,
+        description="Permanent set of both faces after earlier impacts; default: as made.",
     )
     local_law: LocalLaw = Field(
         default=ConsistentLocalLaw(kind="consistent"), description="Local law of the reduced level."
     )
     friction: Ratio = Field(
-        default=0.0, ge=0, le=MOST_FRICTION, description="Coulomb's coefficient between the faces."
+        default=0.0,
+        ge=0,
+        le=MOST_FRICTION,
+        description="Coefficient of Coulomb friction between the faces.",
     )
     static_friction: Ratio | None = Field(
         default=None,
         ge=0,
         le=MOST_FRICTION,
-        description="The same while they stick, at least 'friction'; default the same.",
+        description="Coefficient while the faces stick, at least 'friction'; default: 'friction'.",
     )
     stribeck_speed: Speed = Field(
         default=0.0,
         ge=0,
-        description="Speed of slip over which the static coefficient fades to 'friction'; "
-        "default at once.",
+        description="Slip speed over which the static coefficient decays to 'friction'; "
+        "default: at once.",
     )
     crown: Length = Field(
         default=0.0,
@@ -401,10 +412,10 @@ class CaseContact(Section):
         description="Height of the centre of the face above its edge, of both faces together.",
     )
     waviness: FaceWaviness | None = Field(
-        default=None, description="Waves on the faces; default none."
+        default=None, description="Waves on the faces; default: none."
     )
     roughness: FaceRoughness | None = Field(
-        default=None, description="Asperities of the faces; default smooth."
+        default=None, description="Asperities of the faces; default: smooth."
     )
     tilt: Angle = Field(
         default=0.0,
@@ -413,7 +424,7 @@ class CaseContact(Section):
         description="Angle between the faces when their bodies are upright.",
     )
     tilt_direction: Angle = Field(
-        default=0.0, description="Towards which a tilted face opens, from x towards y."
+        default=0.0, description="Direction towards which a tilted face opens, from x towards y."
     )
 
     @model_validator(mode="after")
@@ -475,7 +486,7 @@ class Spring(Section):
 
 
 class Motion(Section):
-    """Approach of the moving body."""
+    """Start of the moving body."""
 
     speed: Speed = Field(gt=0, description="Speed in -z at the start, towards the stop.")
     force: Force = Field(
@@ -483,19 +494,21 @@ class Motion(Section):
     )
     spring: Spring | None = Field(default=None, description="Closing spring.")
     placement: Placement = Field(
-        default=Placement(), description="Eccentricity and tilt; default centred and upright."
+        default=Placement(), description="Eccentricity and tilt; default: centred and upright."
     )
     sideways_speed: Speed = Field(
         default=0.0,
         ge=0,
         description="Speed of the centre of mass across z at the start; levels interface and full.",
     )
-    sideways_direction: Angle = Field(default=0.0, description="Its direction, from x towards y.")
+    sideways_direction: Angle = Field(
+        default=0.0, description="Direction of the offset, from x towards y."
+    )
     spin: tuple[AngularVelocity, AngularVelocity, AngularVelocity] = Field(
         default=(0.0, 0.0, 0.0),
         examples=[["0 rad/s", "100 rad/s", "0 rad/s"]],
         description="Angular velocity about x, y and z through the centre of mass at the start; "
-        "the same levels. A body that rolls towards x turns about +y.",
+        "levels interface and full. A body that rolls towards x turns about +y.",
     )
 
     @property
@@ -522,12 +535,12 @@ class TransferSweep(Section):
     lowest: Frequency = Field(alias="from", gt=0, description="Lowest frequency.")
     highest: Frequency = Field(alias="to", gt=0, description="Highest frequency.")
     points: Annotated[int, Strict()] = Field(
-        default=200, ge=2, le=5000, description="Number of frequencies, logarithmic."
+        default=200, ge=2, le=5000, description="Number of frequencies, logarithmically spaced."
     )
     nodes: Mapping[Name, tuple[Length, ...]] = Field(
         default_factory=dict,
-        description="Of a body: a place in its drawing, [r, z] axisymmetric or [x, y, z] solid. "
-        "klack reduce reads the node next to it, along the axis, beside the contact.",
+        description="Per body, a position in its drawing, [r, z] axisymmetric or [x, y, z] "
+        "solid. klack reduce reads the nearest node along the axis, in addition to the contact.",
         examples=[{"needle": ["0 mm", "0 mm", "-0.6 mm"]}],
     )
 
@@ -564,10 +577,10 @@ class Run(Section):
         default=1,
         ge=1,
         le=1000,
-        description="Impacts of the same start, one after another on the same faces that yield.",
+        description="Number of equal impacts, one after another on the same yielding faces.",
     )
     run_in: bool = Field(
-        default=False, description="Further impacts until the faces do not yield any more."
+        default=False, description="Whether impacts are repeated until the faces yield no further."
     )
 
     @model_validator(mode="after")
@@ -593,8 +606,8 @@ class Lumped(Section):
         default=None,
         gt=0,
         le=1,
-        description="Dashpot in parallel (Hunt and Crossley 1975), given by its "
-        "restitution; default no loss.",
+        description="Dashpot in parallel (Hunt and Crossley 1975), given by its restitution; "
+        "default: no loss.",
     )
 
 
@@ -611,7 +624,7 @@ class ImpactSections(CaseFile):
         default=None, description="Upper stop, a third body, for bounces between both ends."
     )
     backing: CaseBacking | None = Field(
-        default=None, description="Third body below the struck one, with a contact of its own."
+        default=None, description="Third body below the struck body, with its own contact."
     )
     reduction: Reduction = Field(
         default=Reduction(), description="Kept modes and their correction."
@@ -627,7 +640,8 @@ class ImpactSections(CaseFile):
     )
     noise: CaseNoise | None = Field(default=None, description="Input of klack noise.")
     study: CaseStudy | None = Field(
-        default=None, description="What klack study varies, and what it computes."
+        default=None,
+        description="Parameters that klack study varies, and measures that it computes.",
     )
 
     def plausible_numbers(self) -> Iterator[Number]:

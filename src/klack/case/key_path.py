@@ -46,7 +46,7 @@ class Quantity:
                 str(self),
                 got=f"'{text}'",
                 expected=f"a value {words}" if words != details["msg"] else words,
-                hint="the limits of the key itself hold for its bounds as well.",
+                hint="the limits of the key also hold for its bounds.",
             ) from None
 
     def written(self, value: float) -> str | float:
@@ -65,7 +65,7 @@ def split_path(text: str) -> Key:
         (),
         got=f"'{text}'",
         expected="keys joined with points, e.g. network.components.spring.preload",
-        hint="write the path of the key from the top of the case.",
+        hint="write the path of the key from the top level of the case.",
     )
     return tuple(int(part) if part.isdigit() else part for part in parts)
 
@@ -85,7 +85,7 @@ def node_at(case: Section, key: Key) -> tuple[Any, FieldInfo | None]:
                 got=f"'{'.'.join(map(str, key))}', but there is no '{part}'"
                 + (f" in '{'.'.join(map(str, key[:depth]))}'" if depth else ""),
                 expected=f"one of: {one_of(map(str, known))}",
-                hint=nearest(str(part), map(str, known), "write the path from the top."),
+                hint=nearest(str(part), map(str, known), "write the path from the top level."),
             )
         if isinstance(node, Section):
             field = next(
@@ -118,7 +118,7 @@ def quantity_at(case: Section, key: Key) -> Quantity:
         got = "no value" if node is None else "no number with a unit"
         raise CaseProblem(
             (),
-            got=f"'{'.'.join(map(str, key))}', which holds {got}",
+            got=f"'{'.'.join(map(str, key))}', which contains {got}",
             expected="a key with one number and unit, such as a force or a share",
             hint=_advice(key, node),
         )
@@ -135,14 +135,14 @@ def _require_of_case(case: Section, key: Key) -> None:
     refuse_key_if(
         copy,
         (),
-        got=f"'{place}', which stands in the part '{copy}'",
+        got=f"'{place}', which is in the part '{copy}'",
         expected="a key of the case itself",
         hint="make it a parameter of the part, and name include.N.with.PARAMETER (N from 0).",
     )
     refuse_key_if(
         not found.behind(key),
         (),
-        got=f"'{place}', which no value of the case follows from",
+        got=f"'{place}', on which no value of the case depends",
         expected="a parameter that the case uses",
         hint="use it in an expression: '= ...'.",
     )

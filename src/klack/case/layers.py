@@ -22,20 +22,22 @@ class _Numbers(Section):
     modulus: Modulus | None = Field(
         default=None,
         gt=0,
-        description="With a thickness: pressure over the change of thickness per thickness, of the "
-        "layer as it is held, not of a free sample.",
+        description="With a thickness: pressure over relative change of thickness, of the "
+        "constrained layer, not of a free sample.",
     )
     shear_modulus: Modulus | None = Field(
         default=None, gt=0, description="With a thickness: shear stress over shear angle."
     )
     normal: BedStiffness | None = Field(
-        default=None, gt=0, description="Instead: pressure over the change of thickness."
+        default=None, gt=0, description="Instead of modulus: pressure over change of thickness."
     )
     tangential: BedStiffness | None = Field(
-        default=None, gt=0, description="Instead: shear stress over the slip between the faces."
+        default=None,
+        gt=0,
+        description="Instead of shear_modulus: shear stress over slip between the faces.",
     )
     loss_factor: Ratio = Field(
-        default=0.0, ge=0, lt=1, description="Imaginary over real stiffness."
+        default=0.0, ge=0, lt=1, description="Imaginary over real part of the stiffness."
     )
 
     @property
@@ -52,7 +54,7 @@ class _Numbers(Section):
             raise CaseProblem(
                 (),
                 got=f"{given} with {'no' if thickness is None else 'a'} thickness",
-                expected="thickness, modulus and shear_modulus, or normal and tangential alone",
+                expected="thickness, modulus and shear_modulus, or only normal and tangential",
                 hint="a modulus over the thickness is a stiffness per area; the shear modulus of "
                 "rubber is about a third of its modulus without lateral constraint.",
             )
@@ -64,24 +66,28 @@ class _Numbers(Section):
 class LayerRow(_Numbers):
     """Stiffness and loss at one frequency."""
 
-    frequency: Frequency = Field(gt=0, description="At which these hold; rising.")
+    frequency: Frequency = Field(gt=0, description="Frequencies of the rows, ascending.")
 
 
 class CaseLayer(_Numbers):
     """A thin layer between two parts, with stiffness and loss: one of each, or a table."""
 
     thickness: Length | None = Field(
-        default=None, gt=0, description="Of the layer, which is drawn without one; with moduli."
+        default=None,
+        gt=0,
+        description="Thickness of the layer, which is drawn without thickness; with moduli.",
     )
     table: tuple[LayerRow, ...] | None = Field(
         default=None,
         min_length=2,
-        description="Instead of single numbers: rows over frequency, constant beyond its ends.",
+        description="Rows over frequency, constant beyond the ends; instead of single numbers.",
     )
     frequency: Frequency | None = Field(
         default=None,
         gt=0,
-        description="With a table: where the stiffness is taken; losses follow each mode.",
+        description="With a table: frequency at which the stiffness is taken; losses are taken "
+        "at the "
+        "frequency of each mode.",
     )
 
     @model_validator(mode="after")
@@ -93,8 +99,8 @@ class CaseLayer(_Numbers):
         for name in (*self.given, *(["loss_factor"] if self.loss_factor else [])):
             raise CaseProblem(
                 (name,),
-                got=f"{name} beside a table",
-                expected="numbers in the rows of the table alone",
+                got=f"{name} together with a table",
+                expected="numbers only in the rows of the table",
                 hint=f"remove {name}.",
                 on_key=True,
             )
@@ -123,9 +129,9 @@ class CaseLayer(_Numbers):
                 got="a table without 'frequency'"
                 if self.frequency is None
                 else format_si(self.frequency, "Hz", 4),
-                expected=f"the frequency at which the stiffness is taken, {ends} as the table",
-                hint="take that of the modes that strain the layer most: klack inspect and klack "
-                "impact show them.",
+                expected=f"the frequency at which the stiffness is taken, {ends} as in the table",
+                hint="use the frequency of the modes that strain the layer most: klack inspect "
+                "and klack impact show them.",
             )
         return self
 

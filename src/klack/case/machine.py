@@ -41,27 +41,31 @@ class NoiseElement(Section):
     """
 
     stiffness: dict[Along, Annotated[Stiffness, Field(gt=0)]] | None = Field(
-        default=None, min_length=1, description="By direction; an element without mass."
+        default=None,
+        min_length=1,
+        description="Stiffness by direction, of an element without mass.",
     )
     damping: dict[Along, Annotated[DampingCoefficient, Field(ge=0)]] | None = Field(
-        default=None, description="By direction, viscous, beside the stiffness."
+        default=None, description="Viscous damping by direction, in parallel with the stiffness."
     )
     loss_factor: Ratio = Field(
         default=0.0,
         ge=0,
         lt=2,
-        description="Imaginary over real stiffness at every frequency, beside the damping.",
+        description="Imaginary over real part of the stiffness at every frequency, in addition "
+        "to the "
+        "damping.",
     )
     file: InputPath | None = Field(
         default=None,
-        description="Table of the dynamic stiffness over frequency (ISO 10846): k21 alone, or k11, "
-        "k21 and k22 where its mass counts.",
+        description="Table of the dynamic stiffness over frequency (ISO 10846): only k21, or "
+        "k11, k21 and k22 where its mass counts.",
     )
 
     @model_validator(mode="after")
     def _one(self) -> Self:
-        if self._exactly_one(("stiffness", "file"), "how stiff it is") == "file":
-            self._refuse_with(("damping",), "a file", "the file holds the losses")
+        if self._exactly_one(("stiffness", "file"), "the stiffness") == "file":
+            self._refuse_with(("damping",), "a file", "the file contains the losses")
         for direction in self.damping or {}:
             refuse_key_if(
                 direction not in (self.stiffness or {}),
@@ -81,7 +85,7 @@ class NoiseInfinitePlate(Section):
     foot_radius: Length = Field(
         default=0.0,
         ge=0,
-        description="Of round feet, which carry moments as well; 0: forces alone.",
+        description="Radius of round feet, which also carry moments; 0: only forces.",
     )
 
 
@@ -92,22 +96,24 @@ class NoiseFinitePlate(NoiseInfinitePlate):
         description="Lengths along x and y."
     )
     at: tuple[Length, Length] = Field(
-        description="First mount from a corner; others follow from the drawing."
+        description="Position of the first mount from a corner; the others follow from the drawing."
     )
-    loss_factor: Ratio = Field(default=0.01, gt=0, lt=1, description="Of the mounted plate.")
+    loss_factor: Ratio = Field(
+        default=0.01, gt=0, lt=1, description="Loss factor of the mounted plate."
+    )
 
 
 class NoiseRigidBody(Section):
     """Free rigid body."""
 
-    mass: Mass = Field(gt=0, description="Of the machine alone, without the valve.")
+    mass: Mass = Field(gt=0, description="Mass of the machine without the valve.")
     inertia: tuple[Inertia, Inertia, Inertia] | None = Field(
         default=None,
-        description="Principal moments about x, y, z; without them one mount alone, whose "
-        "rotations are not known.",
+        description="Principal moments about x, y, z; without them only one mount, with unknown "
+        "rotations.",
     )
     centre: Place = Field(
-        default=(0.0, 0.0, 0.0), description="Of mass, in the frame of the machine."
+        default=(0.0, 0.0, 0.0), description="Centre of mass in the frame of the machine."
     )
 
     @model_validator(mode="after")
@@ -117,7 +123,7 @@ class NoiseRigidBody(Section):
             if not 0.0 < value <= rest * (1.0 + 1e-9):
                 raise CaseProblem(
                     ("inertia", i),
-                    got=f"{value:g} kg m^2 beside a sum of {rest:g} kg m^2 of the others",
+                    got=f"{value:g} kg m^2 with a sum of {rest:g} kg m^2 of the others",
                     expected="above 0, and none larger than the other two together",
                     hint="a ball of mass m and radius r has 0.4 m r^2 about each axis.",
                 )
@@ -131,11 +137,11 @@ class NoiseMatrices(Section):
     units: UnitSystemName = Field(description="Consistent units of the matrices, e.g. mm t s.")
     rows: dict[FreedomText, Count | Text] = Field(
         min_length=1,
-        description="Freedom of a mount, flange.z or flange.rx (in radians): its row, by its "
-        "number from 1 or its name in the file.",
+        description="Degree of freedom of a mount, flange.z or flange.rx (in radians): its row, "
+        "by number from 1 or by name in the file.",
     )
     damping: Ratio = Field(
-        default=0.01, ge=0, lt=1, description="Damping ratio of all of its elastic modes."
+        default=0.01, ge=0, lt=1, description="Damping ratio of all its elastic modes."
     )
 
     @model_validator(mode="after")
@@ -155,17 +161,17 @@ class NoiseMatrices(Section):
 class NoiseVirtualPoint(Section):
     """A mount between sensors: it moves as one rigid body with the nodes around it."""
 
-    position: Place = Field(description="In the frame of the measurement.")
+    position: Place = Field(description="Position in the frame of the measurement.")
     nodes: tuple[Node, ...] = Field(
-        min_length=1, description="Whose sensors and hammer blows count."
+        min_length=1, description="Nodes whose sensors and hammer blows are used."
     )
     freedoms: tuple[Literal["x", "y", "z", "rx", "ry", "rz"], ...] = Field(
         default=("x", "y", "z", "rx", "ry", "rz"),
         min_length=1,
-        description="Those to find; fewer where the channels tell no more.",
+        description="Degrees of freedom to determine; fewer where the channels do not suffice.",
     )
     positions: dict[Text, Place] = Field(
-        default_factory=dict, description="Of nodes, where the file has no coordinates."
+        default_factory=dict, description="Positions of nodes, where the file has no coordinates."
     )
 
 
@@ -177,20 +183,23 @@ class NoiseReceiver(Section):
         description="Frequency responses at the mounts: UFF 58, CSV, MAT, HDF5, netCDF or npz.",
     )
     quantity: Literal["displacement", "velocity", "acceleration"] | None = Field(
-        default=None, description="Of motions in a universal file that does not say."
+        default=None, description="Quantity of motions in a universal file that does not state it."
     )
     infinite_plate: NoiseInfinitePlate | None = Field(default=None, description="Infinite plate.")
     plate: NoiseFinitePlate | None = Field(default=None, description="Plate of finite size.")
     body: NoiseRigidBody | None = Field(default=None, description="Free rigid body.")
     springs: dict[Along, Annotated[Stiffness, Field(gt=0)]] | None = Field(
-        default=None, min_length=1, description="From each mount to the ground, by direction."
+        default=None,
+        min_length=1,
+        description="Springs from each mount to the ground, by direction.",
     )
     matrices: NoiseMatrices | None = Field(
         default=None, description="Reduced matrices of another program."
     )
     points: dict[Name, Node | NoiseVirtualPoint] = Field(
         default_factory=dict,
-        description="Mount: its node in the file, or a virtual point; default a node of its name.",
+        description="Mount: its node in the file, or a virtual point; default: the node of the "
+        "same name.",
     )
     axes: tuple[Direction, Direction] | dict[Name, tuple[Direction, Direction]] = Field(
         default=((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
@@ -200,23 +209,24 @@ class NoiseReceiver(Section):
     )
     offset: dict[Name, Place] = Field(
         default_factory=dict,
-        description="With a file: from its node to the mount, in the frame of the machine; they "
-        "move together as one rigid body.",
+        description="With a file: vector from the node to the mount, in the frame of the "
+        "machine; both move together as one rigid body.",
     )
     missing: dict[FreedomText, Literal["blocked", "free"]] = Field(
         default_factory=dict,
-        description="Freedom (flange.rx) or mount -> what the machine does where it is not known: "
-        "it does not move, or it takes up no force.",
+        description="Degree of freedom (flange.rx) or mount: assumption where the machine is "
+        "not known: blocked (does not move) or free (carries no force).",
     )
     pressures: InputPath | None = Field(
         default=None,
-        description="File of the pressures per force at the ears; default that of the responses.",
+        description="File of the pressures per force at the ears; default: the file of the "
+        "responses.",
     )
 
     @model_validator(mode="after")
     def _one(self) -> Self:
         kinds = ("file", "infinite_plate", "plate", "body", "springs", "matrices")
-        kind = self._exactly_one(kinds, "what the machine is")
+        kind = self._exactly_one(kinds, "the model of the machine")
         if kind != "file":
             for name in ("points", "quantity", "offset"):
                 refuse_key_if(
@@ -231,7 +241,7 @@ class NoiseReceiver(Section):
                 isinstance(self.axes, dict),
                 ("axes",),
                 got=f"axes by mount together with {kind}",
-                expected="one pair of directions: the frame of a model is one",
+                expected="one pair of directions: a model has only one frame",
                 hint="write axes: [[1, 0, 0], [0, 1, 0]].",
                 on_key=True,
             )

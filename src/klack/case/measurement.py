@@ -22,7 +22,7 @@ class CaseMeasurement(Section):
         "pressure, acceleration, force); others are found by name and unit.",
     )
     time_step: Time | None = Field(
-        default=None, gt=0, description="Sampling step of files that have no time."
+        default=None, gt=0, description="Sampling step of files without a time channel."
     )
     trigger: Trigger | None = Field(
         default=None,
@@ -30,14 +30,14 @@ class CaseMeasurement(Section):
     )
     zero: Literal["start", "none"] = Field(
         default="start",
-        description="start: lift before the trigger is the closed valve, and set to zero; none: "
-        "the lift stays as it was measured.",
+        description="start: the lift before the trigger is that of the closed valve and is set "
+        "to zero; none: the lift stays as measured.",
     )
     sensor: LiftSensor = Field(default=LiftSensor(), description="Sensor of the lift.")
     velocity_bandwidth: Frequency | None = Field(
         default=None,
         gt=0,
-        description="Bandwidth of the velocity from the lift; default chosen by its noise.",
+        description="Bandwidth of the velocity from the lift; default: chosen by its noise.",
     )
 
 
@@ -49,8 +49,8 @@ class CalibrationParameter(Section):
 
     key: tuple[Text, ...] = Field(
         min_length=1,
-        description="Path of the key in the case, e.g. network.components.spring.preload; a list "
-        "of paths gets one value.",
+        description="Path of the key in the case, e.g. network.components.spring.preload; a "
+        "list of paths shares one value.",
     )
     lower: Written = Field(description="Lower bound, with the unit of the key.")
     upper: Written = Field(description="Upper bound.")
@@ -65,10 +65,10 @@ class CaseCalibration(Section):
     """Parameters that are fitted to measured strokes."""
 
     variant: Literal["wet", "dry"] = Field(
-        default="wet", description="Measured valve: with its fluid, or dry."
+        default="wet", description="State of the measured valve: with its fluid, or dry."
     )
     parameters: Mapping[Name, CalibrationParameter] = Field(
-        min_length=1, description="name: the fitted key of the case, and its bounds."
+        min_length=1, description="name: a fitted key of the case, and its bounds."
     )
     profile: tuple[Name, ...] = Field(
         default=(),

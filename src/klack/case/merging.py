@@ -99,7 +99,7 @@ def argument_values(item: CaseInclude, number: int, scope: Scope, origin: Origin
         if COUNTER in scope:
             raise InputError(
                 origin.where(("count",), on_key=True),
-                got=f"a count beside a parameter '{COUNTER}'",
+                got=f"a count together with a parameter '{COUNTER}'",
                 expected=f"no such parameter: '{COUNTER}' counts the copies",
                 hint="rename the parameter.",
             )
@@ -132,7 +132,7 @@ def _require_count(item: CaseInclude, values: list[Any], where: str) -> None:
         raise InputError(
             where,
             got=f"a list of {len(values)}",
-            expected="one value, or a count beside the list"
+            expected="one value, or a count together with the list"
             if item.count is None
             else f"one value for each of the {item.count} copies",
             hint="count and list belong together: {count: 2, with: {lift: [80 um, 82 um]}}.",
@@ -231,7 +231,7 @@ class Merging:
                     here.where(("file",)),
                     got=f"'{name}' inside {' inside '.join(above[::-1])}",
                     expected=f"parts in at most {DEEPEST} levels that do not contain themselves",
-                    hint="take this include out.",
+                    hint="remove this include.",
                 )
             path = self.folder / name
             data, lines = parse(self.texts[name], path)
@@ -436,8 +436,8 @@ def _from(folder: str, name: str) -> str:
 def _taken(origin: Origin, name: str) -> InputError:
     return InputError(
         origin.where(),
-        got=f"the name '{name}' a second time",
-        expected="a name of its own for every component and every included part",
+        got=f"the name '{name}' for the second time",
+        expected="a different name for every component and every included part",
         hint="change 'as' of one include: its parts are called NAME_part.",
     )
 
@@ -446,7 +446,7 @@ def _require_parameter(name: str, part: PartFile, origin: Origin, file: str) -> 
     if name not in part.parameters:
         raise InputError(
             origin.where(("with", name), on_key=True),
-            got=f"'{name}', no parameter of '{file}'",
+            got=f"'{name}', which is not a parameter of '{file}'",
             expected=f"one of: {one_of(part.parameters)}",
             hint=nearest(name, part.parameters, "add it to 'parameters' of the part."),
         )
@@ -461,7 +461,7 @@ def _require_given(given: Scope, part: PartFile, origin: Origin, file: str) -> N
     if missing:
         raise InputError(
             origin.where(("with",), on_key=True),
-            got=f"no '{missing[0]}', a parameter of '{file}' without default",
+            got=f"no '{missing[0]}', a parameter of '{file}' without a default",
             expected=f"with: {{{missing[0]}: its value}}",
             hint="give it here, or a default in the part.",
         )
@@ -471,7 +471,7 @@ def _require_known(head: str, known: Mapping[str, Any], where: str) -> None:
     if head not in known:
         raise InputError(
             where,
-            got=f"'{head}', which this part does not have",
+            got=f"'{head}', which is not in this part",
             expected=f"component.port of one of: {one_of(known)}",
             hint=nearest(head, known, "a part connects its own components; others join its ports."),
         )

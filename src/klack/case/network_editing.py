@@ -68,7 +68,7 @@ def without_component(text: str, path: Path, name: str) -> str:
         raise _refused(
             f"network.components.{name}",
             "the only component",
-            "a network of one component or more",
+            "a network of at least one component",
             "add another one first.",
         )
     pieces = _without_entry(text, _at(root, _COMPONENTS), name)
@@ -89,7 +89,7 @@ def without_key(text: str, path: Path, name: str, key: str) -> str:
             f"network.components.{name}",
             f"'{key}'",
             "a key of this component that can be left out",
-            "choose one of those that it has.",
+            "choose one of its optional keys.",
         )
     pieces = _without_entry(text, _at(root, (*_COMPONENTS, name)), key)
     components = {**known, name: {k: value for k, value in part.items() if k != key}}
@@ -161,7 +161,7 @@ def disconnected(text: str, path: Path, port: str) -> str:
     data, root = _read(text, path)
     if _place(_lists(data), port) is None:
         raise _refused(
-            port, "a port in no connection", "a port that is connected", "connect it first."
+            port, "a port without a connection", "a port that is connected", "connect it first."
         )
     lists, pieces = _without_ports(text, root, lambda found: found == port)
     return _done(text, path, pieces, {**data, "network": {**data["network"], **lists}})
@@ -439,9 +439,9 @@ def _done(text: str, path: Path, pieces: Pieces, expected: Any) -> str:
 def _layout() -> InputError:
     return _refused(
         "network",
-        "a layout in which this cannot be changed alone",
+        "a layout in which this cannot be changed on its own",
         "components and connections written out, without anchors",
-        "replace anchors and aliases (& and *) by plain values, or change it in the text.",
+        "replace anchors and aliases (& and *) with plain values, or change the text itself.",
     )
 
 
@@ -459,7 +459,7 @@ def _require_new(name: str, known: Mapping[str, Any]) -> None:
     if name in known or name in RESERVED or not name.replace("-", "_").isidentifier():
         raise _refused(
             "network.components",
-            f"the name '{name}'" + (", which is there already" if name in known else ""),
+            f"the name '{name}'" + (", which exists already" if name in known else ""),
             "a new name of letters, digits, _ and -, not starting with a digit",
             "choose another name.",
         )

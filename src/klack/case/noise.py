@@ -45,18 +45,22 @@ class NoiseMount(Section):
     mass: Mass | None = Field(
         default=None,
         gt=0,
-        description="Of all that moves on the mount; default the mass of the held bodies.",
+        description="Mass of everything that moves on the mount; default: the mass of the held "
+        "bodies.",
     )
 
 
 class NoisePlate(Section):
     """A plate that the valve is mounted on; its bending waves carry the sound on."""
 
-    thickness: Length = Field(gt=0, description="Of the plate; sheet steel 1 to 3 mm.")
+    thickness: Length = Field(gt=0, description="Thickness of the plate; sheet steel 1 to 3 mm.")
     area: Area = Field(gt=0, description="Of one side.")
     material: Name = Field(description="Name of a material of the case.")
     loss_factor: Ratio = Field(
-        default=0.01, gt=0, lt=1, description="Of the mounted plate; 0.5 to 5 %, an assumption."
+        default=0.01,
+        gt=0,
+        lt=1,
+        description="Loss factor of the mounted plate; 0.5 to 5 %, an assumption.",
     )
 
 
@@ -69,8 +73,8 @@ class NoiseInterface(Section):
     )
     interface: Literal["rigid", "averaged"] = Field(
         default="rigid",
-        description="The joint moves all points of the surface alike, or the surface stays "
-        "flexible and its mean motion counts.",
+        description="rigid: the joint moves all points of the surface alike; averaged: the "
+        "surface stays flexible and its mean motion is used.",
     )
 
     @property
@@ -83,19 +87,19 @@ class NoisePassage(Section):
     """A line, an inertance, or a way of the fluid into the valve, as it lies in it."""
 
     direction: Literal["opening", "closing", "across"] = Field(
-        description="From a to b along the axis, the way the valve opens or closes; across pushes "
-        "nothing along it."
+        description="Direction from a to b along the axis, in which the valve opens or closes; "
+        "across: no force along the axis."
     )
     area: Area | None = Field(
         default=None,
         gt=0,
-        description="Cross-section of the fluid at the mouth, of an orifice that of its jet; "
-        "default the bore of a line or inertance.",
+        description="Cross-section of the fluid at the mouth; of an orifice, the cross-section "
+        "of its jet; default: the bore of a line or inertance.",
     )
     surface: BodySurface | None = Field(
         default=None,
-        description="Of a held body that it pushes, as body.surface; default that of 'fluid' in "
-        "reactions.",
+        description="Surface of a held body that it pushes, as body.surface; default: the "
+        "surface of 'fluid' in reactions.",
     )
 
 
@@ -115,7 +119,7 @@ class NoiseDrive(Section):
 
     @model_validator(mode="after")
     def _one(self) -> Self:
-        self._exactly_one(("frequency", "speed"), "how often it clicks")
+        self._exactly_one(("frequency", "speed"), "the rate of the clicks")
         return self
 
     @property
@@ -133,14 +137,14 @@ class CaseNoise(Section):
     surfaces: tuple[BodySurface, ...] | None = Field(
         default=None,
         min_length=1,
-        description="Radiating surfaces, as body.surface; default all named surfaces "
-        "of held bodies except contacts and supports.",
+        description="Radiating surfaces, as body.surface; default: all named surfaces of held "
+        "bodies except contacts and supports.",
     )
     mount: NoiseMount | None = Field(
-        default=None, description="Elastic mount of the held bodies; default rigid."
+        default=None, description="Elastic mount of the held bodies; default: rigid."
     )
     plate: NoisePlate | None = Field(
-        default=None, description="Plate below the mount that radiates as well."
+        default=None, description="Plate below the mount, which radiates as well."
     )
     mounts: dict[Name, NoiseInterface] | None = Field(
         default=None,
@@ -149,15 +153,15 @@ class CaseNoise(Section):
     )
     reactions: dict[Name, Literal["outside"] | BodySurface] | None = Field(
         default=None,
-        description="With mounts: surface of a held body, as body.surface, on which the reaction "
-        "of a component acts that pushes moving parts alone; 'fluid' of all pressures and flows; "
-        "outside: it acts on the valve from outside.",
+        description="With mounts: surface of a held body, as body.surface, that carries the "
+        "reaction of a component which itself pushes only moving parts; 'fluid' for all "
+        "pressures and flows; outside: the component acts on the valve from outside.",
         examples=[{"magnet": "housing.pole", "spring": "housing.spring_seat"}],
     )
     elements: dict[Name, NoiseElement] | None = Field(
         default=None,
         min_length=1,
-        description="With mounts: resilient element below a mount; default a rigid joint.",
+        description="With mounts: resilient element below a mount; default: a rigid joint.",
         examples=[{"flange": {"stiffness": {"z": "10 N/um"}, "loss_factor": "10 %"}}],
     )
     receiver: NoiseReceiver | None = Field(
@@ -166,23 +170,23 @@ class CaseNoise(Section):
     ears: dict[Name, Node | Place] | None = Field(
         default=None,
         min_length=1,
-        description="With a receiver: node of a pressure per force in its file, or of a plate the "
-        "place of the ear from its first mount, far from the plate and near its normal. The first "
-        "ear is what measures of the sound are of.",
+        description="With a receiver: node of a pressure per force in its file, or for a plate "
+        "the position of the ear from its first mount, far from the plate and near its normal. "
+        "Measures of the sound are taken at the first ear.",
         examples=[{"driver": 9001}],
     )
     indicators: dict[Name, Node | Place] | None = Field(
         default=None,
         min_length=1,
         description="With a receiver: sensors of a virtual in-situ test (klack noise "
-        "--virtual-test), a node of the file or of a model a place from the first mount; default "
-        "the mounts themselves.",
+        "--virtual-test), a node of the file, or for a model a position from the first mount; "
+        "default: the mounts themselves.",
         examples=[{"a": 7, "b": 8}],
     )
     passages: dict[Name, NoisePassage] | None = Field(
         default=None,
-        description="With mounts: lines, inertances, and what joins the valve with sources of "
-        "pressure and the surroundings, by the name of the component.",
+        description="With mounts: lines, inertances, and components that connect the valve to "
+        "pressure sources and to ambient, by the name of the component.",
         examples=[{"feed": {"direction": "closing"}}],
     )
     radiation: Literal["piston", "unity", "elements"] = Field(
@@ -191,19 +195,21 @@ class CaseNoise(Section):
         "area, or 1 (equivalent radiated power), or by boundary elements on the outside of all "
         "held bodies together.",
     )
-    distance: Length = Field(default=1.0, gt=0, description="From the valve to the listener.")
-    air_density: Density = Field(default=1.204, gt=0, description="Of air at 20 degC.")
-    sound_speed: Speed = Field(default=343.2, gt=0, description="In air at 20 degC.")
+    distance: Length = Field(
+        default=1.0, gt=0, description="Distance from the valve to the listener."
+    )
+    air_density: Density = Field(default=1.204, gt=0, description="Density of air at 20 degC.")
+    sound_speed: Speed = Field(default=343.2, gt=0, description="Speed of sound in air at 20 degC.")
     background: Level | None = Field(
         default=None,
         examples=["35 dB"],
         ge=-20,
         le=140,
-        description="A-weighted level of steady noise besides, re 20 uPa, which clicks stand out "
-        "from; default none.",
+        description="A-weighted level of steady background noise, re 20 uPa, from which clicks "
+        "stand out; default: none.",
     )
-    drive: Annotated[NoiseDrive, Field(description="Pattern of clicks to listen to.")] = NoiseDrive(
-        frequency=10.0
+    drive: Annotated[NoiseDrive, Field(description="Pattern of clicks for listening.")] = (
+        NoiseDrive(frequency=10.0)
     )
 
     @model_validator(mode="after")

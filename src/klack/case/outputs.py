@@ -24,7 +24,8 @@ class CaseLowPass(Section):
     cut_off: Frequency = Field(gt=0, description="Frequency at which 3 dB are lost.")
     order: Count = Field(default=2, le=8, description="Its poles.")
     kind: Literal["bessel", "butterworth"] = Field(
-        default="bessel", description="bessel keeps the shape of pulses, butterworth their level."
+        default="bessel",
+        description="bessel preserves the shape of pulses, butterworth their level.",
     )
 
     @property
@@ -36,8 +37,8 @@ class CaseLowPass(Section):
 class CaseOutput(Section):
     """A sensor at a point of a body, or along a short line on it."""
 
-    name: Name = Field(description="Of the channel in all results.")
-    body: Name = Field(description="Which body it sits on.")
+    name: Name = Field(description="Name of the channel in all results.")
+    body: Name = Field(description="Body that carries the sensor.")
     kind: GaugeKind = Field(
         description="displacement, velocity, strain or stress; tension is positive."
     )
@@ -48,17 +49,17 @@ class CaseOutput(Section):
     )
     direction: Direction | tuple[Number, ...] = Field(
         default="z",
-        description="What is read: along x, y, z, r, or three numbers; around the axis of an "
-        "axisymmetric body.",
+        description="Direction of the reading: x, y, z, r, or three numbers; around: around the "
+        "axis of an axisymmetric body.",
     )
     length: Length = Field(
         default=0.0,
         ge=0,
-        description="Gauge length along the direction, over which the mean is read; default at "
+        description="Gauge length along the direction, over which the mean is read; default: at "
         "the point.",
     )
     low_pass: CaseLowPass | None = Field(
-        default=None, description="Of sensor and amplifier; default unlimited."
+        default=None, description="Low pass of sensor and amplifier; default: unlimited."
     )
 
     @field_validator("direction", mode="after")
@@ -111,7 +112,7 @@ def check_outputs(
             output.name in names,
             ("outputs", i, "name"),
             got=f"'{output.name}' twice",
-            expected="a name of its own for each output",
+            expected="a different name for each output",
             hint="use names of channels in the results.",
         )
         names.add(output.name)
@@ -127,7 +128,7 @@ def check_outputs(
             other,
             ("outputs",),
             got=f"outputs together with '{other}'",
-            expected="bodies that the contact alone acts on, with their meshes",
+            expected="meshed bodies on which only the contact acts",
             hint=f"remove outputs, or '{other}'.",
             on_key=True,
         )

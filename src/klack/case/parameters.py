@@ -109,7 +109,7 @@ def parameters_of_text(
             raise InputError(
                 where((name,)),
                 got=f"the name '{name}', which is a function or pi",
-                expected="a name of its own for every parameter",
+                expected="a different name for every parameter",
                 hint="rename it.",
             )
         if text is None and name in given:
@@ -184,7 +184,7 @@ def evaluated(text: str, scope: Scope, where: str) -> tuple[Computed | float | i
         raise InputError(
             where,
             got=f"'{text.strip()}', which is {value:.4g}",
-            expected="a number below 1e15 in size",
+            expected="a number of magnitude below 1e15",
             hint="check the power of ten.",
         )
     return (int(value) if value.is_integer() else value), found.sources

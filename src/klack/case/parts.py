@@ -114,7 +114,7 @@ def with_parts(text: str, path: Path, texts: Mapping[str, str]) -> str:
         body = _without_parts(text, path)
     else:
         body = text if text.endswith("\n") or not text else text + "\n"
-    section = "parts:  # the included files as they were when this case was read\n"
+    section = "parts:  # the included files as of reading this case\n"
     section += "".join(f"  {json.dumps(name)}: {_scalar(part)}" for name, part in texts.items())
     whole = _in_braces(text, texts) if text.lstrip().startswith("{") else body + section
     expected = {**data, "parts": dict(texts)}
@@ -177,7 +177,7 @@ def _collect(found: _Found, data: Any, above: tuple[str, ...], folder: str, wher
                 expected="parts that do not contain themselves"
                 if circle
                 else f"at most {DEEPEST} levels",
-                hint="take this include out.",
+                hint="remove this include.",
             )
         if name not in found.texts:
             found.texts[name] = _read(found, name, where(key))
@@ -206,7 +206,7 @@ def _read(found: _Found, name: str, where: str) -> str:
     if not inside:
         raise InputError(
             where,
-            got=f"'{name}', a link out of the folder of the case",
+            got=f"'{name}', a link that leaves the folder of the case",
             expected="a file in the folder of the case or below",
             hint="copy the part there.",
         )
@@ -225,17 +225,14 @@ def _read(found: _Found, name: str, where: str) -> str:
             where,
             got="included files of more than "
             f"{LARGEST_CASE / 1e6:g} MB, or more than {_MOST_FILES} of them",
-            expected="a case that stays small with all its parts",
-            hint="use one part several times, by 'count' and 'with'.",
+            expected="a case that is small with all its parts",
+            hint="use one part several times, with 'count' and 'with'.",
         )
     return text
 
 
-INCLUDE = "Parts of the network from files of their own."
-PARTS = (
-    "Texts of the included files, where a result or another stored case holds them; they replace "
-    "the files."
-)
+INCLUDE = "Parts of the network in separate files."
+PARTS = "Texts of the included files in a result or another stored case; they replace the files."
 """Descriptions of keys of two sections."""
 
 _Values = Annotated[
@@ -255,13 +252,15 @@ class CaseInclude(Section):
 
     file: Text = Field(
         min_length=1,
-        description="Of the part, in the folder of the file that includes it or below.",
+        description="File of the part, in the folder of the including file or below.",
     )
     name: Name = Field(
-        alias="as", description="Its components are called after it: injector_needle."
+        alias="as",
+        description="Name of the part, with which the names of its components begin: "
+        "injector_needle.",
     )
     count: Count | None = Field(
-        default=None, le=1000, description="Several of them: injector1, injector2, ..."
+        default=None, le=1000, description="Number of copies: injector1, injector2, ..."
     )
     arguments: Mapping[PlainName, _Values] = Field(
         default_factory=dict,
@@ -283,17 +282,21 @@ class PartFile(Section):
     """A part of a network in a file of its own."""
 
     klack: Literal[1] = Field(description="Format version of the file: 1.")
-    part: Text = Field(min_length=1, description="What it is; one line.")
-    description: Text = Field(default="", description="Its limits, and the source of its numbers.")
+    part: Text = Field(min_length=1, description="Title, one line.")
+    description: Text = Field(
+        default="", description="Limits of the part, and the source of its numbers."
+    )
     parameters: Mapping[PlainName, Written | None] = Field(
         default_factory=dict,
-        description="name: default; none (nothing after the colon): to be given by 'with'.",
+        description="name: default; without a default (nothing after the colon) 'with' has to "
+        "give the "
+        "value.",
     )
     ports: Mapping[Name, Text] = Field(
         default_factory=dict,
-        description="Names by which others connect it: component.port of this part.",
+        description="Names for connections from outside: component.port of this part.",
     )
-    include: tuple[CaseInclude, ...] = Field(default=(), description="Parts inside this one.")
+    include: tuple[CaseInclude, ...] = Field(default=(), description="Parts inside this part.")
     materials: Mapping[Name, _Plain] = Field(default_factory=dict, description="As in a case.")
     bodies: Mapping[Name, _Plain] = Field(default_factory=dict, description="As in a case.")
     stops: Mapping[Name, _Plain] = Field(default_factory=dict, description="As in a case.")
@@ -301,5 +304,6 @@ class PartFile(Section):
         default_factory=dict, description="name: {type: ..., and the keys of that type}."
     )
     connections: tuple[tuple[Text, ...], ...] = Field(
-        default=(), description="Between ports of this part; ground and ambient are allowed."
+        default=(),
+        description="Connections between ports of this part; ground and ambient are allowed.",
     )

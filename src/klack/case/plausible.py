@@ -57,8 +57,8 @@ SPEED = Range(
     unit="m/s",
     usual=(2e-3, 20.0),
     possible=(0.0, 100.0),
-    reason="flat faces of steel that meet are loaded with 20 MPa for each m/s, and at 100 m/s "
-    "hardened steel yields throughout; needles hit with 0.02 to 5 m/s",
+    reason="a flat impact of steel on steel gives 20 MPa per m/s, and at 100 m/s hardened steel "
+    "yields throughout; needles hit at 0.02 to 5 m/s",
 )
 """Of an impact [m/s]. At 2 mm/s a stroke of 0.1 mm takes 50 ms: no valve is so slow."""
 
@@ -87,7 +87,7 @@ SIZE = Range(
 )
 """Longest side [m] of the largest body."""
 
-GO_ON = "check its unit; 'unusual: true' at the head of the case computes it all the same."
+GO_ON = "check its unit; with 'unusual: true' at the top of the case it is computed nevertheless."
 """Advice at what cannot be."""
 
 

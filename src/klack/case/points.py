@@ -203,7 +203,7 @@ def _rows(given: GivenPoints) -> Iterable[Mapping[str, PointValue]]:
         raise InputError(
             _WHERE,
             got=f"lists of different lengths ({', '.join(words)})",
-            expected="as many values of every key",
+            expected="the same number of values for every key",
             hint="give one value of every key for every point.",
         )
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
@@ -235,7 +235,7 @@ def _column(name: str, values: Any) -> list[Any]:
             f"{_WHERE}: {name}",
             got=f"'{values}'",
             expected="a list with a value for every point",
-            hint="put it into brackets; a value that stays belongs into the case.",
+            hint="put it into brackets; a constant value belongs in the case.",
         )
     return list(values)
 
@@ -270,7 +270,7 @@ def _require_apart(keys: Iterable[PointKey]) -> None:
             if place[:depth] in places:
                 raise InputError(
                     f"{_WHERE}: {name}",
-                    got=f"a key below '{places[place[:depth]]}', which points exchange as well",
+                    got=f"a key below '{places[place[:depth]]}', which the points change as well",
                     expected="keys that do not contain each other",
                     hint="leave one of them out.",
                 )
@@ -284,6 +284,6 @@ def _scalar(i: int, name: str, value: Any) -> PointValue:
         f"{_WHERE}: {name}, point {i}",
         got=f"a {type(value).__name__}",
         expected="one value, as in the case file",
-        hint='give a text such as "14 N", or a number; set entries of a list one by one, by their '
-        f"place: {one_of([name + '.0'])}.",
+        hint='give a text such as "14 N", or a number; set entries of a list one by one, by '
+        f"position: {one_of([name + '.0'])}.",
     )

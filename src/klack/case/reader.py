@@ -58,7 +58,7 @@ def expanded(data: Any, lines: Lines, path: Path) -> ExpandedCase:
     if head.parts and not head.include:
         raise InputError(
             origin.where(("parts",), on_key=True),
-            got="texts of parts that nothing includes",
+            got="texts of parts that are not included",
             expected="an include of each of them",
             hint="add 'include: [{file: NAME, as: NAME}]', or remove 'parts'.",
         )

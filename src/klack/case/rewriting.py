@@ -61,7 +61,7 @@ def _require_same(tree: CaseTree, values: Mapping[Key, str], text: str) -> None:
             str(tree.path),
             got="values that YAML anchors share with other keys",
             expected="every calibrated value written out",
-            hint="replace the anchors and aliases (& and *) of these keys by plain values.",
+            hint="replace the anchors and aliases (& and *) of these keys with plain values.",
         )
 
 
@@ -126,7 +126,7 @@ def _node(node: Node, key: Key) -> ScalarNode:
             ".".join(map(str, key)),
             got="no single value in the text of the case",
             expected="a number with its unit",
-            hint="write it out there, without anchors.",
+            hint="write the value out there, without anchors.",
         )
     return node
 
@@ -167,7 +167,7 @@ def merged(data: Any, key: Key, value: object, above: Key = ()) -> Any:
         raise CaseProblem(
             (),
             got=f"an entry of '{place}', a list that the case leaves out",
-            expected="a list in the case, of which entries change",
+            expected="a list in the case whose entries change",
             hint=f"write '{place}: [...]' there, with all its entries.",
         )
     copy: Any = list(data) if isinstance(data, list) else dict(data or {})
@@ -220,7 +220,8 @@ def _require_only(tree: CaseTree, values: Mapping[Key, str], text: str) -> None:
     if not same:
         raise InputError(
             str(tree.path),
-            got="a layout in which these values cannot be changed alone",
+            got="a layout in which these values cannot be changed on their own",
             expected="the sections bodies, reduction and run written out, without anchors",
-            hint="replace anchors and aliases (& and *) by plain values, or change it by hand.",
+            hint="replace anchors and aliases (& and *) with plain values, or change the text by "
+            "hand.",
         )

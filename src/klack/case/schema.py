@@ -52,7 +52,7 @@ class Case(ImpactSections):
             raise InputError(
                 f"{self._path or 'case'}: contact.roughness",
                 got=f"rough faces at the level '{left_out[0]}'",
-                expected=f"levels that have a layer of asperities: {one_of(ROUGH_LEVELS)}",
+                expected=f"levels with a layer of asperities: {one_of(ROUGH_LEVELS)}",
                 hint="leave the level out, or the roughness.",
             )
         along = [level for level in wanted if level not in OBLIQUE_LEVELS]
@@ -70,8 +70,8 @@ class Case(ImpactSections):
                 f"{self._path or 'case'}: backing",
                 got=f"{what} of three bodies in a row",
                 expected=f"klack impact with --level {one_of(BACKING_LEVELS)}",
-                hint="take that, or klack stroke; or draw the struck body and the one behind it as "
-                "one, glued (how-to/two-materials), without 'backing'.",
+                hint="use that, or klack stroke; or draw the struck body and the one behind it "
+                "as one glued body (how-to/two-materials), without 'backing'.",
             )
 
     def require_on_axis(self, what: str) -> None:
@@ -91,8 +91,8 @@ class Case(ImpactSections):
         raise InputError(
             f"{self._path or 'case'}: motion.{key}",
             got=f"{what} of a body with {format_si(value, 'm/s' if key != 'spin' else 'rad/s')}",
-            expected=f"klack impact with {levels}, whose bodies move in every way",
-            hint="take that (in a study: level: interface), or remove motion.sideways_speed and "
+            expected=f"klack impact with {levels}, whose bodies move in all directions",
+            hint="use that (in a study: level: interface), or remove motion.sideways_speed and "
             "motion.spin.",
         )
 
@@ -100,8 +100,8 @@ class Case(ImpactSections):
         return InputError(
             f"{self._path or 'case'}: motion.placement",
             got=f"{what} of axisymmetric bodies off-axis",
-            expected="klack impact with --level interface, which moves them in every way",
-            hint="take that level, or 'model: swept' with 'layers: 18' for both bodies.",
+            expected="klack impact with --level interface, which moves them in all directions",
+            hint="use that level, or 'model: swept' with 'layers: 18' for both bodies.",
         )
 
     def require_ends(self, what: str) -> None:
@@ -112,5 +112,6 @@ class Case(ImpactSections):
                     f"{self._path or 'case'}: bodies.{name}.non_reflecting",
                     got=f"{what} of a body with a non-reflecting end",
                     expected="klack impact with --level full",
-                    hint="remove the end, and make the bar so long that no echo returns in time.",
+                    hint="remove the end, and make the bar long enough that no echo returns "
+                    "during the run.",
                 )

@@ -30,10 +30,10 @@ class Waviness(Section):
     """
 
     rms: LengthDistribution = Field(
-        description="Root mean square of the deviation from roundness, round the ring."
+        description="Root mean square of the deviation from roundness around the ring."
     )
     harmonics: tuple[Count, Count] = Field(
-        default=(2, 8), description="Lowest and highest number of waves round the ring."
+        default=(2, 8), description="Lowest and highest number of waves around the ring."
     )
 
     @model_validator(mode="after")
@@ -43,8 +43,8 @@ class Waviness(Section):
             not 2 <= low <= high <= _HIGHEST_HARMONIC,
             ("harmonics",),
             got=f"[{low}, {high}]",
-            expected=f"two rising whole numbers from 2 to {_HIGHEST_HARMONIC}",
-            hint="0 waves is another diameter, 1 wave an eccentricity; 2 is an oval.",
+            expected=f"two ascending whole numbers from 2 to {_HIGHEST_HARMONIC}",
+            hint="0 waves is a change of diameter, 1 wave an eccentricity, 2 waves an oval.",
         )
         return self
 
@@ -54,7 +54,9 @@ class Shots(Section):
 
     count: Annotated[Count, Field(le=100_000)] = Field(default=50, description="Number of shots.")
     seed: Annotated[int, Strict()] = Field(
-        default=1, ge=0, description="Seed of the random numbers; another seed, other shots."
+        default=1,
+        ge=0,
+        description="Seed of the random numbers; a different seed gives different shots.",
     )
     impacts: Annotated[Count, Field(ge=2, le=1000)] = Field(
         default=4, description="Number of impacts after which a shot ends."
@@ -63,24 +65,25 @@ class Shots(Section):
     step: Time = Field(default=40e-9, gt=0, description="Time step.")
     eccentricity: LengthDistribution | None = Field(
         default=None,
-        description="Distance of the moving body from the axis; default drawn from the guide.",
+        description="Distance of the moving body from the axis; default: drawn from the guide.",
     )
     tilt: AngleDistribution | None = Field(
-        default=None, description="Its tilt; default drawn from the guide."
+        default=None, description="Tilt of the moving body; default: drawn from the guide."
     )
     force: ForceDistribution | None = Field(
         default=None,
-        description="Closing force at first touch; default that of 'motion' (force and preload).",
+        description="Closing force at first touch; default: as in 'motion' (force and preload).",
     )
     friction: RatioDistribution | None = Field(
-        default=None, description="Coulomb's coefficient in the guide; default that of 'guide'."
+        default=None,
+        description="Coefficient of Coulomb friction in the guide; default: as in 'guide'.",
     )
     contact_friction: RatioDistribution | None = Field(
         default=None,
-        description="Coulomb's coefficient between the faces; default that of 'contact'.",
+        description="Coefficient of Coulomb friction between the faces; default: as in 'contact'.",
     )
     waviness: Waviness | None = Field(
-        default=None, description="Out-of-roundness of the contact ring; default none."
+        default=None, description="Out-of-roundness of the contact ring; default: none."
     )
 
     @field_validator("contact_friction", mode="after")
@@ -95,7 +98,7 @@ class Shots(Section):
                 ("duration",),
                 got=f"{self.duration / self.step:.4g} steps of {format_si(self.step, 's')}",
                 expected=f"100 to {_MOST_STEPS} steps",
-                hint="some milliseconds in steps of 40 ns cover the bounces of a small valve.",
+                hint="a few milliseconds in steps of 40 ns cover the bounces of a small valve.",
             )
         return self
 
@@ -105,28 +108,31 @@ class StrokeShots(Section):
 
     count: Annotated[Count, Field(le=100_000)] = Field(default=50, description="Number of strokes.")
     seed: Annotated[int, Strict()] = Field(
-        default=1, ge=0, description="Seed of the random numbers; another seed, other strokes."
+        default=1,
+        ge=0,
+        description="Seed of the random numbers; a different seed gives different strokes.",
     )
     carry: Annotated[bool, Strict()] = Field(
         default=False,
-        description="false: every stroke starts from a position of its own, drawn in the guide; "
-        "true: from where the stroke before has left the needle across its axis.",
+        description="false: every stroke starts from its own position, drawn in the guide; "
+        "true: from the position across the axis where the previous stroke left the needle.",
     )
     eccentricity: LengthDistribution | None = Field(
         default=None,
-        description="Distance of the needle from the axis at the height of its seat, at the start; "
-        "default drawn from the guide.",
+        description="Distance of the needle from the axis at the height of its seat, at the "
+        "start; default: drawn from the guide.",
     )
     tilt: AngleDistribution | None = Field(
-        default=None, description="Its tilt; default drawn from the guide."
+        default=None, description="Tilt of the moving body; default: drawn from the guide."
     )
     friction: RatioDistribution | None = Field(
-        default=None, description="Coulomb's coefficient in the guide; default that of 'guide'."
+        default=None,
+        description="Coefficient of Coulomb friction in the guide; default: as in 'guide'.",
     )
     contact_friction: RatioDistribution | None = Field(
         default=None,
-        description="Coulomb's coefficient between the faces of all stops; default those of "
-        "'stops'.",
+        description="Coefficient of Coulomb friction between the faces of all stops; default: "
+        "as in 'stops'.",
     )
 
     @field_validator("friction", "contact_friction", mode="after")
@@ -147,6 +153,6 @@ def require_friction(drawn: Distribution | None) -> Distribution | None:
             (),
             got=f"coefficients up to {drawn.largest:.3g}",
             expected=f"at most {MOST_FRICTION:g} in every shot",
-            hint="dry clean metals reach 1; {uniform: [0.1, 0.2]} ends where it says.",
+            hint="dry clean metals reach 1; {uniform: [0.1, 0.2]} has fixed ends.",
         )
     return drawn

@@ -23,7 +23,7 @@ def refuse_off_axis(case: ValveSections) -> None:
             key,
             got=f"'{key[-1]}' with motion: axial",
             expected="motion: three-dimensional, in which the needle leaves its axis",
-            hint="add it, or remove this key.",
+            hint="add 'motion: three-dimensional', or remove this key.",
             on_key=True,
         )
 
@@ -38,7 +38,7 @@ def check_off_axis(case: ValveSections, needle: str) -> None:
             not any(own in link and at & set(link) for link in case.network.connections),
             key,
             got=f"'{own}', which is not connected to '{needle}'",
-            expected="a force across the axis of the needle that moves",
+            expected="a force across the axis of the moving needle",
             hint=f"connect it to a point of '{needle}', or remove this key.",
             on_key=True,
         )
@@ -48,9 +48,10 @@ def check_off_axis(case: ValveSections, needle: str) -> None:
         if reach >= part.room:
             raise CaseProblem(
                 key,
-                got=f"{format_si(part.room, 'm')} of room around the armature, whose axis the "
-                f"guide lets {format_si(reach, 'm')} aside there",
-                expected="more room than the guide leaves: the armature would touch the iron",
+                got=f"{format_si(part.room, 'm')} of clearance around the armature, whose axis "
+                f"can move aside by {format_si(reach, 'm')} there in the guide",
+                expected="more clearance than the play in the guide: otherwise the armature would "
+                "touch the iron",
                 hint="enlarge the clearance of the ring, or reduce guide.clearance; check height, "
                 "eccentricity and their units.",
                 on_key=True,
@@ -91,14 +92,14 @@ def check_motion(case: ValveSections, meetings: Mapping[str, Meeting], roles: Va
             part.type in _MOVES,
             at,
             got=f"a {part.type} in a motion in three dimensions",
-            expected=f"bodies with all their freedoms: {{type: {FLEXIBLE_BODY}}}",
-            hint="draw it as a body, or use motion: axial.",
+            expected=f"bodies with all degrees of freedom: {{type: {FLEXIBLE_BODY}}}",
+            hint="draw the part as a body, or use motion: axial.",
         )
         refuse_key_if(
             part.type in _FRICTION,
             at,
-            got="friction along the axis beside a motion in three dimensions",
-            expected="a section 'guide' with friction: side forces make it there",
+            got="friction along the axis together with a motion in three dimensions",
+            expected="a section 'guide' with friction, which follows from the side forces",
             hint="remove this component; guide: {surface: ..., heights: ..., clearance: "
             "..., "
             "friction: 0.1}.",
@@ -113,7 +114,8 @@ def check_motion(case: ValveSections, meetings: Mapping[str, Meeting], roles: Va
         ("reduction", "correction"),
         got=f"'{case.reduction.correction}' with motion: three-dimensional",
         expected="the correction 'consistent'",
-        hint="leave it out: contact points carry what the modes miss.",
+        hint="leave the correction out: the contact points carry the compliance that the "
+        "modes omit.",
     )
     for variant in case.run.variants:
         refuse_key_if(
@@ -132,18 +134,18 @@ def _check_bodies(case: ValveSections) -> None:
     if flat and solid:
         raise CaseProblem(
             ("bodies", flat[0], "geometry"),
-            got=f"an axisymmetric '{flat[0]}' beside a three-dimensional '{solid[0]}'",
+            got=f"an axisymmetric '{flat[0]}' together with a three-dimensional '{solid[0]}'",
             expected="all bodies axisymmetric or all three-dimensional",
-            hint=f"take 'model: swept' with 'layers: 18' for '{flat[0]}', or 'model: axisymmetric' "
-            f"for '{solid[0]}' if it is a turned part.",
+            hint=f"use 'model: swept' with 'layers: 18' for '{flat[0]}', or 'model: "
+            f"axisymmetric' for '{solid[0]}' if it is a turned part.",
         )
     for name in flat:
         refuse_key_if(
             case.bodies[name].matrices is not None,
             ("bodies", name, "matrices"),
             got=f"the axial motion of '{name}' with motion: three-dimensional",
-            expected="a body that klack assembles, which then moves in every way",
-            hint="remove 'matrices', or give those of a solid.",
+            expected="a body that klack assembles, which can move in every direction",
+            hint="remove 'matrices', or give the matrices of a solid.",
             on_key=True,
         )
     if solid:
@@ -156,7 +158,7 @@ def _refuse_angles(case: ValveSections, what: str) -> None:
         ("angles",),
         got=what,
         expected="axisymmetric bodies with motion: three-dimensional",
-        hint="remove it; more 'layers' make a swept mesh finer round the ring.",
+        hint="remove 'angles'; more 'layers' refine a swept mesh around the ring.",
         on_key=True,
     )
 
@@ -168,12 +170,12 @@ def _check_stop(case: ValveSections, name: str, part: Component) -> None:
         key,
         got=f"the end stop '{name}' without surfaces",
         expected=f"its two surfaces: stops: {{{name}: {{between: ...}}}}",
-        hint="in three dimensions every stop is touched point by point.",
+        hint="in three dimensions every stop has its contact point by point.",
     )
     refuse_key_if(
         getattr(getattr(part, "law", None), "kind", "") != "consistent",
         (*key, "law"),
-        got="a law of its own, which contact point by point would replace",
+        got="its own law, which contact point by point would replace",
         expected="law: {kind: consistent}",
         hint="write it, or use motion: axial.",
     )
@@ -182,7 +184,8 @@ def _check_stop(case: ValveSections, name: str, part: Component) -> None:
         raise CaseProblem(
             (*key, "restitution"),
             got=f"{restitution:g} with motion: three-dimensional",
-            expected="no restitution: bodies and friction of the faces lose the energy there",
+            expected="no restitution: in three dimensions the bodies and the friction of the faces "
+            "dissipate the energy",
             hint="leave it out, or use motion: axial.",
         )
     stop = case.stops[name]
@@ -206,24 +209,24 @@ def _check_ends(case: ValveSections, meetings: Mapping[str, Meeting], roles: Val
             raise CaseProblem(
                 ("network", "components", name),
                 got=f"the end stop '{name}' between {' and '.join(map(repr, at)) or 'nothing'}",
-                expected="two bodies of the case, one of which moves, with motion: "
+                expected="two bodies of the case, one of them moving, with motion: "
                 "three-dimensional",
-                hint="remove it, or draw what it hits as a body with 'fixed'.",
+                hint="remove the end stop, or draw the struck part as a body with 'fixed'.",
             )
     for name in _drawn(case):
         refuse_key_if(
             name not in used,
             ("network", "components", name),
-            got=f"the body '{name}', which touches nothing",
-            expected="the needle and what it hits with motion: three-dimensional",
-            hint="remove it, or give it an end stop.",
+            got=f"the body '{name}', which has no contact",
+            expected="only the needle and the bodies that it hits, with motion: three-dimensional",
+            hint="remove the body, or give it an end stop.",
         )
     refuse_key_if(
         case.shots is not None and case.shots.carry and len(free) > 1,
         ("shots", "carry"),
-        got=f"strokes that begin where the one before has ended, and {len(free)} bodies that move",
-        expected="one body that moves: the positions of others are not carried on",
-        hint="remove it: every stroke then starts from positions of its own.",
+        got=f"strokes that begin where the previous one ended, and {len(free)} moving bodies",
+        expected="one moving body: the positions of others are not carried over",
+        hint="remove 'carry': every stroke then starts from its own positions.",
         on_key=True,
     )
     _check_guides(case, _drawn(case)[roles.needle], [_drawn(case)[name] for name in free])
@@ -251,10 +254,10 @@ def _check_guides(case: ValveSections, needle: str, free: list[str]) -> None:
             name not in others,
             ("guides", name),
             got=f"a guide of '{name}'",
-            expected=f"a body that moves beside the needle: {one_of(others)}"
+            expected=f"a moving body other than the needle: {one_of(others)}"
             if others
             else "no section 'guides': only the needle moves",
-            hint="that of the needle is the section 'guide'; a body with 'fixed' has none.",
+            hint="the guide of the needle is the section 'guide'; a body with 'fixed' has none.",
             on_key=True,
         )
         check_surface(case, ("guides", name, "surface"), _surface(name, guide.surface))
@@ -264,9 +267,10 @@ def _check_guides(case: ValveSections, needle: str, free: list[str]) -> None:
         refuse_key_if(
             guide.on.body not in free or guide.on.body == name or (below and below.on),
             ("guides", name, "on"),
-            got=f"'{guide.on}', a body that is held, slides itself on another, or is '{name}'",
+            got=f"'{guide.on}', which belongs to a held body, to one that slides on another, "
+            f"or to '{name}'",
             expected="a surface of a body that moves in a fixed bore, such as the needle",
-            hint="leave 'on' out for a bore of a body that is held.",
+            hint="leave 'on' out for a bore in a held body.",
             on_key=True,
         )
         check_surface(case, ("guides", name, "on"), guide.on)
@@ -279,7 +283,7 @@ def _check_placement(case: ValveSections) -> None:
     refuse_key_if(
         not at.is_centred,
         ("placement", "seed"),
-        got="a seed beside a given position",
+        got="a seed together with a given position",
         expected="one of them",
         hint="remove the seed, or eccentricity and tilt.",
         on_key=True,

@@ -29,7 +29,7 @@ Written = Annotated[Text | Number, BeforeValidator(as_written)]
 class NormalRange(Section):
     """Gauss's distribution, cut off five standard deviations from its mean."""
 
-    mean: Written = Field(description="With the unit of the key.")
+    mean: Written = Field(description="Mean with the unit of the key.")
     sd: Written = Field(description="Standard deviation, with its unit.")
 
 
@@ -45,10 +45,10 @@ class StudyParameter(Section):
     )
     normal: NormalRange | None = Field(default=None, description="Mean and standard deviation.")
     values: tuple[Written, ...] | None = Field(
-        default=None, min_length=1, description="A list, also of words."
+        default=None, min_length=1, description="A list of values or words."
     )
     fixed: Written | None = Field(
-        default=None, description="One value, for expressions of 'linked'."
+        default=None, description="One value, for expressions in 'linked'."
     )
 
     @model_validator(mode="before")
@@ -73,7 +73,7 @@ class StudyParameter(Section):
             got=f"the keys {one_of(found)}" if found else "no values",
             expected="one of: {from: 8 N, to: 20 N}, {normal: {mean: 12 N, sd: 1 N}}, "
             "{values: [8 N, 12 N]}, {fixed: 12 N}",
-            hint="a range has both ends." if len(found) < 2 else f"keep one of {one_of(found)}.",
+            hint="a range needs both ends." if len(found) < 2 else f"keep one of {one_of(found)}.",
         )
         refuse_key_if(
             self.scale == "log" and found != ["from", "to"],
@@ -92,27 +92,27 @@ class StudyDesign(Section):
         "sobol", "latin-hypercube", "saltelli", "morris", "grid", "one-at-a-time", "made", "file"
     ] = Field(
         default="sobol",
-        description="sobol: even cover, more points can be added; latin-hypercube: each parameter "
-        "evenly; saltelli: for Sobol's indices, 'points' times (2 + number of parameters) points; "
-        "morris: elementary effects, 'points' times (1 + number of parameters); grid: all "
-        "combinations of 'levels'; one-at-a-time: each parameter by itself, about the case; "
-        "made: valves made after the case, with the scatter of 'robust'; "
-        "file: the rows of a CSV file.",
+        description="sobol: even coverage, more points can be added; latin-hypercube: each "
+        "parameter evenly; saltelli: for Sobol's indices, 'points' times (2 + number of "
+        "parameters) points; morris: elementary effects, 'points' times (1 + number of "
+        "parameters); grid: all combinations of 'levels'; one-at-a-time: each parameter by "
+        "itself, about the case; made: manufactured valves, the case with the scatter of "
+        "'robust'; file: the rows of a CSV file.",
     )
     points: Count = Field(
         default=64,
         le=1_000_000,
-        description="Of sobol, latin-hypercube and made; base points of saltelli, better a power "
-        "of two; trajectories of morris, ten or more.",
+        description="Number of points of sobol, latin-hypercube and made; of base points of "
+        "saltelli, preferably a power of two; of trajectories of morris, ten or more.",
     )
     levels: Count = Field(
         default=5, le=1000, description="Values of each range in a grid and one-at-a-time."
     )
-    seed: Count = Field(default=1, description="Of the random numbers.")
+    seed: Count = Field(default=1, description="Seed of the random numbers.")
     file: InputPath | None = Field(
         default=None,
-        description="CSV, relative to this file: a head with the names of all parameters, values "
-        "with their units.",
+        description="CSV, relative to this file: a header with the names of all parameters, and "
+        "values with units.",
     )
 
     @model_validator(mode="after")
@@ -152,20 +152,25 @@ class StudySearch(Section):
     """How long a search for the best points lasts."""
 
     population: Annotated[int, Strict()] = Field(
-        default=40, ge=8, le=10_000, description="Points that are computed together."
+        default=40, ge=8, le=10_000, description="Number of points that are computed together."
     )
-    generations: Count = Field(default=50, le=100_000, description="Populations, one by one.")
+    generations: Count = Field(
+        default=50, le=100_000, description="Number of successive populations."
+    )
     refinements: Annotated[int, Strict()] = Field(
-        default=200, ge=0, le=1_000_000, description="Points about the best ones at the end."
+        default=200,
+        ge=0,
+        le=1_000_000,
+        description="Number of points about the best ones at the end.",
     )
     polish: Annotated[int, Strict()] = Field(
         default=0,
         ge=0,
         le=1000,
-        description="Steps by exact derivatives from the recommended point at the end, where all "
-        "objectives and bounds are times or impacts of a stroke.",
+        description="Number of steps with exact derivatives from the recommended point at the "
+        "end, if all objectives and bounds are times or impacts of a stroke.",
     )
-    seed: Count = Field(default=1, description="Of the random numbers.")
+    seed: Count = Field(default=1, description="Seed of the random numbers.")
 
 
 class StudyRobust(Section):
@@ -173,21 +178,23 @@ class StudyRobust(Section):
 
     scatter: Mapping[Text, Written] = Field(
         min_length=1,
-        description="Parameter, or path of a key of the case: standard deviation of made valves "
-        "about the value of the design, with its unit.",
+        description="Parameter, or path of a key of the case: standard deviation of "
+        "manufactured valves about the value of the design, with its unit.",
     )
     valves: Annotated[int, Strict()] = Field(
         default=16,
         ge=4,
         le=10_000,
-        description="Made after every design of klack optimise, all designs with the same draws.",
+        description="Number of valves manufactured to every design of klack optimise, with the "
+        "same "
+        "draws for all designs.",
     )
     value: Text = Field(
         default="mean + 2 sd",
-        description="Of a measure over these valves, for objectives and bounds: 'mean + 2 sd' or "
-        "'quantile 95 %'; towards the worse side.",
+        description="Statistic of a measure over these valves, for objectives and bounds: 'mean "
+        "+ 2 sd' or 'quantile 95 %'; towards the worse side.",
     )
-    seed: Count = Field(default=1, description="Of the random numbers.")
+    seed: Count = Field(default=1, description="Seed of the random numbers.")
 
 
 class StudySurrogate(Section):
@@ -195,8 +202,8 @@ class StudySurrogate(Section):
 
     kind: Literal["polynomial-chaos", "gaussian-process"] = Field(
         description="polynomial-chaos: polynomials of all parameters, up to 10 000 points; "
-        "gaussian-process: from the covariance of near points, up to 500 points. For the designs "
-        "sobol, latin-hypercube, made and file.",
+        "gaussian-process: from the covariance of nearby points, up to 500 points. For the "
+        "designs sobol, latin-hypercube, made and file.",
     )
 
 
@@ -206,7 +213,7 @@ class CaseStudy(Section):
     parameters: Mapping[Text, StudyParameter] = Field(
         min_length=1,
         description="Path of a key of the case, such as network.components.spring.preload, or a "
-        "word of one's own for 'linked': its values.",
+        "name of your own for 'linked': its values.",
     )
     linked: Mapping[Text, Text] = Field(
         default_factory=dict,
@@ -214,33 +221,33 @@ class CaseStudy(Section):
     )
     measures: tuple[Text, ...] = Field(
         min_length=1,
-        description="Such as closing_time, seat.peak_force, noise.sound_exposure_level_weighted; "
-        "of an impact peak_force, restitution.",
+        description="Measures such as closing_time, seat.peak_force, "
+        "noise.sound_exposure_level_weighted; of an impact peak_force, restitution.",
     )
-    design: StudyDesign = Field(default=StudyDesign(), description="Where the points lie.")
+    design: StudyDesign = Field(default=StudyDesign(), description="Design of the points.")
     objectives: Mapping[Text, Literal["minimise", "maximise"]] = Field(
         default_factory=dict,
         max_length=4,
-        description="Measures that klack optimise makes small or large, one to four.",
+        description="Measures that klack optimise minimises or maximises, one to four.",
     )
     constraints: Mapping[Text, StudyLimit] = Field(
-        default_factory=dict, description="Measures and the bounds that a design has to keep."
+        default_factory=dict, description="Measures and the bounds that a design has to meet."
     )
     search: StudySearch = Field(default=StudySearch(), description="Of klack optimise.")
     surrogate: StudySurrogate | None = Field(
         default=None,
-        description="Of klack study: what each measure follows, from the points of one design, "
-        "with its leave-one-out error.",
+        description="For klack study: a surrogate of each measure from the points of one "
+        "design, with its leave-one-out error.",
     )
     robust: StudyRobust | None = Field(
         default=None,
-        description="Scatter of made valves; with it klack optimise compares designs by what these "
-        "do.",
+        description="Scatter of manufactured valves; with it klack optimise compares designs by "
+        "their manufactured valves.",
     )
     variant: Variant | None = Field(
-        default=None, description="Of the stroke; the first one of the case by default."
+        default=None, description="Variant of the stroke; default: the first one of the case."
     )
-    level: Level | None = Field(default=None, description="Of an impact; reduced by default.")
+    level: Level | None = Field(default=None, description="Level of an impact; default: reduced.")
 
 
 class StudyFile(Section):
@@ -249,7 +256,7 @@ class StudyFile(Section):
     klack: Literal[1] = Field(description="Format version of the file: 1.")
     case: Text | None = Field(
         default=None,
-        description="Case file that it was made for, relative to this file: klack app runs the "
-        "study with it. A command names its case itself.",
+        description="Case file of the study, relative to this file: klack app runs the study "
+        "with it. On the command line the case is an argument.",
     )
-    study: CaseStudy = Field(description="What varies and what is computed.")
+    study: CaseStudy = Field(description="Parameters that vary and measures that are computed.")

@@ -43,7 +43,7 @@ class StudySource:
                 "--made",
                 got=f"{valves} valves",
                 expected=f"1 to {_MOST_VALVES}",
-                hint="with 1024 a probability of 1 % is known to about half of it.",
+                hint="with 1024 valves a probability of 1 % is known to about half its value.",
             )
         design = self.study.design.model_copy(
             update={"kind": "made", "points": valves, "file": None}

@@ -22,8 +22,8 @@ class SentHeat(Section):
 
     loss: Text = Field(
         examples=["coil ohmic"],
-        description="A component, for all its losses, or one of them as the energy balance calls "
-        "it: coil ohmic, coil eddy, seat contact, feed flow.",
+        description="A component, for all its losses, or one of them with its name in the "
+        "energy balance: coil ohmic, coil eddy, seat contact, feed flow.",
     )
     node: Name = Field(description="Thermal node: a heat-capacity.")
     share: Ratio = Field(default=1.0, gt=0, le=1, description="Of that loss.")
@@ -37,16 +37,20 @@ class HeatedMagnet(Section):
         description="Relative change of the remanence; NdFeB -0.0012 1/K, ferrite -0.002 1/K."
     )
     reference: Temperature = Field(
-        default=_REFERENCE, gt=0, description="Where the remanence of the case holds."
+        default=_REFERENCE,
+        gt=0,
+        description="Temperature at which the remanence of the case holds.",
     )
 
 
 class GrowthLength(Section):
     """One length of a chain that closes in a gap."""
 
-    node: Name = Field(description="Thermal node whose temperature it has.")
+    node: Name = Field(description="Thermal node that gives its temperature.")
     length: Length = Field(
-        description="Above 0 if the gap widens when the part grows, below 0 if it narrows."
+        description="Length of the part; above 0 if the gap widens when the part grows, below 0 "
+        "if it "
+        "narrows."
     )
     expansion: Expansion = Field(
         examples=["11.5e-6 1/K"], description="Linear thermal expansion of its material."
@@ -63,11 +67,11 @@ class Growth(Section):
     of: tuple[Text, ...] = Field(
         examples=[["stop.gap", "coil.gap"]],
         min_length=1,
-        description="What changes by it, as component.key: lengths, or the preload of a spring.",
+        description="Keys that change, as component.key: lengths, or the preload of a spring.",
     )
     lengths: tuple[GrowthLength, ...] = Field(min_length=1, description="The chain.")
     reference: Temperature = Field(
-        default=_REFERENCE, gt=0, description="Where the numbers of the case hold."
+        default=_REFERENCE, gt=0, description="Temperature at which the numbers of the case hold."
     )
 
     def change(self, temperature: Mapping[str, float]) -> float:
@@ -82,7 +86,9 @@ class CaseThermal(Section):
     """Input of klack heat: where the losses go, and what follows the temperatures."""
 
     period: Time = Field(
-        examples=["100 ms"], gt=0, description="From one stroke to the next; run.duration or more."
+        examples=["100 ms"],
+        gt=0,
+        description="Time from one stroke to the next; run.duration or more.",
     )
     heat: tuple[SentHeat, ...] = Field(
         default=(), description="Losses of the stroke, and the nodes that they warm."
@@ -93,16 +99,16 @@ class CaseThermal(Section):
         "for a further circuit of a magnetic-network.",
     )
     fluid: Name | None = Field(
-        default=None, description="Node of the fluid; default the temperature of the surroundings."
+        default=None, description="Node of the fluid; default: the ambient temperature."
     )
     magnets: Mapping[Name, HeatedMagnet] = Field(
-        default_factory=dict, description="coil: what its permanent magnets follow."
+        default_factory=dict, description="coil: temperature of its permanent magnets."
     )
     growth: Mapping[Name, Growth] = Field(
         default_factory=dict, description="name: a gap that changes with temperatures."
     )
     duration: Time | None = Field(
-        default=None, gt=0, description="Of the warm-up; default to the steady state."
+        default=None, gt=0, description="Duration of the warm-up; default: to the steady state."
     )
     tolerance: TemperatureRise = Field(
         default=0.1,
@@ -114,5 +120,5 @@ class CaseThermal(Section):
         default=5.0,
         ge=1e-5,
         le=500,
-        description="A stroke is computed anew after a change by this at the latest.",
+        description="Largest temperature change before a stroke is computed again.",
     )

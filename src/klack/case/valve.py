@@ -71,7 +71,7 @@ class ValveCase(ValveSections):
                 raise InputError(
                     f"{self.path or 'case'}: lumped",
                     got="no section 'lumped'",
-                    expected=f"its stiffness, because the variant '{variant}' is asked for",
+                    expected=f"its stiffness, because the variant '{variant}' is requested",
                     hint="add 'lumped: {stiffness: 1e9 N/m}'.",
                 )
         require_bodies(self, variants, str(self.path or "case"))

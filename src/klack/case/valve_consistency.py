@@ -33,7 +33,7 @@ def check_shots_of_valve(case: ValveSections) -> None:
         case.motion == "axial",
         ("shots",),
         got="shots of a needle that moves along its axis",
-        expected="motion: three-dimensional, and a guide: along the axis all strokes are alike",
+        expected="motion: three-dimensional, and a guide: along the axis all strokes are equal",
         hint="add 'motion: three-dimensional' and 'guide', or remove this section.",
         on_key=True,
     )
@@ -49,7 +49,7 @@ def check_shots_of_valve(case: ValveSections) -> None:
     refuse_key_if(
         placed and not shots.carry,
         ("placement",),
-        got="a placement beside shots, each of which has one of its own",
+        got="a placement together with shots, each of which has its own",
         expected="one of them",
         hint="remove 'placement': shots draw it from shots.seed. With shots.carry: true "
         "the first stroke starts from it.",
@@ -58,8 +58,8 @@ def check_shots_of_valve(case: ValveSections) -> None:
     refuse_key_if(
         placed and shots.draws_position,
         ("shots", "eccentricity"),
-        got="a drawn position beside a placement",
-        expected="one of them: the first stroke starts from it",
+        got="a drawn position together with a placement",
+        expected="only one of them: the first stroke starts from it",
         hint="remove 'placement', or shots.eccentricity and shots.tilt.",
         on_key=True,
     )
@@ -75,7 +75,7 @@ def check_valve(case: ValveSections) -> None:
             case.bodies[name].non_reflecting is not None,
             ("bodies", name, "non_reflecting"),
             got="a non-reflecting end of a body of a valve",
-            expected="none: strokes have modes alone",
+            expected="none: strokes use only modes",
             hint="use it in an impact, at level full.",
             on_key=True,
         )
@@ -123,7 +123,7 @@ def _check_ports(case: ValveSections, name: str) -> None:
             port in profile.surfaces and port != place.surface,
             key,
             got=f"the name of the surface '{port}' for a port on '{place.surface}'",
-            expected="a name of its own",
+            expected="a different name",
             hint="rename the port here and in the network.",
             on_key=True,
         )
@@ -141,7 +141,7 @@ def _check_flexible_bodies(case: ValveSections) -> None:
         if body in used:
             raise CaseProblem(
                 (*key, "body"),
-                got=f"'{body}' a second time (first in '{used[body]}')",
+                got=f"'{body}' for the second time (first in '{used[body]}')",
                 expected="one component for each body",
                 hint="give one component all the points.",
             )
@@ -177,7 +177,7 @@ def _check_stop(case: ValveSections, name: str, meetings: dict[str, Meeting]) ->
                 other != name and surface in rival.between,
                 (*key, "between", i),
                 got=f"{surface}, which the stop '{other}' uses as well",
-                expected="a surface for each stop",
+                expected="a separate surface for each stop",
                 hint="split the edge in the drawing.",
             )
     refuse_key_if(
@@ -194,8 +194,8 @@ def _check_stop(case: ValveSections, name: str, meetings: dict[str, Meeting]) ->
             (*key, "between"),
             got=f"an axisymmetric '{flat[0]}' and a three-dimensional '{solid}'",
             expected="both axisymmetric or both three-dimensional",
-            hint=f"take 'model: swept' with 'layers: 18' for '{flat[0]}', or 'model: axisymmetric' "
-            f"for '{solid}' if it is a turned part.",
+            hint=f"use 'model: swept' with 'layers: 18' for '{flat[0]}', or 'model: "
+            f"axisymmetric' for '{solid}' if it is a turned part.",
         )
     require_known(key, name, meetings, f"{END_STOP} of the network", on_key=True)
     for side, surface in zip(("upper", "lower"), stop.between, strict=True):
@@ -207,7 +207,7 @@ def _check_stop(case: ValveSections, name: str, meetings: dict[str, Meeting]) ->
                 (*key, "between"),
                 got=f"{surface}, but the network joins {name}.{side} to {found}",
                 expected=f"{name}.{side} at the point '{surface.surface}' of '{surface.body}'",
-                hint="the upper surface comes first; correct the connection or the stop.",
+                hint="the upper surface must come first; correct the connection or the stop.",
             )
 
 
@@ -227,8 +227,8 @@ def _check_laws(case: ValveSections) -> None:
         if series > 0.0:
             raise CaseProblem(
                 ("network", "components", name, "series_compliance"),
-                got=f"{series:g} m/N beside a consistent law",
-                expected="no series compliance: that law comes with its own",
+                got=f"{series:g} m/N together with a consistent law",
+                expected="no series compliance: that law has its own",
                 hint="leave it out, or give the end stop a linear law.",
             )
         refuse_key_if(
@@ -250,7 +250,7 @@ def _check_friction(case: ValveSections) -> None:
             raise CaseProblem(
                 ("stops", name, "friction"),
                 got=f"{stop.friction:g} at an end stop whose law is not computed",
-                expected="0, or the consistent law at this stop: the only one with friction",
+                expected="0, or the consistent law at this stop, the only law with friction",
                 hint=f"write law: {{kind: consistent}} in network.components.{name}, or leave the "
                 "friction out.",
             )
@@ -258,8 +258,9 @@ def _check_friction(case: ValveSections) -> None:
         if restitution is not None:
             raise CaseProblem(
                 ("network", "components", name, "restitution"),
-                got=f"{restitution:g} beside the friction {stop.friction:g} of the same stop",
-                expected="one of them: a restitution stands for all that an impact loses",
+                got=f"{restitution:g} together with the friction {stop.friction:g} of the same "
+                f"stop",
+                expected="only one of them: a restitution represents all losses of an impact",
                 hint=f"leave the restitution out, or stops.{name}.friction.",
             )
 
@@ -271,7 +272,7 @@ def _check_worn(case: ValveSections) -> None:
             stop.worn is not None and not is_consistent(case.network.components[name]),
             ("stops", name, "worn"),
             got="worn faces at an end stop whose law is not computed",
-            expected="the consistent law at this stop: the only one with faces",
+            expected="the consistent law at this stop, the only law with faces",
             hint=f"write law: {{kind: consistent}} in network.components.{name}, or leave "
             "'worn' out.",
             on_key=True,
@@ -308,7 +309,7 @@ def check_thermal(case: ValveSections) -> None:
             ("thermal", "period"),
             got=format_si(thermal.period, "s"),
             expected=f"run.duration or more, {format_si(case.run.duration, 's')}",
-            hint="a stroke has to end before the next one begins; shorten run.duration.",
+            hint="a stroke must end before the next one begins; shorten run.duration.",
         )
     _check_heat(thermal, parts)
     refuse_key_if(
@@ -332,7 +333,7 @@ def check_thermal(case: ValveSections) -> None:
             if text in taken:
                 raise CaseProblem(
                     ("thermal", "growth", name, "of", i),
-                    got=f"'{text}' a second time (first in '{taken[text]}')",
+                    got=f"'{text}' for the second time (first in '{taken[text]}')",
                     expected="one chain for each gap",
                     hint="put all lengths into one chain.",
                 )
@@ -377,8 +378,8 @@ def _check_heat(thermal: CaseThermal, parts: Mapping[str, Component]) -> None:
             refuse_key_if(
                 same and component in (other, sent.loss),
                 key,
-                got=f"'{sent.loss}' beside '{other}', which counts some heat twice",
-                expected="all losses of a component together, or each of them by its name",
+                got=f"'{sent.loss}' together with '{other}', which would count some heat twice",
+                expected="all losses of a component together, or each of them by name",
                 hint=f"name the losses of '{component}' one by one.",
             )
         shares[sent.loss] = shares.get(sent.loss, 0.0) + sent.share

@@ -46,7 +46,7 @@ class BodyPort(Section):
     load: Literal["axial", "pressure"] = Field(
         default="axial",
         description="axial: evenly spread along z; pressure: normal to the surface everywhere, "
-        "so that a cone is squeezed as well.",
+        "which also squeezes a cone.",
     )
 
 
@@ -55,8 +55,8 @@ class ValveBody(CaseBody):
 
     ports: Mapping[Name, BodyPort] = Field(
         default_factory=dict,
-        description="Points for the network with their own name or load; every "
-        "named surface is a point, loaded along the axis.",
+        description="Points for the network with their own name or load; every named surface is "
+        "a point by default, loaded along the axis.",
     )
 
 
@@ -69,18 +69,24 @@ class CaseStop(Section):
     between: tuple[BodySurface, BodySurface] = Field(
         description="Surface of the upper body, then surface of the lower one."
     )
-    speed: Speed = Field(gt=0, description="Fastest impact that the law must cover.")
+    speed: Speed = Field(gt=0, description="Speed of the fastest impact that the law must cover.")
     force: Force = Field(
-        default=0.0, ge=0, description="Largest force that presses the two together during it."
+        default=0.0,
+        ge=0,
+        description="Largest force that presses the two bodies together during it.",
     )
     reach: Length | None = Field(
         default=None, gt=0, description="Largest gap of points that may come into contact."
     )
     friction: Ratio = Field(
-        default=0.0, ge=0, le=MOST_FRICTION, description="Coulomb's coefficient between the faces."
+        default=0.0,
+        ge=0,
+        le=MOST_FRICTION,
+        description="Coefficient of Coulomb friction between the faces.",
     )
     worn: CaseWorn | None = Field(
-        default=None, description="Set of both faces after earlier impacts; default as made."
+        default=None,
+        description="Permanent set of both faces after earlier impacts; default: as made.",
     )
 
     @property
@@ -102,26 +108,26 @@ class StrokeRun(Section):
     )
     accuracy: Accuracy = Field(
         default="normal",
-        description="normal: first impacts to 0.05 % and 0.05 us, in steps of 20 ns and, where "
-        "they are enough, longer ones; fine: steps a quarter to half as long.",
+        description="normal: first impacts to 0.05 % and 0.05 us, in steps of 20 ns or longer "
+        "where sufficient; fine: steps a quarter to half as long.",
     )
     step: Time | None = Field(
-        default=None, gt=0, description="Fine time step, in place of that of the accuracy."
+        default=None, gt=0, description="Fine time step; overrides the accuracy."
     )
     coarse: Count | None = Field(
         default=None,
         le=256,
-        description="Fine steps in a macro step, taken far from the stops; 1 for none; by default "
-        "as many as the accuracy and the parts of the network allow.",
+        description="Number of fine steps in a macro step, used far from the stops; 1: no macro "
+        "steps; default: as many as the accuracy and the parts of the network allow.",
     )
     check_steps: bool | None = Field(
         default=None,
-        description="Whether to run each variant again with all steps twice as long, tell what "
-        "that changes in each impact, and halve all steps, three times or in short runs six, "
-        "until the first three impacts on each stop change by less than half of what the "
-        "accuracy promises; by default in single strokes, in points of studies for the impacts "
-        "that their measures depend on, and on the front of a search; in three dimensions steps "
-        "are halved only where this is true.",
+        description="Whether to repeat each variant with all steps twice as long, report the "
+        "change of each impact, and halve all steps, up to three times or in short runs six, "
+        "until the first three impacts on each stop change by less than half the promised "
+        "accuracy; default: in single strokes, in points of studies for the impacts that their "
+        "measures depend on, and on the front of a search; in three dimensions steps are halved "
+        "only if this is true.",
     )
     record: Time = Field(
         default=1e-6,
@@ -131,19 +137,19 @@ class StrokeRun(Section):
     variants: tuple[Variant, ...] = Field(
         default=("wet",),
         min_length=1,
-        description="wet: as described; dry: without fluid; dry-mounted: the same on the "
-        "receiver of the noise section, where the valve itself moves; with -lumped: rigid bodies "
-        "on one spring per stop.",
+        description="wet: as described; dry: without fluid; dry-mounted: dry, on the receiver "
+        "of the noise section, where the valve itself moves; with -lumped: rigid bodies on one "
+        "spring per stop.",
     )
     lift: BodySurface | None = Field(
         default=None,
         description="Point of a body whose displacement is the lift, as component.point; "
-        "default the point of the needle at the seat.",
+        "default: the point of the needle at the seat.",
     )
     seat: Name | None = Field(
         default=None,
-        description="End stop that the body of the lift closes; default the one that ends its "
-        "travel. Where it closes on a body that stays in place, as an insert, name that stop.",
+        description="End stop that the body of the lift closes; default: the one that ends its "
+        "travel. If it closes on a body that stays in place, such as an insert, name that stop.",
     )
 
     @model_validator(mode="after")
@@ -188,11 +194,12 @@ class ValveSections(CaseFile):
     network: NetworkSection = Field(description="Components of the valve and their connections.")
     motion: ValveMotion = Field(
         default="axial",
-        description="axial: all bodies move along the axis, stops have a law; three-dimensional: "
-        "all bodies keep their rigid freedoms and modes, and touch point by point.",
+        description="axial: all bodies move along the axis, stops have a law; "
+        "three-dimensional: all bodies have all rigid motions and modes, with contact point by "
+        "point.",
     )
     guide: ValveGuide | None = Field(
-        default=None, description="Guide of the needle in three dimensions; default none."
+        default=None, description="Guide of the needle in three dimensions; default: none."
     )
     guides: Mapping[Name, BodyGuide] = Field(
         default_factory=dict,
@@ -200,14 +207,14 @@ class ValveSections(CaseFile):
     )
     placement: ValvePlacement | None = Field(
         default=None,
-        description="Position of the needle at the start in three dimensions; default centred.",
+        description="Position of the needle at the start in three dimensions; default: centred.",
     )
     angles: Count | None = Field(
         default=None,
         ge=8,
         le=512,
-        description="Contact points round each ring of axisymmetric bodies in three dimensions; "
-        "default 48.",
+        description="Contact points around each ring of axisymmetric bodies in three "
+        "dimensions; default: 48.",
     )
     shots: StrokeShots | None = Field(
         default=None, description="Many strokes in three dimensions: input of klack shots."
@@ -220,10 +227,11 @@ class ValveSections(CaseFile):
     noise: CaseNoise | None = Field(default=None, description="Input of klack noise.")
     thermal: CaseThermal | None = Field(default=None, description="Input of klack heat.")
     calibration: CaseCalibration | None = Field(
-        default=None, description="What klack calibrate fits to measured strokes."
+        default=None, description="Parameters that klack calibrate fits to measured strokes."
     )
     study: CaseStudy | None = Field(
-        default=None, description="What klack study varies, and what it computes."
+        default=None,
+        description="Parameters that klack study varies, and measures that it computes.",
     )
 
     def plausible_numbers(self) -> Iterator[Number]:

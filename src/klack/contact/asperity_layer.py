@@ -175,6 +175,6 @@ def press(
         rest, force, stiffness = trial
     raise ConvergenceError(
         f"asperity layer: no forces found in {_ROUNDS} rounds for {len(q)} contact points, the "
-        f"gaps still miss by {size:.2g} m.\nTry: a curve of pressure over closure that rises "
-        "steadily, or a shorter step."
+        f"gaps are still wrong by {size:.2g} m.\n"
+        "Try: a curve of pressure over closure that rises steadily, or a shorter step."
     )

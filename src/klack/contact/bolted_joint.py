@@ -246,7 +246,6 @@ def _wrong(joint: FlatJoint, got: str, expected: str) -> JointError:
     return JointError(
         joint.name,
         got=f"bolts between {joint.ends[0]} and {joint.ends[1]}: {got}",
-        expected=f"{expected}, so that the bolts press '{joint.lower}' and '{joint.upper}' "
-        "together",
-        hint="name the face under the head, and the face or cylinder that the thread pulls.",
+        expected=f"{expected}: the bolts press '{joint.lower}' and '{joint.upper}' together",
+        hint="name the face under the head, and the face or cylinder that carries the thread.",
     )

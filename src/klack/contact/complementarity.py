@@ -49,7 +49,8 @@ class ComplementaritySolver:
                 "complementarity: A",
                 got=f"an array of shape {A.shape}, finite: {bool(np.all(np.isfinite(A)))}",
                 expected="a square matrix of finite numbers",
-                hint="check the contact compliance; a body without support has no static one.",
+                hint="check the contact compliance; a body without support has no static "
+                "compliance.",
             )
         self.A = np.array(A.T, order="F")  # the same matrix; most come in rows
         self.round_limit = 200 + 10 * len(A)

@@ -54,7 +54,7 @@ class Friction:
             "friction: static",
             got=f"{self.static:g}, below the kinetic coefficient {self.kinetic:g}",
             expected="a static coefficient of at least the kinetic one",
-            hint="give the kinetic coefficient alone where only one is known.",
+            hint="give only the kinetic coefficient where only one is known.",
         )
 
     @classmethod

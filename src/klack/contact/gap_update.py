@@ -286,7 +286,7 @@ class RigidGaps:
             "contact: gaps after a rigid motion",
             got="axisymmetric bodies",
             expected="solids",
-            hint="a motion along the axis is ContactSpace.shifted; take 'model: swept' else.",
+            hint="for a motion along the axis use ContactSpace.shifted, otherwise 'model: swept'.",
         )
         slave, master, away = slave_and_master(space, (mesh_a, surface_a), (mesh_b, surface_b))
         hats = hat_quadrature(space, *slave)

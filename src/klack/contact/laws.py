@@ -315,7 +315,7 @@ def _with_origin(
         d.size != f.size or d.size == 0,
         "TableLaw",
         got=f"{d.size} indentations and {f.size} forces",
-        expected="the same number of both, at least one",
+        expected="an equal number of both, at least one",
         hint="give one force per indentation.",
     )
     if d[0] != 0.0:

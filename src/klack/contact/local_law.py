@@ -113,17 +113,17 @@ def consistent_law(static: StaticContact, modal_compliance: float) -> LocalLaw:
         worst = int(np.argmax(tangent_share <= 0))
         raise OverfullModesError(
             "consistent law",
-            got=f"modes with more than the static compliance above {force[worst]:.4g} N "
-            f"({modal_compliance:.4g} m/N of {approach[-1] / force[-1]:.4g} m/N at the end)",
-            expected="a remainder that rises with the force",
-            hint="keep fewer modes, or take the port pattern at a higher force.",
+            got=f"modes whose compliance exceeds the static one above {force[worst]:.4g} N "
+            f"({modal_compliance:.4g} m/N against {approach[-1] / force[-1]:.4g} m/N at the end)",
+            expected="a remaining indentation that increases with the force",
+            hint="keep fewer modes, or use the port pattern at a higher force.",
         )
     lowest = float(min(share.min(), tangent_share.min()))
     if lowest < _FAIR_SHARE:
         warnings.warn(
             f"contact: only {floor(1000 * lowest) / 10:g} % of the static compliance is left to "
-            f"the local law at its lowest point ({100 * _FAIR_SHARE:.0f} % or more is safe). Keep "
-            "fewer modes; where a doubt asks for more of them, neither helps, but level interface.",
+            f"the local law at its lowest point ({100 * _FAIR_SHARE:.0f} % or more is safe). "
+            "Keep fewer modes; if another doubt requires more of them, use level interface.",
             AccuracyWarning,
             stacklevel=2,
         )

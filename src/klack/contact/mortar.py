@@ -846,7 +846,7 @@ def touching_shift(
 def _not_facing(surface_a: Surface, surface_b: Surface) -> InputError:
     return InputError(
         f"contact of surface '{surface_a.name}' with surface '{surface_b.name}'",
-        got="no line along a surface normal that meets the other surface from its front",
+        got="no line along a surface normal that meets the front of the other surface",
         expected="two surfaces that face each other",
         hint="check the names of the two surfaces, their units, their overlap and the axis z.",
     )

@@ -41,7 +41,7 @@ class PressureLimit:
         refuse_if(
             len(self.set) < 2 or self.set[0] != 0.0 or not rises or not self.pressure[0] > 0.0,
             "pressure limit",
-            got=f"{len(self.set)} sets and pressures that do not both rise, from 0 and above 0",
+            got=f"{len(self.set)} sets and pressures that do not both increase, from 0 and above 0",
             expected="at least two, both increasing",
             hint="give a hardening above 0.",
         )

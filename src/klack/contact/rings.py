@@ -82,9 +82,9 @@ class RingSpace:
                 f"{where}: points on rings",
                 got=f"contact points {format_si(float(section.points[:, 0].min()), 'm', 2)} from "
                 "the axis",
-                expected=f"a ring, more than {_CENTRAL:g} elements away from it",
-                hint=f"{more}take 'model: swept' with 'layers: 18' for both bodies: a contact "
-                "around the axis has no ring to put points on.",
+                expected=f"a ring more than {_CENTRAL:g} elements from the axis",
+                hint=f"{more}use 'model: swept' with 'layers: 18' for both bodies: a contact on "
+                "the axis has no ring for contact points.",
             )
         G = section.G_a if section.slave == "a" else section.G_b
         beside = abs(G) @ abs(G).T > 0  # hats that share nodes

@@ -91,7 +91,7 @@ class RubbingLaw:
             not np.all(np.cumsum(self.normal - self.strength) > 0.0),
             "law with friction",
             got="a force that does not fall while the contact opens (self-locking)",
-            expected="a friction below the slope of the faces",
+            expected="a friction coefficient below the slope of the faces",
             hint="lower the coefficient of friction.",
         )
 

@@ -564,8 +564,8 @@ def check_state(
         return
     error = ReachError(
         "contact: reach",
-        got=f"contact at the edge of the candidate points above {below:.4g} N "
-        f"(reach {space.reach * 1e6:.4g} um)",
+        got=f"contact that reaches the edge of the candidate points above {below:.4g} N (reach "
+        f"{space.reach * 1e6:.4g} um)",
         expected=f"a reach that covers the contact up to {needed:.4g} N",
         hint=f"enlarge the reach: in a case 'reach: {2e6 * deepest:.3g} um', "
         "under contact or at the stop; or enlarge the named surfaces.",

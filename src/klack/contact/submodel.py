@@ -114,7 +114,7 @@ def _region(body: ElasticBody, carrying: NDArray[np.float64], size: float) -> El
         got=f"{size * 1e3:.4g} mm, which lets {free} of {body.mesh.node_count} nodes of "
         f"'{body.name}' deform",
         expected="a region larger than a few elements and smaller than the body",
-        hint="some half widths of the contact are usual, for example 0.2 to 1 mm.",
+        hint="a few half widths of the contact are usual, for example 0.2 to 1 mm.",
     )
     d = body.mesh.dimension
     held = (d * beyond[:, None] + np.arange(d)).ravel()

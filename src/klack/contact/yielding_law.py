@@ -67,8 +67,9 @@ class YieldingLaw:
         refuse_if(
             not (rising and np.all(self.set < self.largest)),
             "law of faces that yield",
-            got="a force that falls as faces are pressed further, or faces that do not part",
-            expected="a force that rises, and a set below the indentation",
+            got="a force that falls as the faces are pressed further, or faces that do not "
+            "separate",
+            expected="a force that increases, and a permanent set below the indentation",
             hint="a finer mesh at the contact, or fewer modes.",
         )
         refuse_if(

@@ -21,10 +21,10 @@ class HysteresisController(Section):
 
     kind: Literal["hysteresis"] = Field(description="Which law: hysteresis.")
     sensor: Name = Field(description="Its signal.")
-    lower: Number = Field(description="Signal at or below which 'low' is put out.")
-    upper: Number = Field(description="Signal at or above which 'high' is put out.")
-    low: Number = Field(description="Output while the signal is low, from the start on.")
-    high: Number = Field(description="Output after the signal was high.")
+    lower: Number = Field(description="Signal at or below which the output is 'low'.")
+    upper: Number = Field(description="Signal at or above which the output is 'high'.")
+    low: Number = Field(description="Output while the signal is low, and at the start.")
+    high: Number = Field(description="Output after the signal has been high.")
 
     @model_validator(mode="after")
     def _band(self) -> Self:
@@ -33,7 +33,7 @@ class HysteresisController(Section):
             ("lower",),
             got=f"{self.lower:g}",
             expected=f"a signal below the upper one, {self.upper:g}",
-            hint="a band that is wider than noise and quantisation.",
+            hint="use a band wider than the noise and the quantisation.",
         )
         return self
 

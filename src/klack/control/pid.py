@@ -18,15 +18,19 @@ __all__ = ["PidController", "RunningPid", "Setpoint"]
 class Setpoint(Section):
     """Wanted signal over time, straight between points, constant beyond them."""
 
-    time: tuple[Time, ...] = Field(min_length=1, description="Times, not falling; a jump twice.")
-    value: tuple[Number, ...] = Field(min_length=1, description="Signal, in the sensor's unit.")
+    time: tuple[Time, ...] = Field(
+        min_length=1, description="Times in ascending order; a jump is the same time twice."
+    )
+    value: tuple[Number, ...] = Field(
+        min_length=1, description="Signal, in the unit of the sensor."
+    )
 
     @model_validator(mode="after")
     def _pairs(self) -> Self:
         refuse_key_if(
             len(self.time) != len(self.value) or np.any(np.diff(self.time) < 0),
             ("time",),
-            got=f"{len(self.time)} times for {len(self.value)} values, or falling times",
+            got=f"{len(self.time)} times for {len(self.value)} values, or times that fall",
             expected="one value for each time, in order",
             hint="write a jump as the same time twice.",
         )
@@ -57,17 +61,19 @@ class PidController(Section):
 
     kind: Literal["pid"] = Field(description="Which law: pid.")
     sensor: Name = Field(description="Its signal.")
-    setpoint: Number | Setpoint = Field(description="Wanted signal, or {time: ..., value: ...}.")
+    setpoint: Number | Setpoint = Field(description="Set point, or {time: ..., value: ...}.")
     gain: Number = Field(description="K, output (V, N or Pa) per unit of the signal.")
     integral_time: Time | None = Field(
         default=None, gt=0, description="T_i; default no integral action."
     )
     derivative_time: Time = Field(default=0.0, ge=0, description="T_d.")
     derivative_filter: Time = Field(default=0.0, ge=0, description="Its time constant.")
-    bias: Number = Field(default=0.0, description="Output b without an error.")
+    bias: Number = Field(default=0.0, description="Output b at zero error.")
     lower: Number = Field(description="Smallest output.")
     upper: Number = Field(description="Largest output.")
-    anti_windup: bool = Field(default=True, description="Whether the integral waits at a limit.")
+    anti_windup: bool = Field(
+        default=True, description="Whether the integral is held at a limit (anti-windup)."
+    )
 
     @model_validator(mode="after")
     def _limits(self) -> Self:
@@ -76,7 +82,7 @@ class PidController(Section):
             ("lower",),
             got=f"{self.lower:g}",
             expected=f"below the upper limit, {self.upper:g}",
-            hint="a coil at a half bridge: lower: 0 and the supply as upper.",
+            hint="for a coil on a half bridge: lower: 0, and the supply voltage as upper.",
         )
         return self
 

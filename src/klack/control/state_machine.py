@@ -20,10 +20,14 @@ class Transition(Section):
     """A way out of a state: a signal above or below a value, or a time in the state."""
 
     to: Name = Field(description="Next state.")
-    sensor: Name | None = Field(default=None, description="Its signal, for above and below.")
+    sensor: Name | None = Field(
+        default=None, description="Its signal is compared with above and below."
+    )
     above: Number | None = Field(default=None, description="Taken at or above this signal.")
     below: Number | None = Field(default=None, description="Taken at or below this signal.")
-    after: Time | None = Field(default=None, ge=0, description="Taken after so long in the state.")
+    after: Time | None = Field(
+        default=None, ge=0, description="Taken after this time in the state."
+    )
 
     @model_validator(mode="after")
     def _one_condition(self) -> Self:
@@ -33,7 +37,7 @@ class Transition(Section):
                 ("to",),
                 got=f"{sum(given)} conditions"
                 + (" and no sensor" if self.sensor is None else f" and the sensor {self.sensor}"),
-                expected="'sensor' with 'above' or 'below', or 'after' alone",
+                expected="'sensor' with 'above' or 'below', or only 'after'",
                 hint="write a transition for each condition; the first that holds is taken.",
             )
         return self
@@ -44,7 +48,9 @@ class MachineState(Section):
 
     name: Name = Field(description="Name of the state.")
     output: Number = Field(description="Output (V, N or Pa) in it.")
-    transitions: tuple[Transition, ...] = Field(default=(), description="Ways out of it.")
+    transitions: tuple[Transition, ...] = Field(
+        default=(), description="Transitions out of the state."
+    )
 
 
 class StateMachine(Section):

@@ -40,16 +40,16 @@ def calculix_impact(case: Case, progress: Progress) -> CalculixImpact:
     if form is not None:
         raise InputError(
             f"{case.path or 'case'}: contact.{form}",
-            got="a form or roughness of the faces, which the meshes do not have",
-            expected="faces as drawn: a deck holds the meshes alone",
+            got="a form or roughness of the faces, which the meshes do not contain",
+            expected="faces as drawn: a deck contains only the meshes",
             hint="draw the crown as an arc or the tilt as a placement, and remove the key.",
         )
     layered = next((name for name, body in case.bodies.items() if body.layers), None)
     if layered is not None:
         raise InputError(
             f"{case.path or 'case'}: bodies.{layered}.layers",
-            got="a layer between two parts, which the meshes do not have",
-            expected="parts that are glued: a deck holds the meshes alone",
+            got="a layer between two parts, which the meshes do not contain",
+            expected="glued parts: a deck contains only the meshes",
             hint="draw the layer as a thin part with a material of its own, and remove the key.",
         )
     left_out = [name for name in ("guide", "opposite") if getattr(case, name) is not None]
@@ -65,8 +65,8 @@ def calculix_impact(case: Case, progress: Progress) -> CalculixImpact:
     tell_elastic(case, "the deck is one of")
     if case.contact.worn is not None:
         warnings.warn(
-            "left out of the deck: contact.worn, its faces are as made. Try: compare with the case "
-            "without 'worn'.",
+            "left out of the deck: contact.worn; the faces in the deck are unworn. Try: compare "
+            "with the case without 'worn'.",
             AccuracyWarning,
             stacklevel=2,
         )
@@ -97,10 +97,10 @@ def _other_friction(faces: Friction) -> str:
         if faces.speed:
             left_out += f", stribeck_speed {format_si(faces.speed, 'm/s')}"
     if not faces.kinetic:
-        return f"the deck has no friction, contact.friction is 0{left_out}."
+        return f"the deck has no friction because contact.friction is 0{left_out}."
     return (
-        f"contact.friction {faces.kinetic:g} is regularised in the deck: faces that stick give way "
-        f"like a spring (stick slope), and one coefficient holds at every speed of slip{left_out}."
+        f"contact.friction {faces.kinetic:g} is regularised in the deck: sticking faces yield "
+        f"like a spring (stick slope), and one coefficient holds at every slip speed{left_out}."
     )
 
 

@@ -233,7 +233,7 @@ def _require_solids(impact: CalculixImpact) -> None:
         raise InputError(
             f"body '{impact.upper.name}'",
             got="an upper body that is held",
-            expected="one that is free to move in -z",
+            expected="an upper body that is free to move in -z",
             hint="remove its supports from the case, or swap the bodies.",
         )
 

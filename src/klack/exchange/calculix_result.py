@@ -168,7 +168,7 @@ def _read(path: Path, stream: Iterator[str], tables: _Tables) -> None:
     """Collect tables: heading, empty line, numbers."""
     for line in stream:
         if len(line) > _LONGEST_LINE:
-            raise _refuse(path, f"a line of {len(line)} signs", "a .dat file of CalculiX")
+            raise _refuse(path, f"a line of {len(line)} characters", "a .dat file of CalculiX")
         line = line.rstrip()
         if not line.startswith((" total", " statistics")):
             continue
@@ -210,7 +210,7 @@ def _number(path: Path, word: str) -> float:
     except ValueError:
         raise _refuse(path, f"'{word[:40]}' instead of a number", "numbers") from None
     if not np.isfinite(value):
-        hint = "the run diverged: take a shorter step, or a smaller penalty."
+        hint = "the run diverged: use a shorter step, or a smaller penalty."
         raise _refuse(path, f"'{word[:40]}'", "finite forces and energies", hint)
     return value
 
@@ -234,7 +234,7 @@ def _force(
     axial, sideways = next(iter(tables.force.values()))
     time = np.array(axial.time)
     if not (time[0] > 0 and np.all(np.diff(time) > 0)):
-        raise _refuse(path, "times that do not grow", "one step of one run")
+        raise _refuse(path, "times that do not increase", "one step of one run")
     if len(time) < 4:
         raise _refuse(path, f"{len(time)} increments", "a whole impact")
     return time, np.array(axial.value), np.array(sideways.value)
@@ -338,8 +338,8 @@ def _flight_speed(result: CalculixResult, reference: ImpactHistory, force: float
             result.source,
             got=f"a kinetic energy of {start:.5g} J of set {UPPER} at the start",
             expected=f"{expected:.5g} J: {reference.mass_a * 1e3:.5g} g at {reference.speed:g} m/s",
-            hint="compare with the result of the same case on the same mesh; the deck has to be "
-            "in mm, t, s.",
+            hint="compare with the result of the same case on the same mesh; the units of the "
+            "deck are mm, t, s.",
         )
     return float(np.sqrt(2.0 * start / reference.mass_a))
 

@@ -117,7 +117,8 @@ def _frictionless(case: Case) -> Case:
         return case
     warnings.warn(
         f"the exported pair leaves out contact.friction {case.contact.faces.static:g}: its law "
-        "closes and opens on one curve. Try: klack impact, whose reduced level has the loss.",
+        "loads and unloads on one curve. Try: klack impact, whose reduced level includes the "
+        "loss.",
         AccuracyWarning,
         stacklevel=3,
     )
@@ -130,8 +131,8 @@ def _smooth_valve(case: ValveCase) -> ValveCase:
     if not left:
         return case
     warnings.warn(
-        f"the exported valve leaves out {' and '.join(left)}: its laws close and open on one "
-        "curve. Try: klack stroke, which has the loss.",
+        f"the exported valve leaves out {' and '.join(left)}: its laws load and unload on one "
+        "curve. Try: klack stroke, which includes the loss.",
         AccuracyWarning,
         stacklevel=3,
     )
@@ -187,7 +188,7 @@ def _of_valve(case: ValveCase, progress: Progress, threads: int | None) -> CaseM
             f"{case.path or 'case'}: network.components",
             got="no end stop",
             expected="at least one component of type end-stop",
-            hint="export the bodies alone: --part body.",
+            hint="export only the bodies: --part body.",
         )
     used = [
         body

@@ -33,7 +33,7 @@ def model_folder(models: Sequence[ModalModel], folder: Path) -> Iterator[Path]:
         if count > 1:
             raise InputError(
                 str(folder),
-                got=f"{count} models of the name '{name}'",
+                got=f"{count} models with the name '{name}'",
                 expected="distinct names",
                 hint="rename a body of the case.",
             )
@@ -42,7 +42,7 @@ def model_folder(models: Sequence[ModalModel], folder: Path) -> Iterator[Path]:
             raise InputError(
                 str(folder),
                 got=f"the model name '{model.name}' of {len(model.name)} characters",
-                expected=f"at most {LONGEST}, so that MATLAB accepts it with a suffix",
+                expected=f"at most {LONGEST}, for MATLAB to accept it with a suffix",
                 hint="give the case or the body a shorter name.",
             )
         if model.mode_count == 0:

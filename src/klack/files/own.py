@@ -77,7 +77,7 @@ def require_own_file(path: Path | str, state: os.stat_result) -> None:
         raise InputError(
             os.fspath(path),
             got=got,
-            expected="a regular file of your own, or none",
+            expected="a regular file of your own, or no file",
             hint="another user may have put it there: check it, then remove it, or choose "
             "another folder.",
         )

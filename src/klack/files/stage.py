@@ -136,7 +136,7 @@ class Stage(Closing):
         if unknown := [name for name in names if name not in _KNOWN]:
             return f"with the unknown entry {unknown[0]!r}"
         if not (self._sealed() or self._barely_begun(names)):
-            return "without the seal of klack: it was copied or unpacked here"
+            return "without klack's seal: it was copied or unpacked here"
         return None
 
     def _sealed(self) -> bool:
@@ -333,7 +333,7 @@ def _of_one_user(folder: os.stat_result, file: os.stat_result) -> bool:
 
 
 def _swapped() -> PermissionError:
-    return PermissionError(errno.EPERM, "another folder was put in the place of klack's own")
+    return PermissionError(errno.EPERM, "another folder has replaced klack's own")
 
 
 def _seal_of(state: os.stat_result) -> list[int]:

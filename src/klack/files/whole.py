@@ -143,7 +143,7 @@ def _complete(folder: HeldFolder) -> None:
     if left:
         more = f" and {len(left) - _MOST_NAMED} more" if len(left) > _MOST_NAMED else ""
         warnings.warn(
-            f"{str(folder.path)!r} has an entry that was not made by your klack; it is left "
+            f"{str(folder.path)!r} has an entry that your klack did not make; it is left "
             f"unchanged: {', '.join(left[:_MOST_NAMED])}{more}. Remove it if you know its origin.",
             LeftAloneWarning,
             stacklevel=4,

@@ -55,7 +55,9 @@ class Accumulator(Component):
         description="Share of the gas volume at which it is full; bladders 0.25, pistons 0.1.",
     )
     inlet_diameter: Length | None = Field(
-        default=None, gt=0, description="Of an orifice at its port; without it no resistance."
+        default=None,
+        gt=0,
+        description="Diameter of an orifice at its port; without it the port has no resistance.",
     )
     discharge: Ratio = Field(default=0.7, gt=0, le=1, description="Flow coefficient of the inlet.")
     critical_flow_number: Ratio = Field(
@@ -107,8 +109,8 @@ class Accumulator(Component):
     def _limits(self, rows: Rows) -> list[LimitRow]:
         node = rows.nodes.get(rows.port("fluid"))
         holds = node is not None and node.stated and node.at_start > self.precharge
-        full = "It is full: it takes no more fluid, the pressure rises as without it."
-        empty = "It is empty: it no longer holds the pressure."
+        full = "It is full and takes no more fluid: the pressure rises as without it."
+        empty = "It is empty and no longer holds the pressure."
         limits = [("full", (self.full_at * self.volume * (1.0 + 1e-12), inf), full)]
         if holds:
             limits.append(("empty", (0.0, self.volume * (1.0 - 1e-12)), empty))

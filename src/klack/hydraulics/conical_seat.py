@@ -178,7 +178,9 @@ class ConicalSeat(OpeningComponent):
                 hint=f"add chamfer_{missing}.",
             )
         if self.edge_radius is not None:
-            self._refuse_with(("chamfer_width",), "edge_radius", "an edge is rounded or chamfered")
+            self._refuse_with(
+                ("chamfer_width",), "edge_radius", "an edge is either rounded or chamfered"
+            )
         self._check_angles()
         self._check_edge()
         return self
@@ -198,8 +200,8 @@ class ConicalSeat(OpeningComponent):
             got=f"{degrees(self.tip_half_angle):g} deg",
             expected=f"more than the {seat:g} deg of the seat: the tip must leave it below "
             "the edge",
-            hint="swap both angles; a tip that is steeper than its seat touches the upper end "
-            "of the seat: that is a seat with shape: cone.",
+            hint="swap both angles; a tip steeper than its seat touches the upper end of "
+            "the seat: describe that as a seat with shape: cone.",
         )
         refuse_key_if(
             self.shank_half_angle >= self.half_angle,
@@ -218,14 +220,15 @@ class ConicalSeat(OpeningComponent):
             got=f"{degrees(chamfer):g} deg",
             expected=f"between those of shank and tip, {degrees(self.shank_half_angle):g} and "
             f"{degrees(self.tip_half_angle):g} deg",
-            hint="measured from the axis, like all of them.",
+            hint="all angles are measured from the axis.",
         )
         refuse_key_if(
             abs(chamfer - self.half_angle) < _PARALLEL,
             ("chamfer_half_angle",),
             got=f"{degrees(chamfer):g} deg, parallel to the seat",
-            expected="another angle than that of the seat: a land has no sealing diameter",
-            hint="a parallel land is a seat with shape: cone, its land_width and a land-face.",
+            expected="an angle other than that of the seat: a land has no sealing diameter",
+            hint="describe a parallel land as a seat with shape: cone, with its land_width "
+            "and a land-face.",
         )
 
     def _check_edge(self) -> None:
@@ -246,8 +249,8 @@ class ConicalSeat(OpeningComponent):
             got=f"a needle that meets the cone at {1e3 * seal:g} mm",
             expected=f"between the ends of the seat, {1e3 * self.lower_diameter:g} and "
             f"{1e3 * self.upper_diameter:g} mm",
-            hint="check the diameters and their units; an end of the seat that seals is a seat "
-            "with shape: cone.",
+            hint="check the diameters and their units; if an end of the seat seals, use a "
+            "seat with shape: cone.",
         )
 
     @property
@@ -366,9 +369,9 @@ class ConicalSeat(OpeningComponent):
                 got=f"{name} {told} of the pressure faces at port {port}"
                 if given
                 else f"no pressure-face with direction: opening at port {port}",
-                expected=f"a pressure-face with {name}: {1e3 * seal:.6g} mm, the sealing diameter, "
-                "from which on this seat follows the lift itself",
-                hint=f"give the face that {name}, or leave tip_side out: then faces keep theirs; "
-                "another port at the tip is tip_side: "
+                expected=f"a pressure-face with {name}: {1e3 * seal:.6g} mm, the sealing "
+                "diameter, from which this seat follows the lift itself",
+                hint=f"give the face that {name}, or leave tip_side out, which keeps the "
+                "diameters of the faces; for the other port at the tip write tip_side: "
                 f"{'a' if self.tip_side == 'b' else 'b'}.",
             )

@@ -28,7 +28,9 @@ class ControlledPressure(Controlled):
     output_unit: ClassVar[str] = "Pa"
     ports: ClassVar[Mapping[str, Port]] = {"fluid": PRESSURE}
 
-    start: Pressure = Field(gt=0, description="Absolute pressure at the start, before it acts.")
+    start: Pressure = Field(
+        gt=0, description="Absolute pressure at the start, before the controller acts."
+    )
 
     def add_rows(self, rows: Rows) -> None:
         """Prescribe the pressure of the node, and add the controller."""

@@ -130,7 +130,7 @@ def _tabulated(name: str, temperature: float) -> FluidState:
     refuse_if(
         not pressure or pressure[-1] < _LEAST,
         f"fluid '{name}': temperature",
-        got=f"{temperature - 273.15:g} degC, where its equation of state does not reach "
+        got=f"{temperature - 273.15:g} degC, where its equation of state does not extend to "
         f"{_LEAST / 1e5:g} bar",
         expected="a liquid",
         hint="choose another temperature or fluid.",
@@ -160,7 +160,7 @@ def _viscosity(state: Any, name: str, temperature: float, start: float) -> tuple
                 got=f"'{name}', of which CoolProp has no viscosity at "
                 f"{temperature - 273.15:g} degC and {p / 1e5:.4g} bar",
                 expected="a fluid with a viscosity",
-                hint="write its properties to a file and give it as table.",
+                hint="write its properties to a file and give the file as table.",
             ) from None
     slope, base = np.polyfit(pressure - ATMOSPHERE, np.log(values), 1)
     return float(np.exp(base)), float(slope)

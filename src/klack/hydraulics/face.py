@@ -31,7 +31,7 @@ class FaceComponent(Component):
         if (self.inner_diameter or 0.0) >= (self.outer_diameter or 0.0):
             raise CaseProblem(
                 ("inner_diameter",),
-                got=f"{self.inner_diameter:g} m inside of {self.outer_diameter:g} m",
+                got=f"{self.inner_diameter:g} m inside {self.outer_diameter:g} m",
                 expected="less than outer_diameter",
                 hint="swap both.",
             )

@@ -98,20 +98,22 @@ class Film(Section):
     cut_off: Length | None = Field(
         default=None,
         gt=0,
-        description="Film height h_r left at first touch; 3 roughness, or 0.3 um without one.",
+        description="Film height h_r left at first touch; default: 3 roughness, or 0.3 um "
+        "without a "
+        "roughness.",
     )
     pressure: Pressure | None = Field(
-        default=None, gt=0, description="Around the film, absolute; the ambient pressure if absent."
+        default=None, gt=0, description="Around the film, absolute; default: the ambient pressure."
     )
     cavitation_pressure: Pressure | None = Field(
-        default=None, description="Absolute; the vapour pressure if absent, negative for tension."
+        default=None, description="Absolute; default: the vapour pressure; negative for tension."
     )
 
     sectors: int = Field(
         default=36,
         ge=8,
         le=360,
-        description="Into which the land is cut round its circumference where it can tilt.",
+        description="Sectors round the circumference of a land that can tilt.",
     )
 
     @model_validator(mode="after")
@@ -121,7 +123,7 @@ class Film(Section):
                 ("cut_off",),
                 got=format_si(self.cut_off, "m"),
                 expected=f"half the roughness ({format_si(self.roughness, 'm')}) or more",
-                hint="1 to 3 times the roughness is usual; leave it out for 3 times.",
+                hint="1 to 3 times the roughness is usual; the default is 3 times.",
             )
         return self
 
@@ -182,16 +184,16 @@ class Film(Section):
                 f"network.components.{component}.film.cavitation_pressure",
                 got=f"{limit} absolute",
                 expected=f"less than the pressure around the film, {words}",
-                hint="pressures are absolute; leave it out for the vapour pressure.",
+                hint="pressures are absolute; the default is the vapour pressure.",
             )
         key, hint = (
             "network.ambient.pressure",
-            f"give {film} its own 'pressure', that of the valve; surroundings have about 1 bar "
-            "absolute, at which a hot fluid may boil.",
+            f"give {film} its own 'pressure', the one in the valve; ambient pressure is about 1 "
+            "bar absolute, at which a hot fluid may boil.",
         )
         if self.pressure is not None:
             key = f"network.components.{component}.film.pressure"
-            hint = "pressures are absolute; a hot fluid boils at a higher one."
+            hint = "pressures are absolute; a hot fluid boils at a higher pressure."
         return InputError(
             key,
             got=f"{words} absolute around {film}",
@@ -320,7 +322,9 @@ class SphereFilm(Film):
     shape: Literal["sphere"] = Field(description="Which shape: sphere.")
     radius: Length = Field(gt=0, description="Radius R of the sphere, of curvature of a crown.")
     edge_radius: Length | None = Field(
-        default=None, gt=0, description="Where the spherical face ends; the radius R if absent."
+        default=None,
+        gt=0,
+        description="Radius at which the spherical face ends; default: the radius R.",
     )
 
     @model_validator(mode="after")
@@ -330,7 +334,8 @@ class SphereFilm(Film):
             ("edge_radius",),
             got=format_si(self.face_radius, "m"),
             expected=f"at most the radius of the sphere, {format_si(self.radius, 'm')}",
-            hint="radius is that of the sphere, edge_radius that of the face seen from above.",
+            hint="'radius' is the radius of the sphere, 'edge_radius' the radius of the face "
+            "seen from above.",
         )
         refuse_key_if(
             self.rise < _LEAST_RISE * self.lowest_height,
@@ -338,7 +343,7 @@ class SphereFilm(Film):
             got=f"a face that rises by {format_si(self.rise, 'm')} to its edge",
             expected=f"a rise above {_LEAST_RISE:g} cut-offs, "
             f"{format_si(_LEAST_RISE * self.lowest_height, 'm')}",
-            hint="so flat a face is nearly a disc: use shape: disc.",
+            hint="such a flat face is nearly a disc: use shape: disc.",
         )
         return self
 

@@ -27,7 +27,7 @@ class FlowForce(Section):
     """
 
     velocity_coefficient: Ratio = Field(
-        default=0.98, ge=0, le=1, description="Speed of the jet over that without loss."
+        default=0.98, ge=0, le=1, description="Speed of the jet over the speed without loss."
     )
     jet_angle: Angle | None = Field(
         default=None,
@@ -36,8 +36,8 @@ class FlowForce(Section):
     )
     damping_length: Length = Field(
         default=0.0,
-        description="Fluid column accelerated by a change of flow; positive when flow from a to b "
-        "runs along +z beside the needle.",
+        description="Fluid column accelerated by a change of flow; positive when flow from a to "
+        "b runs along +z past the needle.",
     )
 
     def momentum(self, angle: float) -> float:

@@ -114,12 +114,12 @@ class FluidChoice(NamedSection):
     viscosity_pressure: Pressure | None = Field(
         default=None,
         gt=0,
-        description="Pressure over which the viscosity grows by e = 2.72; fuels 1000 bar.",
+        description="Pressure rise that multiplies the viscosity by e = 2.72; fuels 1000 bar.",
     )
     viscosity_law: Literal["ambient", "barus", "roelands"] = Field(
         default="ambient",
-        description="Viscosity over pressure in orifices, seats, annuli and channels: that at "
-        "ambient pressure, or a law, which lines and films then follow too.",
+        description="Viscosity over pressure in orifices, seats, annuli and channels: constant, "
+        "as at ambient pressure, or a law, which lines and films then follow too.",
     )
     vapour_pressure: Pressure | None = Field(
         examples=["5 kPa"],
@@ -152,16 +152,16 @@ class FluidChoice(NamedSection):
         examples=["1 ms"],
         default=None,
         gt=0,
-        description="Time constant of gas that leaves the liquid of chambers; default: at once.",
+        description="Time constant of gas release from the liquid of chambers; default: at once.",
     )
     absorption_time: Time | None = Field(
         examples=["5 s"],
         default=None,
         gt=0,
-        description="Time constant of gas that dissolves; with release_time.",
+        description="Time constant of gas dissolution; with release_time.",
     )
     boiling_half_width: Pressure = Field(
-        default=2000.0, gt=0, description="Half of the pressure band in which it boils."
+        default=2000.0, gt=0, description="Half of the pressure band in which the fluid boils."
     )
 
     @model_validator(mode="after")
@@ -170,7 +170,7 @@ class FluidChoice(NamedSection):
         if (low is None) != (high is None) or (low and high and low >= high):
             raise CaseProblem(
                 ("saturation_pressure",),
-                got="one of the two alone" if low is None or high is None else "not above it",
+                got="only one of the two" if low is None or high is None else "not above it",
                 expected="release_pressure below saturation_pressure, or none of them",
                 hint="leave both out: in strokes of milliseconds the gas stays free.",
             )
@@ -178,7 +178,7 @@ class FluidChoice(NamedSection):
         if times != (None, None) and (None in times or low is None):
             raise CaseProblem(
                 ("release_time",) if times[0] is not None else ("absorption_time",),
-                got="one of the two times alone" if None in times else "no release_pressure",
+                got="only one of the two times" if None in times else "no release_pressure",
                 expected="release_time, absorption_time, release_pressure, saturation_pressure",
                 hint="add what is missing, or leave both times out.",
             )
@@ -189,7 +189,7 @@ class FluidChoice(NamedSection):
             raise CaseProblem(
                 ("name",),
                 got=f"'{self.name}' together with your own values",
-                expected="a name alone, or your own values under another name",
+                expected="only a name, or your own values under another name",
                 hint=f"remove the values, or call it e.g. {own}.",
             )
         if isinstance(self.table, Path):
@@ -320,6 +320,6 @@ class FluidChoice(NamedSection):
             raise CaseProblem(
                 ("sound_speed" if self.bulk_modulus is None else "bulk_modulus",),
                 got=f"a bulk modulus of {K:g} Pa",
-                expected="one that stays above 0 down to zero pressure",
+                expected="a bulk modulus that stays above 0 down to zero pressure",
                 hint="liquids have 0.4 to 3 GPa; check the unit.",
             ) from error

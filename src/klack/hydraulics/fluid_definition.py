@@ -329,8 +329,8 @@ class FluidDefinition:
             f"fluid '{self.name}': temperature",
             got=f"{temperature - _ZERO_CELSIUS:g} degC",
             expected=f"{low - _ZERO_CELSIUS:g} to {high - _ZERO_CELSIUS:g} degC",
-            hint="describe your own fluid by density, viscosity and bulk_modulus at "
-            "this temperature; the constants of the library hold within the range.",
+            hint="describe your own fluid by density, viscosity and bulk_modulus at this "
+            "temperature; the constants of the library hold within this range.",
         )
         state = self.properties.at(temperature)
         return Fluid(

@@ -67,7 +67,7 @@ class Inertance(Component):
     diameter: Length | None = Field(default=None, gt=0, description="Of the channel.")
     area: Area | None = Field(default=None, gt=0, description="Instead of the diameter.")
     friction: Literal["laminar", "none"] = Field(
-        default="laminar", description="Of a round channel of that area, or none."
+        default="laminar", description="Law of a round channel of that area, or none."
     )
 
     @model_validator(mode="after")

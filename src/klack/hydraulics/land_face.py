@@ -78,7 +78,7 @@ class LandFace(Component):
         refuse_key_if(
             self.inner_diameter >= self.outer_diameter,
             ("inner_diameter",),
-            got=f"{self.inner_diameter:g} m inside of {self.outer_diameter:g} m",
+            got=f"{self.inner_diameter:g} m inside {self.outer_diameter:g} m",
             expected="less than outer_diameter",
             hint="swap both.",
         )

@@ -85,11 +85,12 @@ class Line(Component):
     )
     wall: Wall | None = Field(
         default=None,
-        description="Hose by its bulk modulus, or a tube of any thickness; instead of both above.",
+        description="A hose with its bulk modulus, or a tube of any thickness; instead of "
+        "wall_thickness and wall_modulus.",
     )
     friction: Literal["none", "steady", "kagawa", "turbulent"] = Field(
         default="kagawa",
-        description="none, steady laminar, with memory after Kagawa, or that and turbulent.",
+        description="none, steady laminar, unsteady after Kagawa, or unsteady and turbulent.",
     )
     roughness: Length | None = Field(
         default=None, ge=0, description="Of the wall, for turbulent friction; smooth without it."
@@ -123,7 +124,7 @@ class Line(Component):
             self.roughness is not None and self.friction != "turbulent",
             ("roughness",),
             got=f"a roughness with friction: {self.friction}",
-            expected="it with friction: turbulent alone",
+            expected="a roughness only with friction: turbulent",
             hint="leave it out, or choose friction: turbulent.",
         )
         wrong = "segments" if self.properties == "local" else "cells"
@@ -135,7 +136,7 @@ class Line(Component):
             hint="leave it out, or change properties.",
         )
         if self.wall is not None:
-            self._refuse_with(tuple(given), "wall", "the wall is given twice")
+            self._refuse_with(tuple(given), "wall", "the wall is already given")
             if self.wall.diameter not in (None, self.diameter):
                 raise CaseProblem(
                     ("wall", "diameter"),
@@ -296,10 +297,9 @@ class Line(Component):
             speeds = [self.wave_speed(fluid, x) for x in (pressure, p)]
             off = percent_text(float(self._error(fluid, pressure, p)[0]))
             return (
-                f"Its waves run at {speeds[0]:.4g} m/s, those at {1e-5 * p:.4g} bar at "
-                f"{speeds[1]:.4g} m/s: echo times, pressures of a change "
-                f"of flow and the stored fluid are up to {off} off "
-                "at such times."
+                f"Its waves run at {speeds[0]:.4g} m/s, but waves at {1e-5 * p:.4g} bar run at "
+                f"{speeds[1]:.4g} m/s: echo times, pressures of flow changes and the stored "
+                f"fluid are then wrong by up to {off}."
             )
 
         if isinstance(fluid, Fluid):

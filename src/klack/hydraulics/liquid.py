@@ -293,7 +293,7 @@ def _require_rising(p: Values, rho: Values) -> None:
         p.size != rho.size or p.size < 2,
         "TabulatedLiquid",
         got=f"{p.size} pressures and {rho.size} densities",
-        expected="the same number of both, at least two",
+        expected="an equal number of both, at least two",
         hint="give one density per pressure.",
     )
     if not (np.all(np.diff(p) > 0.0) and np.all(np.diff(rho) > 0.0) and rho[0] > 0 and p[0] > 0):
@@ -302,7 +302,7 @@ def _require_rising(p: Values, rho: Values) -> None:
             got=f"points from ({p[0]:g} Pa, {rho[0]:g} kg/m^3) to ({p[-1]:g} Pa, {rho[-1]:g} "
             "kg/m^3)",
             expected="absolute pressures and densities above 0, both strictly increasing",
-            hint="sort the points, remove repeated ones, and give the densities with more digits.",
+            hint="sort the points, remove repeated ones, and state densities with more digits.",
         )
 
 

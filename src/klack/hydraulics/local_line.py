@@ -83,7 +83,10 @@ class LocalLine:
             drop=lambda p_a, flow: _drop(parameters, p_a, flow),
             parts=self.cells,
             crossing=self.length / self.cells / float(np.max(speeds(fluid, pressures))),
-            failures={1: "a cell of the line is empty", 2: "the line holds what is no number"},
+            failures={
+                1: "a cell of the line is empty",
+                2: "the state of the line is not a finite number",
+            },
             losses=("friction", "wave dissipation", "outflow"),
             doubts=lambda passed, reynolds, time: self._doubts(component, passed, reynolds, time),
         )
@@ -121,9 +124,9 @@ class LocalLine:
         if passed[1] > _STEEP * passed[3]:
             yield (
                 f"'{component}': {100.0 * passed[1] / passed[3]:.2g} % of the energy that passed "
-                f"the ends of this line was lost in steep fronts. A front is some cells of "
-                f"{format_si(self.length / self.cells, 'm', 3)} wide, so that a part of this comes "
-                "from the cells; a shock loses the rest.\n"
+                "the ends of this line was lost in steep fronts. A front is several cells of "
+                f"{format_si(self.length / self.cells, 'm', 3)} wide: part of the loss comes "
+                "from the cells, the rest from shocks.\n"
                 f"Try: components.{component}.cells: {2 * self.cells}, and compare."
             )
         if self.friction in ("steady", "kagawa"):
@@ -192,10 +195,10 @@ def steady_state(
     refuse_if(
         not np.isfinite(lost),
         f"components.{component}: steady flow at the start",
-        got=f"{format_si(abs(flow), 'kg/s', 3)} through its bore, for which the pressure there "
-        "does not suffice",
+        got=f"{format_si(abs(flow), 'kg/s', 3)} through its bore, for which the pressure "
+        "there is too low",
         expected="a flow that does not boil in the line",
-        hint="check its diameter, and the openings behind it; or start with a closed opening.",
+        hint="check its diameter and the openings downstream, or start with a closed opening.",
     )
     memory = np.repeat(flow / np.sqrt(mass), TERMS)
     state = np.concatenate([np.zeros(SCALARS), mass, np.full(n, flow), p, np.zeros(n), memory])

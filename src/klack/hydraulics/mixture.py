@@ -77,7 +77,7 @@ class EntrainedGas:
             "EntrainedGas.exponent",
             got=f"{self.exponent:g}",
             expected="an exponent from 1 (isothermal) to 1.67 (adiabatic, one atom)",
-            hint="take 1.4 for air in fast strokes.",
+            hint="use 1.4 for air in fast strokes.",
         )
         low, high = self.release_pressure, self.saturation_pressure
         if (low is None) != (high is None) or (

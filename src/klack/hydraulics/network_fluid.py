@@ -68,8 +68,9 @@ def fixed_viscosity(rows: Rows) -> tuple[NetworkFluid, float]:
     """As :func:`ambient_viscosity`, with a note that the restriction follows no viscosity law."""
     if viscosity_law(rows) is not CONSTANT:
         warnings.warn(
-            f"{rows.component}: its laminar flow has the viscosity at one atmosphere. The law of "
-            "the fluid for viscosity acts in orifices, seats, annuli, inertances, lines and films.",
+            f"{rows.component}: its laminar flow uses the viscosity at one atmosphere. The "
+            "viscosity law of the fluid acts in orifices, seats, annuli, inertances, lines and "
+            "films.",
             AccuracyWarning,
             stacklevel=2,
         )

@@ -205,12 +205,12 @@ class Notch(Section):
         "triangular: a V in outline and section, its bottom rising to the tip; hole: a radial bore "
         "through the land or the sleeve."
     )
-    count: Count = Field(description="Number of them round the edge.")
+    count: Count = Field(description="Number of notches round the edge.")
     width: Length = Field(
         gt=0,
         examples=["1 mm"],
-        description="Along the circumference: of a triangle at the edge, of a round one and a hole "
-        "the diameter.",
+        description="Along the circumference: of a triangle at the edge, of a round notch or a "
+        "hole the diameter.",
     )
     length: Length = Field(
         gt=0, examples=["0.8 mm"], description="From the edge to the tip, which opens first."
@@ -219,7 +219,7 @@ class Notch(Section):
         default=None,
         gt=0,
         examples=["0.4 mm"],
-        description="From the surface of the spool, of a triangle at the edge; not of a hole.",
+        description="From the surface of the spool; of a triangle at the edge; a hole has none.",
     )
 
     @model_validator(mode="after")
@@ -231,14 +231,14 @@ class Notch(Section):
                 ("length",),
                 got=f"{1e3 * self.length:g} mm for a hole of {1e3 * self.width:g} mm",
                 expected="at least its diameter: the whole circle is ahead of the edge",
-                hint="a circle that the edge cuts is a notch with shape: round.",
+                hint="for a circle cut by the edge use a notch with shape: round.",
             )
         elif self.depth is None:
             raise CaseProblem(
                 (),
                 got=f"a {self.shape} notch without depth",
                 expected="depth: from the surface of the spool",
-                hint="add depth; a bore through the land is shape: hole.",
+                hint="add depth; for a bore through the land use shape: hole.",
             )
         return self
 

@@ -89,7 +89,7 @@ class SeatFace:
             "SeatFace.angle",
             got=f"{self.angle:g} rad for the shape {self.shape}",
             expected="above 0 and below pi/2 for cone and ball, pi/2 for a flat face",
-            hint="acos(r/R) for a ball of radius R, half of the angle of a drawing for a cone.",
+            hint="acos(r/R) for a ball of radius R, half of the angle in the drawing for a cone.",
         )
 
     @classmethod
@@ -207,7 +207,7 @@ def _angles(number: int) -> Vector:
         "seat off-axis: angles",
         got=f"{number}",
         expected=f"at least {_FEWEST_ANGLES}",
-        hint="72 while nothing overlaps, some hundred where one side does.",
+        hint="72 without overlap, a few hundred where one side overlaps.",
     )
     return 2.0 * pi / number * np.arange(number, dtype=np.float64)
 

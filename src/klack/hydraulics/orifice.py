@@ -183,14 +183,14 @@ class Orifice(Component):
     diameter: Length | None = Field(default=None, gt=0, description="Of the circular hole.")
     area: Area | None = Field(default=None, gt=0, description="Instead of the diameter.")
     hydraulic_diameter: Length | None = Field(
-        default=None, gt=0, description="4 area / perimeter; of a circle by default."
+        default=None, gt=0, description="4 area / perimeter; default: the value of a circle."
     )
-    count: Count = Field(default=1, description="Number of such holes in parallel.")
+    count: Count = Field(default=1, description="Number of equal holes in parallel.")
     length: Length | None = Field(
         default=None,
         gt=0,
-        description="Of the hole along the flow, for the weight of its liquid in notes; as in a "
-        "thin plate by default. The flow does not depend on it.",
+        description="Length of the hole along the flow, used by notes on the inertia of its "
+        "liquid; default: a thin plate. The flow does not depend on it.",
     )
     discharge: Ratio = Field(
         default=0.7,
@@ -218,7 +218,7 @@ class Orifice(Component):
             chosen == "diameter" and self.hydraulic_diameter is not None,
             ("hydraulic_diameter",),
             got="hydraulic_diameter together with diameter",
-            expected="no hydraulic_diameter: that of a circle is its diameter",
+            expected="no hydraulic_diameter: for a circle it is the diameter",
             hint="remove it, or give the area instead of the diameter.",
             on_key=True,
         )

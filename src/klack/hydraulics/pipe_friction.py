@@ -91,9 +91,9 @@ def laminar_doubts(
     shown = "" if drop is None else f", {1e-5 * drop:.2g} bar as computed,"
     yield (
         f"'{component}': the flow in this line, whose friction is laminar, reaches a Reynolds "
-        f"number of {number} at {format_si(time, 's', 4)}; steady laminar flow "
-        f"ends at {LAMINAR:g}. In the first milliseconds of a change it stays laminar above that, "
-        f"later the pressure drop{shown} is about {times:.2g} times that of laminar friction.\n"
+        f"number of {number} at {format_si(time, 's', 4)}; steady laminar flow ends at "
+        f"{LAMINAR:g}. In the first milliseconds of a change the flow stays laminar above that; "
+        f"later the pressure drop{shown} is about {times:.2g} times the laminar one.\n"
         f"Try: components.{component}.friction: turbulent."
     )
 
@@ -174,7 +174,7 @@ class PipeFriction(Component):
             ("roughness",),
             got=f"{self.roughness:g} m in a bore of {self.diameter:g} m",
             expected=f"at most {_ROUGHEST:g} of the diameter, the end of Colebrook's law",
-            hint="check the units; a corrugated hose is a pressure-loss.",
+            hint="check the units; model a corrugated hose as a pressure-loss.",
         )
         return self
 

@@ -79,7 +79,7 @@ class PressureViscosity:
             not log(viscosity) + _UNIT > 0.1,
             "PressureViscosity.roelands: viscosity",
             got=f"viscosity_law roelands with {viscosity:g} Pa s",
-            expected="more than 0.07 mPa s, where the lines of Roelands meet",
+            expected="more than 0.07 mPa s, where the lines of Roelands intersect",
             hint="check the unit, or take viscosity_law: barus.",
         )
         exponent = log(viscosity) + _UNIT

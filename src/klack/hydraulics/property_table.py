@@ -119,7 +119,7 @@ class CompressedLiquid:
             lowest=max(low - _BEYOND * first, 0.0),
             highest=min(high + _BEYOND * last, HIGHEST_PRESSURE),
             usable=min(high + 10.0 * _FAR * last, HIGHEST_PRESSURE),
-            source=f"'{self.name}' goes from {low / 1e5:.4g} to {high / 1e5:.4g} bar",
+            source=f"'{self.name}' covers {low / 1e5:.4g} to {high / 1e5:.4g} bar",
         )
 
     def bulk_modulus(self, pressure: ArrayLike) -> Values:
@@ -169,9 +169,9 @@ class PropertyTable:
         if error > _EXPONENTIAL:
             warnings.warn(
                 f"fluid table '{self.name}': its viscosity at {temperature - 273.15:.4g} degC is "
-                f"up to {100.0 * error:.2g} % off the exponential over pressure, from "
-                f"{self.pressure[0] / 1e5:.4g} to {self.pressure[-1] / 1e5:.4g} bar, that "
-                "represents it.\nTry: a table that ends at the highest pressure of the valve.",
+                f"up to {100.0 * error:.2g} % off the exponential that represents it from "
+                f"{self.pressure[0] / 1e5:.4g} to {self.pressure[-1] / 1e5:.4g} bar.\n"
+                "Try: a table that ends at the highest pressure of the valve.",
                 AccuracyWarning,
                 stacklevel=2,
             )
@@ -273,7 +273,7 @@ def _require_rising(where: str, T: Values, p: Values, rho: Values) -> None:
             where,
             got=f"a density of {rho[i, k + 1]:g} kg/m^3 at {p[k + 1] / 1e5:g} bar after "
             f"{rho[i, k]:g} kg/m^3 at {p[k] / 1e5:g} bar ({T[i] - 273.15:g} degC)",
-            expected="densities that rise with pressure",
+            expected="densities that increase with pressure",
             hint="correct the row, or give the densities with more digits.",
         )
 
@@ -302,9 +302,9 @@ def _stiffness(where: str, T: Values, p: Values, columns: dict[str, Values]) -> 
         raise InputError(
             where,
             got=f"densities that rise {ratio[i]:.3g} times as much from {p[0] / 1e5:g} to "
-            f"{p[-1] / 1e5:g} bar at {T[i] - 273.15:g} degC as the bulk modulus says",
+            f"{p[-1] / 1e5:g} bar at {T[i] - 273.15:g} degC as the bulk modulus implies",
             expected=f"{low:g} to {high:g} times: the ratio of the specific heats of liquids",
-            hint="check the units of the columns; densities are those of constant temperature.",
+            hint="check the units of the columns; densities refer to constant temperature.",
         )
     return np.asarray(K)
 
@@ -318,13 +318,14 @@ def _read(path: Path) -> tuple[list[str], Values]:
         where,
         got=f"{size / 1e6:.3g} MB",
         expected=f"at most {_LARGEST / 1e6:g} MB",
-        hint="some ten temperatures and pressures are enough; smooth curves run through them.",
+        hint="about ten temperatures and pressures are enough; smooth curves are drawn "
+        "through them.",
     )
     try:
         text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError:
         raise InputError(
-            where, got="bytes that are no text", expected="a text file (UTF-8)",
+            where, got="bytes that are not text", expected="a text file (UTF-8)",
             hint="export the table as CSV.",
         ) from None  # fmt: skip
     lines = [
@@ -334,7 +335,7 @@ def _read(path: Path) -> tuple[list[str], Values]:
     ]
     if len(lines) < 2:
         raise InputError(
-            where, got="no rows", expected="a head with units, and rows of numbers",
+            where, got="no rows", expected="a header with units, and rows of numbers",
             hint="begin with e.g. temperature [degC], pressure [bar], density [kg/m^3], ...",
         )  # fmt: skip
     separator = ";" if ";" in lines[0][1] else ","
@@ -358,7 +359,7 @@ def _head(where: str, cells: list[str]) -> tuple[list[str], list[tuple[float, fl
                 where,
                 got=f"the column '{cell.strip()}'" + (" twice" if name in names else ""),
                 expected=f"each of: {', '.join(f'{c} [unit]' for c in _COLUMNS)}",
-                hint=f"needed are {', '.join(_REQUIRED)}; remove or rename others.",
+                hint=f"required are {', '.join(_REQUIRED)}; remove or rename others.",
             )
         names.append(name)
         if name == "temperature" and unit in _CELSIUS:
@@ -376,7 +377,7 @@ def _head(where: str, cells: list[str]) -> tuple[list[str], list[tuple[float, fl
             where,
             got=f"no column {', '.join(missing)}",
             expected=f"the columns {', '.join(_REQUIRED)}",
-            hint=f"add it to the head with its unit, e.g. '{missing[0]} "
+            hint=f"add it to the header with its unit, e.g. '{missing[0]} "
             f"[{_COLUMNS[missing[0]].unit}]'.",
         )
     return names, factors
@@ -391,7 +392,7 @@ def _numbers(where: str, cells: list[str], names: list[str]) -> list[float]:
         raise InputError(
             where,
             got=f"'{','.join(cells)[:60]}'",
-            expected=f"{len(names)} finite numbers, one per column of the head",
-            hint="use a point as decimal sign; begin comments with #.",
+            expected=f"{len(names)} finite numbers, one per column of the header",
+            hint="use a decimal point; begin comments with #.",
         )
     return row

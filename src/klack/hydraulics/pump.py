@@ -119,7 +119,7 @@ class Pump(Component):
     displacement: Volume = Field(gt=0, examples=["10 cm^3"], description="Per turn, V_g.")
     speed: Rotation = Field(gt=0, examples=["1500 rpm"], description="Of the shaft, n.")
     pistons: Count | None = Field(
-        default=None, description="Number z; without it the flow has no ripple."
+        default=None, description="Number of pistons z; without it the flow has no ripple."
     )
     phase: Angle = Field(default=0.0, description="Angle of the shaft at time zero.")
     volumetric_efficiency: Ratio = Field(

@@ -117,7 +117,9 @@ class ReliefValve(OpeningComponent):
     area: Area | None = Field(default=None, gt=0, description="Instead of the diameter.")
     leak_area: Area = Field(default=0.0, ge=0, description="When closed, in both directions.")
     hysteresis: Pressure = Field(
-        default=0.0, ge=0, description="By how much lower the closing branch lies."
+        default=0.0,
+        ge=0,
+        description="Pressure by which the closing branch lies below the opening branch.",
     )
     time_constant: Time = Field(default=0.0, ge=0, description="Of the lag of the area.")
 
@@ -130,7 +132,7 @@ class ReliefValve(OpeningComponent):
             got=f"{value_text(self.rated_pressure, 'Pa')} at a set pressure of "
             f"{value_text(self.set_pressure, 'Pa')}",
             expected="more than the set pressure",
-            hint="take one point of the characteristic above the set pressure.",
+            hint="use a point of the characteristic above the set pressure.",
         )
         refuse_key_if(
             self.hysteresis >= self.set_pressure,
@@ -161,11 +163,11 @@ class ReliefValve(OpeningComponent):
             pressure = value_text(self.rated_pressure, "Pa")
             raise CaseProblem(
                 ("components", rows.component, "rated_flow"),
-                got=f"{6e4 * self.rated_flow:.4g} l/min at {pressure}, "
-                f"which takes an area of {1e6 * rated:.3g} mm^2 with this fluid",
-                expected="a rated point that takes less than the area when fully open, "
+                got=f"{6e4 * self.rated_flow:.4g} l/min at {pressure}, which requires an area of "
+                f"{1e6 * rated:.3g} mm^2 with this fluid",
+                expected="a rated point that requires less than the area when fully open, "
                 f"{1e6 * self.open_area:.3g} mm^2",
-                hint="enlarge the area, or take a rated point with less flow.",
+                hint="enlarge the area, or use a rated point with less flow.",
             )
         rows.branch(
             relief_valve_step,

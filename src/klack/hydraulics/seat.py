@@ -225,7 +225,9 @@ class Seat(Component):
     )
     ball_diameter: Length | None = Field(default=None, gt=0, description="Of a ball.")
     bore_diameter: Length | None = Field(
-        default=None, gt=0, description="Limits the area; that of the seat by default."
+        default=None,
+        gt=0,
+        description="Diameter of the bore, which limits the area; default: the seat diameter.",
     )
     lift: Length = Field(default=0.0, ge=0, description="At the start.")
     discharge: Ratio = Field(default=0.7, gt=0, le=1, description="Turbulent flow coefficient.")
@@ -243,8 +245,8 @@ class Seat(Component):
     flow_force: FlowForce | None = Field(default=None, description="Of the jet on the needle.")
     off_axis: SeatPlace | None = Field(
         default=None,
-        description="With motion: three-dimensional: opening and side force where the needle is. "
-        "Without it those of its lift alone.",
+        description="With motion: three-dimensional: opening and side force at the position of "
+        "the needle; without it only those of its lift.",
     )
 
     @model_validator(mode="after")

@@ -28,7 +28,7 @@ class SeatPlace(Section):
     """Where the edge of a seat meets the needle, so that it follows a needle off its axis."""
 
     height: Length = Field(
-        description="Edge along z with the seat closed, in the drawing of the needle."
+        description="Height z of the edge with the seat closed, in the drawing of the needle."
     )
     inside: Literal["a", "b"] = Field(
         default="b", description="Port at the bore of the seat: its pressure is inside the edge."

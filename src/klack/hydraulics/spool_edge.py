@@ -160,14 +160,14 @@ class SpoolEdge(OpeningComponent):
     width: Length | None = Field(
         default=None,
         ge=0,
-        description="Of all slots together; default: whole circumference; 0: only the notches "
-        "open.",
+        description="Total width of all slots; default: whole circumference; 0: only the "
+        "notches open.",
     )
     notches: tuple[Notch, ...] = Field(
         default=(), max_length=8, description="Metering notches that open ahead of the edge."
     )
     largest_area: Area | None = Field(
-        default=None, gt=0, description="Of the port behind the edge; default: no limit."
+        default=None, gt=0, description="Area of the port behind the edge; default: no limit."
     )
     eccentricity: Ratio = Field(
         default=0.0, ge=0, le=1, description="Offset of the axes over the clearance."
@@ -191,7 +191,7 @@ class SpoolEdge(OpeningComponent):
         refuse_key_if(
             wide > around,
             ("notches",),
-            got=f"notches of {1e3 * wide:g} mm in all",
+            got=f"notches with a total width of {1e3 * wide:g} mm",
             expected=f"at most the {1e3 * around:g} mm of the edge",
             hint="check count and width; width is the width of one notch.",
         )

@@ -159,7 +159,7 @@ def sector_film(
         "sector_film: sectors",
         got=f"{sectors}",
         expected=f"at most {MOST_SECTORS}",
-        hint="36 sectors are within 0.5 % of many.",
+        hint="36 sectors are within 0.5 % of the limit of many.",
     )
     width, angle = outer_radius - inner_radius, 2.0 * pi / sectors
     panels = max(circles - 1, 1)

@@ -15,7 +15,7 @@ def check_table(time: Sequence[float], values: Sequence[float], name: str) -> No
         len(time) != len(values) or not time,
         (name,),
         got=f"{len(values)} values at {len(time)} times",
-        expected="one value per time, at least one",
+        expected="an equal number of both, at least one",
         hint="give one entry in each list per time.",
     )
     for k in range(1, len(time)):

@@ -162,12 +162,13 @@ class UnsteadyDrag(Component):
         "around": Port("mechanical", ELEMENT.role, optional=True),
     }
 
-    shape: Literal["sphere", "layer"] = Field(description="What moves: sphere, or layer.")
+    shape: Literal["sphere", "layer"] = Field(description="Moving surface: sphere, or layer.")
     radius: Length | None = Field(default=None, gt=0, description="Of the sphere, a.")
     area: Area | None = Field(default=None, gt=0, description="Of the layer, A.")
     height: Length | None = Field(default=None, gt=0, description="Of the layer, h.")
     steady: bool = Field(
-        default=True, description="Whether D acts; false beside an annulus, which has it."
+        default=True,
+        description="Whether D acts; false together with an annulus, which includes it.",
     )
     memory: bool = Field(default=True, description="Whether the liquid remembers: K.")
     typical_speed: Speed | None = Field(
@@ -266,7 +267,7 @@ class UnsteadyDrag(Component):
                     law="the drag of a sphere",
                     source="Schiller and Naumann 1933",
                     effect=lambda value: "The drag is higher there than computed.",
-                    advice="check radius and speed; at such speeds inertia rules.",
+                    advice="check radius and speed; at such speeds inertia dominates.",
                     channel=f"{name} Reynolds number",
                 )
             )
@@ -290,7 +291,7 @@ def _load(rows: Rows, component: str, port: int, added: float) -> None:
             body.rigid_count != 1,
             f"component '{component}': added mass",
             got=f"a body with {body.rigid_count} rigid motions",
-            expected="one, along the axis",
+            expected="one rigid motion, along the axis",
             hint="write added_mass: 0 g, and add its mass to that of the body.",
         )
         scale = sqrt(body.mass / (body.mass + added))

@@ -78,16 +78,16 @@ class VariableOrifice(OpeningComponent):
     }
 
     lift: tuple[Length, ...] | None = Field(
-        default=None, min_length=2, description="Displacements of needle less body, rising."
+        default=None, min_length=2, description="Displacements of needle minus body, ascending."
     )
     time: tuple[Time, ...] | None = Field(
-        default=None, min_length=2, description="Instead of the lift: times, rising."
+        default=None, min_length=2, description="Instead of the lift: times, ascending."
     )
-    area: tuple[Area, ...] = Field(min_length=2, description="One for each lift or time.")
+    area: tuple[Area, ...] = Field(min_length=2, description="One area for each lift or time.")
 
     @model_validator(mode="after")
     def _table(self) -> Self:
-        name = self._exactly_one(("lift", "time"), "what the area follows")
+        name = self._exactly_one(("lift", "time"), "what determines the area")
         _check_areas(name, self.points, self.area)
         return self
 

@@ -68,7 +68,7 @@ class Wall(Section):
     """
 
     bulk_modulus: Modulus | None = Field(
-        default=None, gt=0, description="Of the wall alone: pressure over relative growth."
+        default=None, gt=0, description="Of the wall only: pressure over relative volume growth."
     )
     diameter: Length | None = Field(default=None, gt=0, description="Inside, of a round tube.")
     thickness: Length | None = Field(default=None, gt=0, description="Of the wall of that tube.")
@@ -84,7 +84,7 @@ class Wall(Section):
     def _one_kind(self) -> Self:
         tube = ("diameter", "thickness", "modulus")
         if self.bulk_modulus is not None:
-            return self._refuse_with(tube, "bulk_modulus", "it is that of the whole wall")
+            return self._refuse_with(tube, "bulk_modulus", "it describes the whole wall")
         missing = [name for name in tube if getattr(self, name) is None]
         if missing:
             raise CaseProblem(

@@ -104,12 +104,12 @@ class Section(BaseModel):
                 if str(key).endswith(")"):
                     otherwise = "lists stand in square brackets: [1, 2]."
                 elif str(key)[:1].isdigit():
-                    otherwise = "a comma separates keys: use a point as decimal sign."
+                    otherwise = "a comma separates keys: use a decimal point."
                 else:
                     otherwise = "remove it, or check its indentation."
                 hint = nearest(str(key), known, otherwise)
                 if colon and name.strip() in known:
-                    hint = f"write a blank behind the colon: {name.strip()}: {rest.strip()}"
+                    hint = f"put a space after the colon: {name.strip()}: {rest.strip()}"
                 raise CaseProblem(
                     (key,),
                     got=f"the unknown key '{key}'",
@@ -169,7 +169,7 @@ def _no_mapping(value: Any, known: Mapping[str, FieldInfo]) -> tuple[str, str]:
         first, _, rest = re.sub(r"\s*[:=]\s*|\s+", " ", value[:80]).partition(" ")
         required = [key for key, info in known.items() if info.is_required()]
         if first in known:
-            return f"'{value}'"[:80], f"write '{first}: {rest}', with a colon and a blank."
+            return f"'{value}'"[:80], f"write '{first}: {rest}', with a colon and a space."
         if len(required) == 1:
             return f"'{value}'"[:80], f"write {{{required[0]}: {value[:80]}}}."
     got = "nothing" if value is None else f"'{value}'"[:80]

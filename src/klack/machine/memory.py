@@ -60,7 +60,7 @@ def require_memory(where: str, needed: float, *, what: str, hint: str) -> None:
     there = available_memory()
     raise InputError(
         where,
-        got=f"{what} that takes about {in_words(needed)} of memory",
+        got=f"{what} needing about {in_words(needed)} of memory",
         expected=f"at most {in_words(_SHARE * there.size)} ({there.bound})",
         hint=hint,
     )

@@ -193,7 +193,7 @@ def for_comparison(what: str, compute: Callable[[], Found]) -> Found | None:
     except FAILURES as error:
         reason = str(error) or type(error).__name__
     warnings.warn(
-        f"{what} was left out, which is for comparison only: {reason}",
+        f"{what}, which is computed only for comparison, was left out: {reason}",
         AccuracyWarning,
         stacklevel=2,
     )

@@ -33,11 +33,11 @@ class BoostCapacitor(Component):
     ports: ClassVar[Mapping[str, Port]] = {"outlet": FEEDS}
 
     capacitance: Capacitance = Field(gt=0, description="Of the capacitor.")
-    voltage: Voltage = Field(gt=0, description="Up to which the converter recharges it.")
+    voltage: Voltage = Field(gt=0, description="Voltage to which the converter recharges it.")
     start_voltage: Voltage | None = Field(
-        default=None, ge=0, description="At the start; default voltage."
+        default=None, ge=0, description="At the start; default: voltage."
     )
-    recharge_power: Power = Field(ge=0, description="Into the capacitor; 0: no recharge.")
+    recharge_power: Power = Field(ge=0, description="Power into the capacitor; 0: no recharge.")
     recharge_current: Current | None = Field(
         default=None, gt=0, description="Largest current into the capacitor; default no limit."
     )

@@ -20,7 +20,9 @@ __all__ = ["BoostDriver", "Shot"]
 class Shot(Section):
     """One actuation: when the driver switches on and off."""
 
-    start: Time = Field(ge=0, description="Switched on, from the start of the run or cycle.")
+    start: Time = Field(
+        ge=0, description="Time of switching on, from the start of the run or cycle."
+    )
     end: Time = Field(gt=0, description="Switched off.")
 
 
@@ -56,53 +58,64 @@ class BoostDriver(Driver):
 
     battery: Voltage = Field(gt=0, description="Battery, for holding and for the converter.")
     capacitance: Capacitance | None = Field(
-        default=None, gt=0, description="Boost capacitor of its own; none: one joined to 'supply'."
+        default=None,
+        gt=0,
+        description="Its own boost capacitor; without it: the one joined to 'supply'.",
     )
     boost_voltage: Voltage | None = Field(
-        default=None, gt=0, description="Up to which the converter recharges its own capacitor."
+        default=None,
+        gt=0,
+        description="Voltage to which the converter recharges its own capacitor.",
     )
     start_voltage: Voltage | None = Field(
-        default=None, ge=0, description="Of the capacitor at the start; default boost_voltage."
+        default=None,
+        ge=0,
+        description="Voltage of the capacitor at the start; default: boost_voltage.",
     )
     recharge_power: Power | None = Field(
-        default=None, ge=0, description="Into its own capacitor; 0: no recharge."
+        default=None, ge=0, description="Power into its own capacitor; 0: no recharge."
     )
     recharge_current: Current | None = Field(
         default=None, gt=0, description="Largest current into the capacitor; default no limit."
     )
-    efficiency: Ratio = Field(default=1.0, gt=0, le=1, description="Of its own converter.")
-    peak_current: Current = Field(gt=0, description="Where the boost ends.")
+    efficiency: Ratio = Field(
+        default=1.0, gt=0, le=1, description="Efficiency of its own converter."
+    )
+    peak_current: Current = Field(gt=0, description="Current at which the boost ends.")
     peak_duration: Time | None = Field(
         default=None,
         gt=0,
-        description="Time after the start of each shot that the current is held in a band below "
-        "the peak, as wide as that of the hold; default no peak hold.",
+        description="Time after the start of each shot until which the current is held in a "
+        "band below the peak, as wide as the hold band; default: no peak hold.",
     )
     hold_current: Current = Field(gt=0, description="Middle of the hold band.")
-    hold_band: Current = Field(gt=0, description="Upper minus lower current of the hold.")
+    hold_band: Current = Field(gt=0, description="Upper minus lower current of the hold band.")
     fall: Literal["freewheel", "decay"] = Field(
-        default="freewheel", description="What the current falls against from peak to hold."
+        default="freewheel",
+        description="Voltage against which the current falls from peak to hold.",
     )
     decay: Literal["capacitor", "clamp"] = Field(
         default="capacitor",
-        description="Where the coil's energy goes after the end: back into the capacitor, or lost "
-        "in a clamp.",
+        description="Where the energy of the coil goes after the end: back into the capacitor, "
+        "or into a clamp.",
     )
     clamp_voltage: Voltage | None = Field(
         default=None, gt=0, description="Zener or avalanche voltage of the clamp."
     )
     clamp_resistance: Resistance = Field(
-        default=0.0, ge=0, description="Slope of the clamp voltage over the current."
+        default=0.0, ge=0, description="Slope of the clamp voltage over current."
     )
     diode_voltage: Voltage = Field(default=0.7, ge=0, description="Forward voltage of each diode.")
-    diode_resistance: Resistance = Field(default=0.0, ge=0, description="Slope of each diode.")
+    diode_resistance: Resistance = Field(
+        default=0.0, ge=0, description="Slope of the voltage of each diode over current."
+    )
     switch_resistance: Resistance = Field(
         default=0.0,
         ge=0,
         description="On-resistance of each switch.",
     )
     shots: tuple[Shot, ...] = Field(
-        min_length=1, description="Actuations in their order: {start: ..., end: ...}."
+        min_length=1, description="Actuations in order: {start: ..., end: ...}."
     )
     repeat_every: Time | None = Field(
         default=None, gt=0, description="Period of repetition; default no repetition."
@@ -116,7 +129,7 @@ class BoostDriver(Driver):
                 ("boost_voltage",),
                 got=f"{self.boost_voltage:g} V",
                 expected=f"more than the battery, {self.battery:g} V",
-                hint="a driver without boost is 'two-point'.",
+                hint="for a driver without boost use type 'two-point'.",
             )
         refuse_key_if(
             not self.hold_band < 2.0 * self.hold_current,
@@ -130,7 +143,7 @@ class BoostDriver(Driver):
             ("peak_current",),
             got=f"{self.peak_current:g} A",
             expected="a current above the band of the hold",
-            hint="a driver without a peak is 'two-point'.",
+            hint="for a driver without a peak use type 'two-point'.",
         )
         refuse_key_if(
             self.decay == "clamp" and self.clamp_voltage is None,
@@ -150,7 +163,7 @@ class BoostDriver(Driver):
                 ("shots", k),
                 got=f"from {shot.start:g} s to {shot.end:g} s",
                 expected=f"a start from {before:g} s on, and an end after it",
-                hint="list the shots in their order; they may not overlap.",
+                hint="list the shots in order; they must not overlap.",
             )
             if self.peak_duration is not None and not shot.start + self.peak_duration < shot.end:
                 raise CaseProblem(
@@ -204,7 +217,7 @@ class BoostDriver(Driver):
             raise CaseProblem(
                 (missing[0],),
                 got=f"none, with {', '.join(given)}",
-                expected=f"all of {', '.join(needed)}, or none of its capacitor",
+                expected=f"all of {', '.join(needed)}, or none of them",
                 hint="add it; or join 'supply' to a boost-capacitor, which has these keys.",
             )
 

@@ -122,7 +122,7 @@ class MagneticCircuit:
             "MagneticCircuit.branches",
             got="no loop around turns of the coil",
             expected="at least one branch with turns in a loop",
-            hint="give the branch through the coil its number of turns.",
+            hint="give the branch through the coil a number of turns.",
         )
 
     @property

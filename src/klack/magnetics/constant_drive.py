@@ -85,7 +85,7 @@ def coils_of(network: Network) -> dict[str, Coil]:
                 f"components.{name}",
                 got=f"the type '{part.type}'",
                 expected="a solenoid, a magnetic-network or a force-map-solenoid",
-                hint="an operating point sets the current of these alone.",
+                hint="an operating point sets only the current of these.",
             )
     return found
 

@@ -158,10 +158,10 @@ def _tell_remanence(placed: Sequence[PlacedMagnet]) -> None:
         names = [w.circuit for w in part.magnet.windings if w.circuit]
         for name, parts in magnetised_otherwise(circuit, names, gap=part.magnet.gap).items():
             warnings.warn(
-                f"components.{part.component}.start: remanent iron starts as the coils at "
-                f"'terminals' leave it; a strong current of '{name}' would leave "
-                f"{', '.join(parts)} magnetised otherwise. Try: if '{name}' acts last, put its "
-                "coil at 'terminals'; or run two strokes with start: demagnetised, and take the "
+                f"components.{part.component}.start: remanent iron starts in the state left by "
+                f"the coils at 'terminals'; a strong current of '{name}' would leave "
+                f"{', '.join(parts)} in a different state. Try: if '{name}' acts last, put its "
+                "coil at 'terminals'; or run two strokes with start: demagnetised, and use the "
                 "second.",
                 AccuracyWarning,
                 stacklevel=4,

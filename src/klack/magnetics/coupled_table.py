@@ -249,10 +249,10 @@ def independent_ways(circuit: MagneticCircuit, names: Sequence[str]) -> tuple[Ve
         raise InputError(
             "magnetic circuit",
             got=f"the coils of {found_names} without enough leakage paths of their own",
-            expected="a leakage path around the coils of each, without an eddy term; else their "
-            "currents would jump with the voltage",
-            hint="add a leakage beside each coil (an element 'leakage' between the nodes of it); "
-            "windings on top of each other have 1 to 5 % of the main permeance.",
+            expected="a leakage path around the coils of each, without an eddy term; otherwise "
+            "their currents would jump with the voltage",
+            hint="add a leakage in parallel with each coil (an element 'leakage' between its "
+            "nodes); windings on top of each other have 1 to 5 % of the main permeance.",
         )
     own = null @ linked @ np.linalg.inv(linked.T @ linked)
     q, _ = np.linalg.qr(np.column_stack((linked, np.eye(linked.shape[0]))))

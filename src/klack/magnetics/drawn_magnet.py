@@ -151,30 +151,30 @@ class DrawnMagnet:
             "DrawnMagnet: opens",
             got=f"{self.opens}",
             expected="1 or -1",
-            hint="1 where the moving parts rise as the gap opens, -1 where they sink.",
+            hint="1 if the moving parts rise as the gap opens, -1 if they descend.",
         )
         refuse_if(
             not (self.fixed and self.moving),
             "DrawnMagnet",
             got=f"{len(self.fixed)} fixed and {len(self.moving)} moving parts",
             expected="at least one of each",
-            hint="draw the iron of both.",
+            hint="draw the iron of fixed and moving parts.",
         )
         for part in self.fixed:
             refuse_if(
                 _overlap(self.coil, part.profile),
                 "DrawnMagnet: coil",
                 got=f"a coil that overlaps '{part.name}'",
-                expected="a section without iron; both may touch",
-                hint="draw the winding alone, without its bobbin, inside its window.",
+                expected="a section without iron; coil and iron may touch",
+                hint="draw only the winding, without its bobbin, inside its window.",
             )
         for one, other in (*combinations(self.fixed, 2), *combinations(self.moving, 2)):
             refuse_if(
                 one.iron is not other.iron and _overlap(one.profile, other.profile),
                 f"DrawnMagnet: {other.name}",
                 got=f"a part that overlaps '{one.name}', which has another iron",
-                expected="one iron at every place; both may touch",
-                hint="let the two parts share an edge and nothing else.",
+                expected="one iron at every place; parts may touch",
+                hint="let the two parts share only an edge.",
             )
 
     @property
@@ -266,9 +266,9 @@ class DrawnMagnet:
             got=f"'{moving}' that touches '{still}'"
             if least <= 0.0
             else f"{format_si(least, 'm')} of air between '{moving}' and '{still}'",
-            expected=f"more than {format_si(_NARROWEST * self.extent, 'm', 2)} of air between "
-            "what moves and what does not",
-            hint="draw the residual gap, too, or leave out that gap.",
+            expected=f"more than {format_si(_NARROWEST * self.extent, 'm', 2)} of air "
+            "between moving and fixed parts",
+            hint="draw the residual gap too, or leave out this gap.",
         )
         if mesh_size is not None:
             require_positive("DrawnMagnet: mesh_size", mesh_size, "m")
@@ -276,7 +276,7 @@ class DrawnMagnet:
                 raise InputError(
                     where,
                     got=f"a mesh of {format_si(mesh_size, 'm')} for {format_si(least, 'm')} of air",
-                    expected="a mesh that resolves the air between what moves and what does not",
+                    expected="a mesh that resolves the air between moving and fixed parts",
                     hint=f"give a mesh_size of at most {format_si(least, 'm')}, or leave it out.",
                 )
 

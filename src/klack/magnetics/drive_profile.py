@@ -40,22 +40,22 @@ class DriveProfile(DiodeDriver):
     type: ClassVar[str] = "drive-profile"
 
     time: tuple[Time, ...] = Field(
-        min_length=2, description="Points of time, not falling, not negative; twice for a jump."
+        min_length=2, description="Times in ascending order from 0; the same time twice for a jump."
     )
     current: tuple[Current, ...] | None = Field(
-        default=None, description="Target at these points; or give the voltage."
+        default=None, description="Target current at these times; or give the voltage."
     )
     voltage: tuple[Voltage, ...] | None = Field(
-        default=None, description="At the terminals, of either sign."
+        default=None, description="Voltage at the terminals, of either sign."
     )
     supply_voltage: Voltage | None = Field(
-        default=None, gt=0, description="That the current is raised with; with a current only."
+        default=None, gt=0, description="Voltage that raises the current; only with a current."
     )
     band: Current | None = Field(
         default=None,
         gt=0,
-        description="Between switching on and off about the target; default 5 % of the largest "
-        "current.",
+        description="Current between switching on and off about the target; default: 5 % of the "
+        "largest current.",
     )
 
     @model_validator(mode="after")
@@ -81,7 +81,7 @@ class DriveProfile(DiodeDriver):
             raise CaseProblem(
                 ("time", k),
                 got=f"{self.time[k]:g} s" + (f" after {self.time[k - 1]:g} s" if falls else ""),
-                expected="times from 0 s on that do not fall, the last one after the first",
+                expected="times from 0 s in ascending order, the last one after the first",
                 hint="write a jump as the same time twice.",
             )
         self.require_period(self.time[-1])
@@ -103,7 +103,7 @@ class DriveProfile(DiodeDriver):
             self.supply_voltage is None,
             ("supply_voltage",),
             got="a current over time without a supply",
-            expected="the voltage that the current is raised with",
+            expected="the voltage that raises the current",
             hint="supply_voltage: 65 V, from a boost capacitor, or 14 V from the battery.",
         )
         if min(self.current) < 0 or not max(self.current) > 0:

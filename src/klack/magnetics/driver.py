@@ -271,8 +271,8 @@ class DiodeDriver(Driver):
     decay: Voltage | None = Field(
         default=None,
         ge=0,
-        description="Voltage against the current after the end (zener diode, boost "
-        "capacitor); default that of freewheeling.",
+        description="Voltage against the current after the end (Zener diode, boost capacitor); "
+        "default: freewheeling.",
     )
     repeat_every: Time | None = Field(
         default=None, gt=0, description="Period of repetition; default no repetition."
@@ -311,7 +311,9 @@ class TimedDriver(DiodeDriver):
     """A driver that works from ``start`` to ``end``."""
 
     start: Time = Field(default=0.0, ge=0, description="When the driver switches on.")
-    end: Time | None = Field(default=None, gt=0, description="When it switches off; default never.")
+    end: Time | None = Field(
+        default=None, gt=0, description="When the driver switches off; default: never."
+    )
 
     @model_validator(mode="after")
     def _order_of_times(self) -> Self:

@@ -146,5 +146,5 @@ def _check(
         "eddy ladder: terms",
         got=f"{terms}",
         expected=f"1 to {MOST_TERMS}",
-        hint="1 for lift and timing, 3 or 4 for the first 50 us.",
+        hint="use 1 for lift and timing, 3 or 4 for the first 50 us.",
     )

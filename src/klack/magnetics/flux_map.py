@@ -73,12 +73,12 @@ class ForceComparison:
     def advice(self) -> str:
         """Likely reason."""
         if self.ratio < 0.0:
-            return "the force counts the other way; from a file: force_closing: positive."
+            return "the sign of the force is reversed; from a file: force_closing: positive."
         for factor, words in ((2.0, "2"), (4.0, "4"), (0.5, "0.5")):
             if abs(self.ratio * factor - 1.0) < _ACCEPTED:
                 return (
-                    f"on the whole it is {self.ratio:.3g} times as large: a part of a model? From "
-                    f"a file: force_factor: {words}."
+                    f"overall it is {self.ratio:.3g} times as large: is the force that of half a "
+                    f"model? From a file: force_factor: {words}."
                 )
         return (
             "more gaps and currents in the table, and force and linkage from the same computation."
@@ -227,11 +227,10 @@ class FluxMap:
             gaps = " and ".join(format_si(gap, "m") for gap in self.gap[j : j + 2])
             raise InputError(
                 "FluxMap",
-                got=f"a table that changes so abruptly between the gaps {gaps} that the current "
-                "falls as the linkage rises, "
-                f"near {format_si(self.linkage[k], 'Wb', 3)}",
+                got=f"a table that changes too abruptly between the gaps {gaps}: the current "
+                f"falls as the linkage rises, near {format_si(self.linkage[k], 'Wb', 3)}",
                 expected="linkages that change smoothly with the gap",
-                hint="put more gaps or currents into the table there, or smooth its noise.",
+                hint="add gaps or currents to the table there, or smooth its noise.",
             )
 
     def compare_force(
@@ -266,12 +265,12 @@ class FluxMap:
         if found.share > _ACCEPTED:
             low, high, gap = found.step
             warnings.warn(
-                f"force map: the given force is {found.given:.4g} N at {found.current:.4g} A and a "
-                f"gap of {format_si(found.gap, 'm')}, the linkage gives {found.derived:.4g} N "
-                f"there: {100.0 * found.share:.3g} % of the largest force. dF/di and dpsi/dx "
-                f"differ most between {low:.4g} A and {high:.4g} A at {format_si(gap, 'm')}. The "
-                "linkage is used, because only one of them can conserve energy. Try: "
-                + found.advice(),
+                f"force map: the given force is {found.given:.4g} N at {found.current:.4g} A and "
+                f"a gap of {format_si(found.gap, 'm')}, but the linkage gives "
+                f"{found.derived:.4g} N there: {100.0 * found.share:.3g} % of the largest force. "
+                f"dF/di and dpsi/dx differ most between {low:.4g} A and {high:.4g} A at "
+                f"{format_si(gap, 'm')}. The linkage is used, because only it conserves energy. "
+                "Try: " + found.advice(),
                 AccuracyWarning,
                 stacklevel=3,
             )

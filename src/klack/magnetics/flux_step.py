@@ -126,7 +126,7 @@ FAILURES = {
 }
 
 _GAP_ADVICE = (
-    "the stroke has to end before the working gap closes: increase components.{name}.gap, or "
+    "the stroke must end before the working gap closes: increase components.{name}.gap, or "
     "reduce the gap of the stop that ends the stroke (residual_gap remains in addition)."
 )
 _MAP_ADVICE = (
@@ -550,7 +550,7 @@ def gap_limit(
             usable=known.usable,
             slack=known.slack,
             law=f"the magnet of '{rows.component}'",
-            effect=lambda value: "Its force there is a guess.",
+            effect=lambda value: "Its force there is extrapolated.",
             advice=advice.format(name=rows.component),
             key="gap",
             start=gap,

@@ -63,7 +63,7 @@ class ForceMapSolenoid(Component):
     map: MapFile | None = Field(
         default=None,
         description="Map from a file of FEMM, JMAG, Ansys Maxwell or another program; otherwise "
-        "current, gaps and linkage.",
+        "give current, gaps and linkage.",
     )
     current: tuple[Current, ...] | None = Field(
         default=None, min_length=2, description="Currents, increasing from 0."
@@ -76,10 +76,10 @@ class ForceMapSolenoid(Component):
         description="Flux linkage of the coil: one row per current, one value per gap.",
     )
     force: tuple[tuple[Force, ...], ...] | None = Field(
-        default=None, description="Force, negative where it closes the gap; compared only."
+        default=None, description="Force, negative where it closes the gap; only compared."
     )
     start_current: Current = Field(
-        default=0.0, ge=0, description="Steady current before the start: holding."
+        default=0.0, ge=0, description="Steady (holding) current before the start."
     )
 
     @model_validator(mode="after")
@@ -165,7 +165,7 @@ class ForceMapSolenoid(Component):
                 slack=_BEYOND * most,
                 law=f"the map of '{rows.component}'",
                 effect=lambda value: "The linkage continues linearly there, without saturation.",
-                advice="add currents to the table, or limit the current by the driver.",
+                advice="add currents to the table, or limit the current in the driver.",
                 channel=f"{rows.component} current",
             )
         )

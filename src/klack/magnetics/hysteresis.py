@@ -85,7 +85,7 @@ class LoopWidth:
             self.reversal > most,
             "hysteresis: initial_permeability",
             got=f"a value with which the loop reverses over {self.reversal:.3g} T",
-            expected=f"a reversal within {most:.3g} T, in which its width changes little",
+            expected=f"a reversal within {most:.3g} T, where its width changes little",
             hint="lower initial_permeability, or give a smaller coercivity.",
         )
 
@@ -184,8 +184,8 @@ def falling_width(
         "hysteresis: remanence",
         got=f"{remanence:g} T, where the mean curve needs {field:.4g} A/m",
         expected=f"less than {most:.4g} T, where it needs the coercivity of {coercivity:g} A/m",
-        hint="a loop whose halves lie evenly about this curve cannot keep more: lower the "
-        "remanence, or give a steeper mean curve (not the initial one).",
+        hint="a loop symmetric about this curve cannot retain more: lower the remanence, or "
+        "give a steeper mean curve (not the initial curve).",
     )
     scale = remanence / np.sqrt(np.log(coercivity / field))
 
@@ -244,7 +244,7 @@ def _branch(
         B.size != H.size or B.size < 5,
         where,
         got=f"{B.size} flux densities and {H.size} field strengths",
-        expected="the same number of both, at least 5",
+        expected="an equal number of both, at least 5",
         hint="give the falling branch from the positive tip of the loop to the negative one.",
     )
     if B[0] > B[-1]:
@@ -253,8 +253,8 @@ def _branch(
         not (np.all(np.diff(B) > 0.0) and np.all(np.diff(H) > 0.0)),
         where,
         got="a branch on which flux density and field strength do not both fall",
-        expected="points of one branch, in order, each below the one before",
-        hint="take one branch only; smooth its noise and remove repeated points.",
+        expected="points of one branch, in order, each below the previous one",
+        hint="use only one branch; smooth its noise and remove repeated points.",
     )
     uneven = max(abs(B[0] + B[-1]) / B[-1], abs(H[0] + H[-1]) / H[-1]) if B[-1] > 0 else np.inf
     if uneven > _UNEVEN:
@@ -275,7 +275,7 @@ def _branch(
             where,
             got=f"a field strength of {float(branch(0.0)):.4g} A/m at 0 T",
             expected="the falling branch: the flux density is zero at minus the coercivity",
-            hint="give the branch that passes (0 A/m, +B_r); mirror a rising one at the origin.",
+            hint="give the branch through (0 A/m, +B_r); mirror a rising branch about the origin.",
         )
     return branch, tip
 
@@ -288,11 +288,11 @@ def _reversal(curve: IronCurve, coercivity: float, initial_permeability: float) 
         not 1.0 < initial_permeability < most,
         "hysteresis: initial_permeability",
         got=f"{initial_permeability:g}",
-        expected=f"above 1 and below {most:.6g}, that of the mean curve at the origin",
-        hint="soft magnetic iron has 100 to 1000 after it was demagnetised."
+        expected=f"above 1 and below {most:.6g}, the value of the mean curve at the origin",
+        hint="demagnetised soft magnetic iron has 100 to 1000."
         if most > 100.0
-        else "the curve of this material begins flatter than iron does: give a curve of your "
-        "own, the mean of both branches of its loop.",
+        else "the curve of this material begins flatter than iron: give your own curve, the "
+        "mean of both branches of its loop.",
     )
     return 2.0 * coercivity / (1.0 / (VACUUM_PERMEABILITY * initial_permeability) - steep)
 

@@ -32,9 +32,9 @@ USUAL_CLASS = "H"
 InsulationClass = Annotated[
     Literal["Y", "A", "E", "B", "F", "H", "N", "R", "250"] | None,
     Field(
-        description="Thermal class of its insulation after IEC 60085: Y 90, A 105, E 120, B 130, "
-        "F 155, H 180, N 200, R 220 or 250 degC. klack heat doubts copper above it; without one "
-        "above 180 degC."
+        description="Thermal class of its insulation after IEC 60085: Y 90, A 105, E 120, B "
+        "130, F 155, H 180, N 200, R 220 or 250 degC. klack heat warns of copper above it; "
+        "without a class, above 180 degC."
     ),
 ]
 """Key of a coil."""

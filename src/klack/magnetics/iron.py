@@ -227,7 +227,7 @@ def measured(flux_density: ArrayLike, field_strength: ArrayLike) -> IronCurve:
         B.size != H.size or B.size == 0,
         "measured magnetisation curve",
         got=f"{B.size} flux densities and {H.size} field strengths",
-        expected="the same number of both, at least one",
+        expected="an equal number of both, at least one",
         hint="give one field strength per flux density.",
     )
     if B[0] != 0.0:

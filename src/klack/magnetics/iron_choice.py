@@ -54,7 +54,8 @@ class IronChoice(NamedSection):
     brauer: BrauerNumbers | None = Field(default=None, description="Exponential curve.")
     table: IronPoints | None = Field(default=None, description="Measured points.")
     loop: LoopPoints | None = Field(
-        default=None, description="Measured major loop; its mean curve, and hysteresis if given."
+        default=None,
+        description="Measured major loop; its mean curve is used, and its hysteresis if given.",
     )
 
     @model_validator(mode="after")

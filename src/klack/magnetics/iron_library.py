@@ -71,7 +71,7 @@ def iron_curve(name: str) -> IronCurve:
     >>> round(float(iron_curve("9SMnPb28").field(1.4)), 1)
     3118.6
     """
-    own = "give your own curve as formula or table."
+    own = "give your own curve as a formula or a table."
     entry = require_entry("iron_curve: name", name, IRON_LIBRARY, own)
     return rational_curve(
         initial=entry.initial,

@@ -47,7 +47,7 @@ class CoilCircuit(Section):
     )
     insulation_class: InsulationClass = None
     start_current: Current = Field(
-        default=0.0, ge=0, description="Steady current before the start: holding."
+        default=0.0, ge=0, description="Steady (holding) current before the start."
     )
 
 

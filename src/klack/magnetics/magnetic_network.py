@@ -75,15 +75,15 @@ class MagneticNetwork(Component):
     )
     circuits: Mapping[Name, CoilCircuit] = Field(
         default_factory=dict,
-        description="Further electric circuits of its coils by name, which is a port, each with a "
-        "driver of its own.",
+        description="Further electric circuits of its coils by name; each is a port and has its "
+        "own driver.",
     )
     start_current: Current = Field(
-        default=0.0, ge=0, description="Steady current before the start: holding."
+        default=0.0, ge=0, description="Steady (holding) current before the start."
     )
     start: Literal["demagnetised", "remanent"] = Field(
         default="demagnetised",
-        description="Iron with hysteresis at the start: as new, or as saturation has left it.",
+        description="State of iron with hysteresis at the start: as new, or as left by saturation.",
     )
 
     @model_validator(mode="after")
@@ -95,7 +95,7 @@ class MagneticNetwork(Component):
                 ("elements",),
                 got=f"elements of the kinds {', '.join(sorted(kinds))}",
                 expected=words,
-                hint="add it, with the nodes that it lies between.",
+                hint="add it, with the two nodes at its ends.",
             )
         refuse_key_if(
             self.start == "remanent"
@@ -136,7 +136,7 @@ class MagneticNetwork(Component):
                         got=f"'{circuit}'",
                         expected=f"one of circuits: {one_of(self.circuits)}"
                         if self.circuits
-                        else "no circuit, as 'circuits' has none",
+                        else "no circuit, because 'circuits' is empty",
                         hint=nearest(circuit, self.circuits, "add it to circuits, or leave it out"),
                     )
                 wound[circuit].append(name)
@@ -147,14 +147,14 @@ class MagneticNetwork(Component):
                 got="no coil in it" if name else "no coil at the terminals",
                 expected="an element of kind coil"
                 + (f" with circuit: {name}" if name else " without 'circuit'"),
-                hint="the resistance of the network is that of the coils without 'circuit'.",
+                hint="the resistance of the network belongs to the coils without 'circuit'.",
             )
             refuse_key_if(
                 name in self.ports,
                 ("circuits", name),
                 got=f"the name '{name}', which is another port",
                 expected=f"a name other than {', '.join(self.ports)}",
-                hint="name it after its purpose: holding, closing, sensing.",
+                hint="name the circuit after its purpose: holding, closing, sensing.",
             )
 
     def circuit(self) -> MagneticCircuit:

@@ -42,8 +42,8 @@ class MapFile(Section):
     """Table of linkage and force from a file; see :mod:`klack.magnetics.map_file`."""
 
     file: InputPath = Field(
-        description="CSV or text, relative to the case: one row per point, or a column per gap or "
-        "current with its value in the head; with layout: matrix, of the linkage."
+        description="CSV or text, relative to the case: one row per point, or a column per gap "
+        "or current with its value in the header; with layout: matrix, the linkage."
     )
     layout: Literal["rows", "matrix"] = Field(
         default="rows",
@@ -53,21 +53,23 @@ class MapFile(Section):
         default=None, description="Matrix of the force, with layout: matrix."
     )
     columns: MapColumns = Field(
-        default=MapColumns(), description="Columns that the head does not tell."
+        default=MapColumns(), description="Columns that the header does not identify."
     )
-    units: MapUnits = Field(default=MapUnits(), description="Units that the head does not tell.")
+    units: MapUnits = Field(default=MapUnits(), description="Units that the header does not state.")
     linkage_factor: Number = Field(
         default=1.0,
-        description="Factor on the linkage: 2 of half a model, the turns of a flux per turn, -1 of "
-        "a coil that counts the other way.",
+        description="Factor on the linkage: 2 for half a model, the number of turns for a flux "
+        "per turn, -1 for a coil of opposite sense.",
     )
-    force_factor: Number = Field(default=1.0, gt=0, description="On the force: 2 of half a model.")
+    force_factor: Number = Field(
+        default=1.0, gt=0, description="Factor on the force: 2 for half a model."
+    )
     force_closing: Literal["negative", "positive"] = Field(
-        default="negative", description="Sign in the file of a force that closes the gap."
+        default="negative", description="Sign that a force closing the gap has in the file."
     )
     closed_at: Length | None = Field(
         default=None,
-        description="Where the gap is zero, if the column of the gap is a position that grows "
+        description="Position at zero gap, if the column of the gap is a position that grows "
         "while the gap closes: gap = closed_at - position.",
     )
 
@@ -78,7 +80,7 @@ class MapFile(Section):
             ("linkage_factor",),
             got="0",
             expected="a factor other than 0",
-            hint="leave it out for a whole model.",
+            hint="leave the factor out for a whole model.",
         )
         refuse_key_if(
             self.force_file is not None and self.layout != "matrix",
@@ -182,8 +184,8 @@ def _require_coil(where: str, table: MapTable) -> None:
                 if k > 0
                 else ""
             ),
-            expected="a linkage that rises with the current",
-            hint="write linkage_factor: -1, because the coil counts the other way."
+            expected="a linkage that increases with the current",
+            hint="write linkage_factor: -1, because the coil has the opposite sense."
             if turned
             else "correct that point.",
         )
@@ -193,6 +195,6 @@ def _require_coil(where: str, table: MapTable) -> None:
             got=f"a linkage that rises from {format_si(psi[-1, 0], 'Wb')} to "
             f"{format_si(psi[-1, -1], 'Wb')} as the gap opens from {format_si(x[0], 'm')} to "
             f"{format_si(x[-1], 'm')}",
-            expected="one that falls: iron is attracted",
+            expected="a linkage that falls: iron is attracted",
             hint="if the column is a position that grows while the gap closes, give closed_at.",
         )

@@ -107,7 +107,7 @@ def read_matrix(path: Path, quantity: str, units: Mapping[str, str]) -> tuple[Ve
     if None in current:
         k = current.index(None)
         raise InputError(
-            f"{cells.where}, column {k + 2} of its head",
+            f"{cells.where}, column {k + 2} of its header",
             got=f"'{cells.head[k + 1]}'",
             expected="a current as a number",
             hint="layout: matrix has currents in its first row and gaps in its first column.",
@@ -169,7 +169,7 @@ def _columns(
             got=heads[:300],
             expected=f"a column of the {missing[0]}"
             + (
-                " (a force alone does not tell what voltage drives which current)"
+                " (a force alone does not define the voltage that drives a current)"
                 if missing[0] == "linkage"
                 else ""
             ),
@@ -283,7 +283,7 @@ def _families(cells: CellTable, found: Mapping[int, _Column]) -> dict[str, Vecto
         or len(varied) != sum(c.varied is not None for c in found.values()),
         cells.where,
         got="heads that vary " + " and ".join(sorted(names)),
-        expected="one of current and gap in the first column, the other in the heads",
+        expected="one of current and gap in the first column, the other in the headers",
         hint="export one row per point instead.",
     )
     points: dict[str, list[float]] = {name: [] for name in (*own, *names, *values)}
@@ -320,8 +320,8 @@ def _grid(where: str, points: Mapping[str, Vector]) -> MapTable:
                 got=f"{words} at {format_si(i[k], 'A')} and a gap of {format_si(x[j], 'm')}"
                 + (f", and {np.sum(wrong) - 1} more such" if np.sum(wrong) > 1 else ""),
                 expected=f"one for each of {i.size} currents and {x.size} gaps",
-                hint="compute the missing ones, remove doubled ones; a column that stands still "
-                "may be the wrong one.",
+                hint="compute the missing points, remove duplicates; a constant column may be "
+                "the wrong one.",
             )
     grids = {}
     for name in ("linkage", "force"):

@@ -61,7 +61,7 @@ def read_cells(path: Path, where: str) -> CellTable:
         where,
         got=f"{size / 1e6:.3g} MB",
         expected=f"at most {LARGEST / 1e6:g} MB",
-        hint="some ten currents and gaps are enough; smooth curves run through them.",
+        hint="about ten currents and gaps are enough; smooth curves are drawn through them.",
     )
     lines = [
         (number, line)
@@ -77,7 +77,7 @@ def read_cells(path: Path, where: str) -> CellTable:
     raise InputError(
         where,
         got="no row of numbers",
-        expected="rows of at least two numbers, with semicolons, tabs, commas or blanks between",
+        expected="rows of at least two numbers, separated by semicolons, tabs, commas or spaces",
         hint="export the table as CSV.",
     )
 
@@ -128,7 +128,7 @@ def _text(data: bytes, where: str) -> str:
         except UnicodeDecodeError:
             continue
     raise InputError(
-        where, got="a text cut off", expected="a text file", hint="export the table again."
+        where, got="truncated text", expected="a text file", hint="export the table again."
     )
 
 
@@ -168,7 +168,7 @@ def _table(
             len(cells) != len(head),
             f"{where}, line {number}",
             got=f"{len(cells)} cells",
-            expected=f"{len(head)}, as many as in the head",
+            expected=f"{len(head)}, as many as in the header",
             hint="give every row a cell for each column; a decimal comma needs semicolons or "
             "tabs between the columns.",
         )

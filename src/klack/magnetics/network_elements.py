@@ -32,7 +32,8 @@ _TREE, _REST, _LEAKAGE, _GAP = range(4)  # ranks: what the spanning tree takes f
 _TOLERANCE = 1e-8
 
 Between = Annotated[
-    tuple[Name, Name], Field(description="Magnetic nodes at its ends; flux counts from the first.")
+    tuple[Name, Name],
+    Field(description="Magnetic nodes at its ends; flux is positive from the first."),
 ]
 
 
@@ -109,12 +110,12 @@ class IronElement(IronPart, _Element):
 class MovingGap(_Element):
     """A gap that the armature changes."""
 
-    residual_gap: Length = Field(gt=0, description="Magnetic gap that remains when it is closed.")
+    residual_gap: Length = Field(gt=0, description="Magnetic gap that remains in the closed state.")
     opens_from: Length | None = Field(
         default=None,
         ge=0,
-        description="Of a gap that opens while the others close: its width at the start, without "
-        "the residual gap.",
+        description="Width at the start of a gap that opens while the others close, without the "
+        "residual gap.",
     )
 
     @property
@@ -165,7 +166,7 @@ class PoleElement(PoleGap, MovingGap):
             ("tilts",),
             got="a pole that tilts its armature",
             expected="tilts: false",
-            hint="moments across the axis are a matter of the component 'solenoid'.",
+            hint="for moments across the axis use the component 'solenoid'.",
         )
         return self
 
@@ -219,7 +220,7 @@ class RingElement(ParasiticGap, _Element):
     @model_validator(mode="after")
     def _centred(self) -> Self:
         return self._refuse_with(
-            ("off_axis",), "kind: ring", "forces across the axis are a matter of 'solenoid'"
+            ("off_axis",), "kind: ring", "forces across the axis only in the component 'solenoid'"
         )
 
     def tubes(self, name: str, gaps: WorkingGaps) -> tuple[Tube, ...]:
@@ -243,12 +244,12 @@ class CoilElement(_Element):
 
     kind: Literal["coil"]
     turns: Number = Field(
-        description="Turns; a positive current drives flux from the first node to the second, "
-        "with a negative number the other way."
+        description="Number of turns; a positive current drives flux from the first node to the "
+        "second, with a negative number the reverse."
     )
     circuit: Name | None = Field(
         default=None,
-        description="Of the network's circuits, the one that the coil is in; default that at the "
+        description="The circuit of the network that contains the coil; default: the one at the "
         "terminals.",
     )
 
@@ -277,7 +278,7 @@ class ShortedCoil(_Element):
 
     kind: Literal["shorted-coil"]
     turns: Number = Field(default=1.0, gt=0, description="Turns.")
-    resistance: Resistance = Field(gt=0, description="Of the whole closed circuit.")
+    resistance: Resistance = Field(gt=0, description="Resistance of the whole closed circuit.")
 
     def tubes(self, name: str, gaps: WorkingGaps) -> tuple[Tube, ...]:
         """One branch with an eddy term."""

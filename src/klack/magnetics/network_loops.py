@@ -51,8 +51,8 @@ def circuit_of_network(tubes: Sequence[Tube], main: str, gap: float) -> Magnetic
             got=f"{len(chords)} independent loops"
             + (f": {', '.join(tubes[k].branch.name for k in chords)}" if chords else ""),
             expected=f"1 to {MOST_LOOPS}",
-            hint="join elements that lie in parallel or leave out small leakages; an eddy ladder "
-            "of n terms counts n - 1 loops.",
+            hint="join parallel elements or leave out small leakages; an eddy ladder of n terms "
+            "counts as n - 1 loops.",
         )
     loops = np.zeros((len(tubes), len(chords)), dtype=np.int64)
     for column, k in enumerate(chords):
@@ -63,9 +63,9 @@ def circuit_of_network(tubes: Sequence[Tube], main: str, gap: float) -> Magnetic
     refuse_if(
         idle,
         "magnetic network",
-        got=f"no flux through {', '.join(idle)}: nothing leads back from there",
+        got=f"no flux through {', '.join(idle)}: no path leads back from there",
         expected="every element in a closed path",
-        hint="check the names of the nodes in 'between'; a node needs two elements at least.",
+        hint="check the names of the nodes in 'between'; a node needs at least two elements.",
     )
     circuit = MagneticCircuit(branches=tuple(tube.branch for tube in tubes), loops=loops, main=main)
     _require_reluctance(circuit, gap)

@@ -217,6 +217,6 @@ def _require_open(where: str, used: Vector, room: ArrayLike, what: str) -> None:
     raise InputError(
         where,
         got=f"{1e6 * used.flat[worst]:.4g} um with {what} of {1e6 * room.flat[worst]:.4g} um",
-        expected="0 or more, and less than that: the faces may not touch",
+        expected="0 or more, and less than that: the faces must not touch",
         hint="check offset and tilt; iron that touches needs a residual gap (coating, shim).",
     )

@@ -92,7 +92,7 @@ class Capacitor:
     nominal [V]
         Up to which it is recharged.
     power [W]
-        Into the capacitor; 0: no recharge.
+        Power into the capacitor; 0: no recharge.
     current [A]
         Largest one into the capacitor; 0: no limit.
     efficiency [-]

@@ -29,16 +29,16 @@ class PeakHold(TimedDriver):
 
     type: ClassVar[str] = "peak-hold"
 
-    boost_voltage: Voltage = Field(gt=0, description="Until the peak current is reached.")
-    peak_current: Current = Field(gt=0, description="Where the boost ends.")
+    boost_voltage: Voltage = Field(gt=0, description="Voltage until the peak current is reached.")
+    peak_current: Current = Field(gt=0, description="Current at which the boost ends.")
     supply_voltage: Voltage = Field(gt=0, description="For holding (battery).")
     hold_current: Current = Field(gt=0, description="Middle of the hold band.")
-    hold_band: Current = Field(gt=0, description="Upper minus lower current of the hold.")
+    hold_band: Current = Field(gt=0, description="Upper minus lower current of the hold band.")
     peak_until: Time | None = Field(
         default=None,
         gt=0,
-        description="End of the peak hold, in a band below the peak as wide as that of the "
-        "hold; default no peak hold.",
+        description="End of the peak hold, in a band below the peak as wide as the hold band; "
+        "default: no peak hold.",
     )
     fall: Literal["freewheel", "decay"] = Field(
         default="freewheel", description="Voltage against the current from peak to hold."
@@ -58,7 +58,7 @@ class PeakHold(TimedDriver):
             ("peak_current",),
             got=f"{self.peak_current:g} A",
             expected="a current above the band of the hold",
-            hint="a driver without a peak is 'two-point'.",
+            hint="for a driver without a peak use type 'two-point'.",
         )
         inside = self.peak_until is None or (
             self.start < self.peak_until and (self.end is None or self.peak_until < self.end)

@@ -104,7 +104,7 @@ class GapReluctance:
             not (x.size == R.size == dR.size and x.size >= 2 and np.all(np.diff(x) > 0)),
             "GapReluctance",
             got=f"{x.size} gaps, {R.size} reluctances, {dR.size} slopes",
-            expected="the same number of each, at least two, the gaps increasing",
+            expected="an equal number of each, at least two, the gaps increasing",
             hint="sort the gaps and remove repeated ones.",
         )
         if not np.all(R > 0):
@@ -175,7 +175,7 @@ class IronReluctance:
             not (phi.size == F.size == dF.size and phi.size >= 2 and phi[0] == 0.0 == F[0]),
             "IronReluctance",
             got=f"{phi.size} fluxes, {F.size} mmfs, {dF.size} slopes",
-            expected="the same number of each, at least two, starting at (0 Wb, 0 A)",
+            expected="an equal number of each, at least two, starting at (0 Wb, 0 A)",
             hint="begin the table at the origin.",
         )
         refuse_if(

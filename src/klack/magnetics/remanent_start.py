@@ -83,7 +83,8 @@ def remanent_state(
         widths = now if turn == 0 else 0.5 * (widths + now)  # a falling width could overshoot
     else:
         raise ConvergenceError(
-            f"remanent start: the fluxes do not settle at {current:g} A and a gap of {gap:g} m.\n"
+            f"remanent start: the fluxes do not converge at {current:g} A and a gap of {gap:g} "
+            "m.\n"
             "Try: a loop that falls less steeply, or start: demagnetised."
         )
     stops = []

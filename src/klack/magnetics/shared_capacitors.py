@@ -66,7 +66,7 @@ class SharedCapacitors:
                     got=format_si(capacitor.nominal, "V"),
                     expected=f"more than the battery of the driver of '{part.component}', "
                     f"{format_si(battery, 'V')}",
-                    hint="a driver without boost is 'two-point'.",
+                    hint="for a driver without boost use type 'two-point'.",
                 )
 
 

@@ -107,7 +107,7 @@ class Solenoid(Component):
         default=(), description="Permanent magnets in series with the main flux."
     )
     leakage: Permeance | None = Field(
-        default=None, gt=0, description="Permeance of the coil's own leakage; see leakage_share."
+        default=None, gt=0, description="Permeance of the leakage of the coil; see leakage_share."
     )
     leakage_share: Ratio = Field(
         default=0.1,
@@ -117,14 +117,14 @@ class Solenoid(Component):
     )
     eddy: tuple[EddyPart, ...] = Field(default=(), description="Solid iron with eddy currents.")
     residual_flux: Flux = Field(
-        default=0.0, ge=0, description="Main flux that remains without current, gap closed."
+        default=0.0, ge=0, description="Main flux that remains without current with the gap closed."
     )
     start_current: Current = Field(
-        default=0.0, ge=0, description="Steady current before the start: holding."
+        default=0.0, ge=0, description="Steady (holding) current before the start."
     )
     start: Literal["demagnetised", "remanent"] = Field(
         default="demagnetised",
-        description="Iron with hysteresis at the start: as new, or as saturation has left it.",
+        description="State of iron with hysteresis at the start: as new, or as left by saturation.",
     )
 
     @model_validator(mode="after")
@@ -157,7 +157,7 @@ class Solenoid(Component):
         refuse_key_if(
             self.residual_flux > 0.0 and any(part.hysteresis for part in self.iron),
             ("residual_flux",),
-            got="a residual flux beside iron with hysteresis",
+            got="a residual flux together with iron with hysteresis",
             expected="one of them: the iron has its own remanence",
             hint="remove residual_flux, or the sections 'hysteresis'.",
         )
@@ -184,7 +184,7 @@ class Solenoid(Component):
                 not alone,
                 f"components.{rows.component}",
                 got="off_axis or tilts with a driver that shares its boost capacitor",
-                expected="forces across the axis of a magnet solved by itself",
+                expected="forces across the axis only of a magnet with its own capacitor",
                 hint="give the driver a capacitance of its own.",
             )
             rows.side_of_element(self._side_pull(circuit.loops.shape[1]))

@@ -70,11 +70,13 @@ class PoleGap(Section):
     outer_radius: Length = Field(gt=0, description="Outer radius of the pole face.")
     inner_radius: Length = Field(default=0.0, ge=0, description="Inner radius; 0: a full disc.")
     fringing: Literal["none", "equal", "plane", "wall"] = Field(
-        description="Edge field: none, equal (two equal poles), plane (pole on a larger plane), "
-        "wall (two equal poles inside a tube)."
+        description="Edge field: none, equal (two equal poles), plane (pole facing a larger "
+        "plane), wall (two equal poles inside a tube)."
     )
     shoulder: Length | None = Field(
-        default=None, gt=0, description="Side face next to the edge, for equal and plane."
+        default=None,
+        gt=0,
+        description="Length of the side face next to the edge, for equal and plane.",
     )
     wall: Length | None = Field(
         default=None, gt=0, description="Distance of the tube from the side face, for wall."
@@ -90,7 +92,7 @@ class PoleGap(Section):
         refuse_key_if(
             self.inner_radius >= self.outer_radius,
             ("inner_radius",),
-            got=f"{self.inner_radius:g} m beside an outer radius of {self.outer_radius:g} m",
+            got=f"{self.inner_radius:g} m with an outer radius of {self.outer_radius:g} m",
             expected="an inner radius below the outer radius",
             hint="swap the two radii.",
         )
@@ -132,11 +134,13 @@ class PoleGap(Section):
 class ArmatureBore(Section):
     """Where a gap is that surrounds the armature, so that it pulls an armature off its axis."""
 
-    height: Length = Field(description="Middle of the ring along z, in the drawing of the needle.")
-    eccentricity: Length = Field(
-        default=0.0, ge=0, description="Distance of the axis of the bore from that of the guide."
+    height: Length = Field(
+        description="Height z of the middle of the ring, in the drawing of the needle."
     )
-    direction: Angle = Field(default=0.0, description="Its direction, from x towards y.")
+    eccentricity: Length = Field(
+        default=0.0, ge=0, description="Distance between the axes of bore and guide."
+    )
+    direction: Angle = Field(default=0.0, description="Direction of the offset, from x towards y.")
 
 
 class ParasiticGap(Section):
@@ -148,8 +152,9 @@ class ParasiticGap(Section):
     length: Length | None = Field(default=None, gt=0, description="Axial length of the ring.")
     off_axis: ArmatureBore | None = Field(
         default=None,
-        description="Of a ring round the armature, with motion: three-dimensional: it pulls the "
-        "armature to the nearer side. Without it no force across the axis.",
+        description="Offset of a ring round the armature, with motion: three-dimensional: the "
+        "ring pulls the armature to the nearer side. Without it there is no force across the "
+        "axis.",
     )
 
     @model_validator(mode="after")
@@ -199,7 +204,7 @@ class Hysteresis(Section):
     remanence: FluxDensity | None = Field(
         default=None,
         gt=0,
-        description="B_r of the closed ring; without it the loop is as wide everywhere.",
+        description="B_r of the closed ring; without it the width of the loop is constant.",
     )
     initial_permeability: Number = Field(
         gt=1, description="Relative permeability of the demagnetised iron for small changes."
@@ -254,10 +259,11 @@ class IronPart(Section):
     length: Length = Field(gt=0, description="Mean path of the flux in the part.")
     area: Area = Field(gt=0, description="Cross-section across the flux.")
     hysteresis: Hysteresis | None = Field(
-        default=None, description="Remanence and hysteresis loss; the material is the mean curve."
+        default=None,
+        description="Remanence and hysteresis loss; the material gives the mean curve.",
     )
     eddy: SolidIron | None = Field(
-        default=None, description="Eddy currents with the permeability of the moment."
+        default=None, description="Eddy currents with the momentary permeability."
     )
 
     @model_validator(mode="after")
@@ -278,9 +284,9 @@ class IronPart(Section):
                 refuse_key_if(
                     getattr(given, name) is not None,
                     ("hysteresis", name),
-                    got=f"{name} beside material: loop",
+                    got=f"{name} together with material: loop",
                     expected="one of them",
-                    hint=f"remove {name}; the loop holds it.",
+                    hint=f"remove {name}; the loop contains it.",
                 )
         try:
             self.width()

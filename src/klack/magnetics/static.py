@@ -88,9 +88,9 @@ def static_state(
             share *= 0.5
         phi, here = phi + share * step, there
     raise ConvergenceError(
-        f"static magnetic circuit at {current:g} A and a gap of {gap:g} m: the last flux step was "
-        f"{np.max(np.abs(step)):.2g} Wb after {_MOST_ITERATIONS} iterations.\n"
-        "Try: check that every reluctance is above 0 and every B-H curve rises."
+        f"static magnetic circuit at {current:g} A and a gap of {gap:g} m: the last flux step "
+        f"was {np.max(np.abs(step)):.2g} Wb after {_MOST_ITERATIONS} iterations.\n"
+        "Try: check that every reluctance is above 0 and every B-H curve increases."
     )
 
 

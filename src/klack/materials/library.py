@@ -172,7 +172,8 @@ MATERIALS: Mapping[str, MaterialEntry] = MappingProxyType(
             ),
             _entry(
                 "X5CrNi18-10",
-                "austenitic stainless steel 1.4301 (AISI 304), solution annealed bar from 16 mm on",
+                "austenitic stainless steel 1.4301 (AISI 304), solution annealed bar of 16 mm "
+                "and above",
                 (200e9, _GUIDE, False),
                 (0.29, _GUIDE, False),
                 (7900.0, _GUIDE, False),

@@ -80,7 +80,7 @@ class LiftSensor(Section):
     sensitivity: Ratio = Field(
         default=1.0, gt=0, description="Measured change over true change of the lift."
     )
-    offset: Length = Field(default=0.0, description="Reading for the closed valve.")
+    offset: Length = Field(default=0.0, description="Reading of the closed valve.")
     resolution: Length = Field(
         default=0.0, ge=0, description="Smallest step of its reading; default none."
     )
@@ -97,9 +97,7 @@ class Trigger(Section):
     """
 
     channel: Role = Field(default="current", description="Channel that triggers.")
-    level: Text | None = Field(
-        default=None, description="Value at which it triggers, with its unit, e.g. 1 A."
-    )
+    level: Text | None = Field(default=None, description="Trigger level with its unit, e.g. 1 A.")
     share: Ratio | None = Field(
         default=None,
         gt=0,
@@ -115,13 +113,13 @@ class Trigger(Section):
     dead_time: Time | None = Field(
         default=None,
         gt=0,
-        description="No second trigger within this time; default the time kept after it.",
+        description="No second trigger within this time; default: the time kept after the trigger.",
     )
 
     @model_validator(mode="after")
     def _one_level(self) -> Self:
         if self.level is not None and self.share is not None:
-            self._exactly_one(("level", "share"), "at which value it triggers")
+            self._exactly_one(("level", "share"), "the trigger level")
         if self.level is not None:
             try:
                 parse_quantity(self.level, ROLES[self.channel], "level")

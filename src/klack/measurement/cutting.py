@@ -83,7 +83,7 @@ def trigger_level(windows: Iterable[Window], trigger: Trigger) -> float:
         not high > low,
         f"measurement.trigger: channel '{trigger.channel}'",
         got=f"a channel that stays at {low:g} (SI)",
-        expected="a channel that moves with every stroke",
+        expected="a channel that changes with every stroke",
         hint="choose another channel for the trigger.",
     )
     rest = float(np.median(all_values[all_values <= low + _LOW * (high - low)]))
@@ -204,7 +204,7 @@ def common_axis(pieces: Sequence[Piece], first: float, last: float) -> Vector:
         b - a < 2,
         "strokes",
         got=f"{len(pieces)} pieces with no common time around their trigger",
-        expected="strokes with samples before and after it",
+        expected="strokes with samples before and after the trigger",
         hint="check the trigger: channel, level, 'before' and 'after'.",
     )
     return np.asarray(step * np.arange(a, b + 1), dtype=np.float64)

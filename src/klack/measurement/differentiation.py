@@ -149,7 +149,7 @@ def noise_floor(records: NDArray[np.float64], step: float) -> tuple[NDArray[np.f
             "velocity_of: lift",
             got=f"{records.shape[-1]} samples",
             expected="at least 10",
-            hint="a stroke needs some hundred samples.",
+            hint="a stroke needs a few hundred samples.",
         )
     taper = np.hanning(n + 2)[1:-1]
     lines = np.fft.rfft(second * taper, axis=-1)[:, 1 : n // 2 + 1]
@@ -191,7 +191,7 @@ def _half_window(bandwidth: float, samples: int, step: float) -> int:
     if _lost_3_dB(2 * guess + 1, step) < bandwidth:
         raise InputError(
             "velocity bandwidth",
-            got=f"{bandwidth:g} Hz at {1.0 / step:g} samples a second",
+            got=f"{bandwidth:g} Hz at {1.0 / step:g} samples per second",
             expected=f"at most {_lost_3_dB(5, step):.3g} Hz: the narrowest window",
             hint="request less bandwidth, or sample faster.",
         )

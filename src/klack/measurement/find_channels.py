@@ -121,7 +121,7 @@ def _matching(recording: Recording, role: Role, choice: ChannelChoice) -> list[C
             f"{recording.path.name}: measurement.channels.{role}",
             got=f"no channel '{choice.name}'",
             expected=f"one of: {some_names(recording.channels)}",
-            hint="correct the name; * and ? stand for anything.",
+            hint="correct the name; * and ? are wildcards.",
         )
     numbered = {re.sub(r" #\d+$", "", info.name) for info in found} == {choice.name}
     if len(found) > 1 and not (numbered or re.search(r"[*?]", choice.name)):
@@ -177,7 +177,7 @@ def _require_known_scale(recording: Recording, role: Role, info: ChannelInfo) ->
         f"{recording.path.name}: channel '{info.name}' ({role})",
         got=f"a scale that klack does not know: {info.unapplied}",
         expected="values in the unit of the channel, or packed by scale_factor and add_offset",
-        hint=f"say in the case what the stored numbers are, with the {unit} per one of them as "
+        hint=f"state in the case what the stored numbers are, with the {unit} per stored 1 as "
         f"scale: measurement: {{channels: {{{role}: {choice}}}}}.",
     )
 
@@ -245,7 +245,7 @@ def _ambiguous(recording: Recording, role: Role, infos: Sequence[ChannelInfo]) -
     return InputError(
         f"{recording.path.name}: channels",
         got=f"several that could be the {role}: {candidates}",
-        expected=f"one channel of {role}, or a series with names that differ only in their number",
+        expected=f"one channel of {role}, or a series whose names differ only in a number",
         hint=f"name it in the case: measurement: {{channels: {{{role}: {choice}}}}}.",
     )
 
@@ -270,7 +270,7 @@ def _not_found(recording: Recording, role: Role) -> InputError:
     choice, meaning = f"{{name: {name}, unit: {unit}}}", ""
     if not no_unit(first.unit):
         choice = f"{{name: {name}, unit: {unit}, scale: 1}}"
-        meaning = f", with the {unit} that one {first.unit} stands for as scale"
+        meaning = f", with the {unit} per {first.unit} as scale"
     return InputError(
         f"{recording.path.name}: channels",
         got=f"none that could be the {role}: {', '.join(listed)}",

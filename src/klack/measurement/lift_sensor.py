@@ -150,9 +150,9 @@ def trigger_instant(time: Vector, values: Vector, trigger: Trigger, step: float)
     crossings = np.flatnonzero(above[1:] & ~above[:-1])
     if not crossings.size:
         raise ConvergenceError(
-            f"The computed {trigger.channel} never crosses the trigger level of {level:.4g} "
-            f"(it runs from {values.min():.4g} to {values.max():.4g}, SI).\n"
-            "Try: the level of measurement.trigger, and bounds that keep the valve opening."
+            f"The computed {trigger.channel} never crosses the trigger level of {level:.4g} (its "
+            f"range is {values.min():.4g} to {values.max():.4g}, SI).\n"
+            "Try: the level of measurement.trigger, and bounds within which the valve opens."
         )
     i = int(crossings[0])
     share = (level - values[i]) / (values[i + 1] - values[i])

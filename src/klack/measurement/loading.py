@@ -184,8 +184,8 @@ def load_stroke_set(
         source or "measurement",
         got="no stroke",
         expected="a channel that crosses the trigger level",
-        hint="check measurement.trigger: channel, level or share, and slope; scale: -1 turns a "
-        "channel round.",
+        hint="check measurement.trigger: channel, level or share, and slope; scale: -1 "
+        "reverses a channel.",
     )
     zero = measurement is not None and measurement.zero == "start"
     return _aligned(source, cuts, trigger, zero=zero or measurement is None, notes=notes)
@@ -224,8 +224,9 @@ def _aligned(
         notes.extend(_shortened(axis, trigger))
     if any(between_samples(cut.piece, axis) for cut in cuts):
         notes.append(
-            f"{', '.join(cuts[0].piece.values)}: samples moved onto one time from the trigger, in "
-            f"steps of {axis[1] - axis[0]:.4g} s, by cubic splines held within the samples."
+            f"{', '.join(cuts[0].piece.values)}: samples interpolated onto a common time from "
+            f"the trigger, in steps of {axis[1] - axis[0]:.4g} s, by cubic splines limited to "
+            "the range of the samples."
         )
     rejected, strokes = [], []
     cuts.reverse()
@@ -248,7 +249,7 @@ def _aligned(
             got=f"{len(rejected)} strokes, none of them "
             f"usable ({rejected[0].name}: {rejected[0].reason})",
             expected="at least one complete stroke",
-            hint="check the trigger, and how long was recorded.",
+            hint="check the trigger and the recorded time.",
         )
     return StrokeSet(
         source=source,

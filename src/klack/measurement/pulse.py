@@ -151,7 +151,7 @@ def _require_plateau(time: Floats, x: Floats, front: float, end: float, where: s
         _refuse(
             where,
             f"no plateau: the pulse is above {100 * _HIGH:.0f} % of its middle for "
-            f"{100 * share:.0f} % of its length only",
+            f"{100 * share:.0f} % of its length",
         )
 
 
@@ -198,8 +198,8 @@ def _refuse(where: str, got: str) -> NoReturn:
         where,
         got=got,
         expected="one pulse with quiet time before it, a front, a plateau, and an end",
-        hint="cut the record so that it begins before the front and ends after the pulse; smooth "
-        "noise of more than a twentieth of the plateau.",
+        hint="cut the record so that it begins before the front and ends after the pulse; "
+        "smooth noise above a twentieth of the plateau.",
     )
 
 

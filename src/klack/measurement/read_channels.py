@@ -178,12 +178,15 @@ def _started(recording: Recording, found: Mapping[Role, FoundChannel]) -> Iterat
     where, bases = recording.path.name, _bases(recording, found)
     for name, (_, later) in bases.items():
         if later > 0.0:
-            yield f"{where}: '{name}' starts {later:.9g} s later by the time stamps of the file."
+            yield (
+                f"{where}: '{name}' starts {later:.9g} s later according to the time stamps of "
+                "the file."
+            )
     silent = [name for name in bases if recording.channel(name).origin is None]
     if 0 < len(silent) < len(bases):
         yield (
-            f"{where}: {', '.join(silent)} without a start time; taken to start with the earliest "
-            "of the others."
+            f"{where}: {', '.join(silent)} without a start time; assumed to start with the "
+            "earliest of the others."
         )
 
 
@@ -237,7 +240,7 @@ def _tell_spikes(
     if moved > 0.0 and 0 < spikes.size <= _MOST_SPIKES:
         at = start + step * spikes[0]
         warnings.warn(
-            f"{recording.path.name}: {spikes.size} of the values of '{name}' far outside all "
+            f"{recording.path.name}: {spikes.size} values of '{name}' are far outside all "
             f"others, the first at {at:.6g} s: {values[spikes[0]]:.3g}.",
             AccuracyWarning,
             stacklevel=4,
@@ -259,8 +262,8 @@ def _filled(recording: Recording, name: str, at: Vector, values: Vector, time: V
             hint="leave this part out of the file, or choose another channel.",
         )
     warnings.warn(
-        f"{recording.path.name}: {np.count_nonzero(missing)} missing values of '{name}' filled "
-        f"by linear interpolation, the first at {time[begins[0]]:.6g} s.",
+        f"{recording.path.name}: {np.count_nonzero(missing)} missing values of '{name}' were "
+        f"filled by linear interpolation, the first at {time[begins[0]]:.6g} s.",
         AccuracyWarning,
         stacklevel=4,
     )

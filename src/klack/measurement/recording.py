@@ -84,7 +84,7 @@ class Recording(Closing):
             str(path),
             got="no channel of numbers over time" + "".join(f"; {note}" for note in notes),
             expected="at least one channel",
-            hint="check that it was exported completely, and the range of the instrument.",
+            hint="check that the file was exported completely, and the range of the instrument.",
         )
 
     def channel(self, name: str) -> ChannelInfo:
@@ -151,7 +151,7 @@ class Recording(Closing):
             f"{self.path.name}: channel '{channel.name}'",
             got=f"{end - begin} samples at once",
             expected=f"at most {_LARGEST_WINDOW}",
-            hint="read it piecewise: give a trigger in the section 'measurement'.",
+            hint="read the record in pieces: give a trigger in the section 'measurement'.",
         )
         return begin, end
 

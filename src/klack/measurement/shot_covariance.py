@@ -212,8 +212,8 @@ def identifiability_warnings(
     """Warnings on what the data do not determine, by scaled parameters z and their covariance."""
     C, error = covariance.covariance, covariance.standard_error
     notes = [
-        f"The data do not depend on '{name}': it stays at its start value. "
-        "Remove it from the calibration, or measure something that it affects."
+        f"The data do not depend on '{name}': it stays at its start value. Remove it from the "
+        "calibration, or measure a quantity that it affects."
         for name, e in zip(names, error, strict=True)
         if np.isinf(e)
     ]
@@ -241,9 +241,9 @@ def identifiability_warnings(
         if place < 1e-3 or place > 1.0 - 1e-3:
             side = "lower" if place < 0.5 else "upper"
             notes.append(
-                f"'{name}' ended at its {side} bound: its interval is not reliable. "
-                "Widen the bounds if they are not a physical limit; else another parameter "
-                "or a part of the model is wrong."
+                f"'{name}' ended at its {side} bound: its interval is not reliable. Widen the "
+                "bounds if they are not physical limits; otherwise another parameter or a part "
+                "of the model is wrong."
             )
     return tuple(notes)
 

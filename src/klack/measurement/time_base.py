@@ -122,10 +122,10 @@ def survey_time(
             hint="export the parts between the gaps into separate files or channels.",
         )
     if _two_lengths(sorted(lengths)) and deviation < 1.0 and longest < _GAP:
-        return replace(base, note="time is rounded in the file; taken as uniform.")
+        return replace(base, note="the time in the file is rounded and is taken as uniform.")
     what = "leaves out samples" if longest > _GAP else "jitters"
     note = (
-        f"time {what} (longest step {longest:.2f} of the usual one); resampled by linear "
+        f"time {what} (longest step {longest:.2f} times the usual step); resampled by linear "
         "interpolation."
     )
     return replace(base, step=usual, uniform=False, note=note)
@@ -142,10 +142,10 @@ def _check_order(
     came = f"{time[k]:.9g} s" if np.isfinite(time[k]) else "no value"
     raise InputError(
         where,
-        got=f"a time that does not rise: {came} at {place(first + k)}",
-        expected="times that rise from sample to sample",
-        hint="correct it, or write each stroke into its own file or channel; of tables, a time "
-        "that starts again is cut where all parts are alike.",
+        got=f"a time that does not increase: {came} at {place(first + k)}",
+        expected="times that increase from sample to sample",
+        hint="correct it, or write each stroke into its own file or channel; a table whose time "
+        "restarts is cut if all parts are alike.",
     )
 
 
@@ -174,7 +174,7 @@ def uniform_step(time: NDArray[np.float64], where: str) -> float:
         raise InputError(
             where,
             got=f"{n} times from {time[0] if n else 0:g} s",
-            expected="at least two rising times",
+            expected="at least two ascending times",
             hint="check the time channel and its unit.",
         )
     worst = float(np.max(np.abs(time - time[0] - step * np.arange(n)))) / step

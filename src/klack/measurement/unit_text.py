@@ -169,7 +169,7 @@ def unit_factor(text: str, quantity: Role | Kind, where: str) -> UnitFactor:
             got=f"the unit '{text[:_LONGEST]}'{came}",
             expected=f"a unit of {kind.name}: {', '.join(kind.common)}",
             hint="check that it is the right channel; 'unit' of the channel in the section "
-            f"'measurement' of the case replaces that of the file, and 'scale' is the number of "
+            "'measurement' of the case overrides the file, and 'scale' is the number of "
             f"{kind.common[0]} per '{text[:_LONGEST]}' of a sensor.",
         ) from error
 

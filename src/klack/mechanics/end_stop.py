@@ -46,10 +46,17 @@ class EndStop(Component):
     type: ClassVar[str] = "end-stop"
     ports: ClassVar[Mapping[str, Port]] = {"upper": ELEMENT, "lower": ELEMENT}
 
-    gap: Length = Field(ge=0, description="Between the parts at the start; the lift at the stop.")
-    law: StopLaw | None = Field(default=None, description="Contact law; none: only a film.")
+    gap: Length = Field(
+        ge=0, description="Gap between the parts at the start: the lift to the stop."
+    )
+    law: StopLaw | None = Field(
+        default=None, description="Contact law; without it only a film acts."
+    )
     restitution: Ratio | None = Field(
-        default=None, gt=0, le=1, description="Of rigid bodies; leave it out for modal ones."
+        default=None,
+        gt=0,
+        le=1,
+        description="Restitution of rigid bodies; leave it out for modal bodies.",
     )
     series_compliance: Compliance = Field(
         default=0.0, ge=0, description="Residual compliance of the bulk behind the faces."
@@ -72,7 +79,7 @@ class EndStop(Component):
             ("restitution",),
             got="restitution without a law",
             expected="a contact law that it applies to",
-            hint="remove it: a film alone has its own loss.",
+            hint="remove it: a film has its own loss.",
             on_key=True,
         )
         return self
@@ -85,8 +92,8 @@ class EndStop(Component):
                 ("film", "radius" if film.edge_radius is None else "edge_radius"),
                 got=f"a face that rises by {format_si(film.rise, 'm')} to its edge",
                 expected=f"a rise of the gap, {format_si(self.gap, 'm')}, or more",
-                hint="farther away the film is not that of a sphere; use shape: disc for a flat "
-                "crown, or leave edge_radius out where the sphere is whole.",
+                hint="farther away the film is not spherical; use shape: disc for a flat crown, "
+                "or leave edge_radius out for a whole sphere.",
             )
         return self
 
@@ -124,9 +131,9 @@ class EndStop(Component):
             what = "friction between the faces" if isinstance(law, RubbingLaw) else "yield"
             raise InputError(
                 "EndStop.restitution",
-                got=f"{self.restitution:g} beside {what}",
-                expected="one of them: a restitution stands for all that an impact loses",
-                hint=f"leave the restitution out; {what} and modes take the energy.",
+                got=f"{self.restitution:g} together with {what}",
+                expected="only one of them: a restitution represents all losses of an impact",
+                hint=f"leave the restitution out; {what} and modes absorb the energy.",
             )
         return HuntCrossley(law, gonthier_coefficient(self.restitution))
 

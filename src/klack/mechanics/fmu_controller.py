@@ -234,5 +234,5 @@ def _size(fmu: FmuDescription, unit: str, variable: FmuVariable) -> float:
         f"{fmu.path.name}: '{variable.name}'",
         got=f"'{other}' for a signal in '{unit}'",
         expected="units of one kind",
-        hint="change the unit of the sensor, or take another variable.",
+        hint="change the unit of the sensor, or use another variable.",
     )

@@ -112,7 +112,7 @@ class FmuCoupling:
             f"{self.slave.fmu.path.name}: coupling_step",
             got=f"{self.coupling_step:g} s, shorter than a step of {h:g} s",
             expected="at least one step of the time loop",
-            hint="enlarge it to whole macro steps, or switch those off: run: {coarse: 1}.",
+            hint="enlarge it to whole macro steps, or switch macro steps off: run: {coarse: 1}.",
         )
 
     def _not_whole(self, step: float) -> InputError:
@@ -120,7 +120,7 @@ class FmuCoupling:
             f"{self.slave.fmu.path.name}: coupling_step",
             got=f"{self.coupling_step:g} s, and an exchange after {step:g} s",
             expected="whole steps of the time loop, for an FMU with fixed steps only",
-            hint="take a whole number of macro steps (run.coarse times run.step).",
+            hint="use a whole number of macro steps (run.coarse times run.step).",
         )
 
 

@@ -91,7 +91,7 @@ def describe_fmu(path: Path) -> FmuDescription:
         raise _damaged(
             path,
             "an FMU for model exchange only",
-            "one for co-simulation, which has its own solver",
+            "an FMU for co-simulation, which has its own solver",
             "export it again as a co-simulation FMU.",
         )
     return fmu
@@ -170,7 +170,7 @@ def unpack_fmu(fmu: FmuDescription, folder: Path) -> Path:
             raise InputError(
                 str(fmu.path),
                 got=f"binaries for {', '.join(found) or 'no platform'}",
-                expected=f"one for this platform, '{library}'",
+                expected=f"a binary for this platform, '{library}'",
                 hint=f"compile its sources into it: fmpy compile {fmu.path.name}"
                 if sources
                 else "ask its supplier for a binary for this platform, or for its sources.",
@@ -213,7 +213,7 @@ def _extract(path: Path, archive: zipfile.ZipFile, folder: Path, wanted: object)
         odd = "\\" in item.filename or ":" in item.filename or "\0" in item.filename
         if odd or name.is_absolute() or ".." in name.parts:
             raise _damaged(
-                path, f"a file '{item.filename[:80]}' that leads out of its folder", "plain names"
+                path, f"a file '{item.filename[:80]}' whose path leaves its folder", "plain names"
             )
     chosen = [item for item in members if wanted(item.filename)]
     described = [item for item in chosen if item.filename == _DESCRIPTION]

@@ -104,7 +104,7 @@ class FmuProcess(Closing):
         failed, force, length = ANSWER.unpack(self._read(ANSWER.size))
         if failed:
             error, _, said = self._read(length).decode(errors="replace").partition("\0")
-            raise FmuFailed(f"failed ({error})" + (f"; it says: {said}" if said else ""))
+            raise FmuFailed(f"failed ({error})" + (f"; its output: {said}" if said else ""))
         self._watch.calls += 1
         return float(force)
 

@@ -113,7 +113,7 @@ class FmuInstance:
         name = self.fmu.path.name
         return ConvergenceError(
             f"{name}: the FMU {what}, {when}.\n"
-            f"Try: 'fmpy simulate {name}' alone, {self._advice}; a time_limit above "
+            f"Try: run only 'fmpy simulate {name}', {self._advice}, or a time_limit above "
             f"{self.time_limit:g} s if it needs that long."
         )
 

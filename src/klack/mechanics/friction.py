@@ -56,7 +56,7 @@ class GuideFriction(Component):
     )
     viscous: DampingCoefficient = Field(default=0.0, ge=0, description="Viscous part b.")
     smoothing_speed: Speed | None = Field(
-        default=None, gt=0, description="Without meaning since friction sticks; remove it."
+        default=None, gt=0, description="Obsolete, because friction sticks at rest; remove it."
     )
 
     @model_validator(mode="after")
@@ -64,8 +64,8 @@ class GuideFriction(Component):
         require_breakaway(self.coulomb, self.breakaway)
         if self.smoothing_speed is not None:
             warnings.warn(
-                "guide-friction: smoothing_speed has no meaning since friction sticks at rest. "
-                "Remove it.",
+                "guide-friction: smoothing_speed has no effect, because friction sticks at "
+                "rest. Remove it.",
                 AccuracyWarning,
                 stacklevel=2,
             )

@@ -67,12 +67,12 @@ class ImportedFmu(Component):
         description="Parameters and start values by name, in the units of the FMU.",
     )
     extrapolation: Literal["linear", "hold"] = Field(
-        default="linear", description="Force between two exchanges: linear, or hold the last one."
+        default="linear", description="Force between two exchanges: linear, or hold the last value."
     )
     time_limit: Time = Field(
         default=TIME_LIMIT,
         gt=0,
-        description="Longest time that one call of the FMU may take on the clock.",
+        description="Longest wall-clock time that one call of the FMU may take.",
     )
 
     @model_validator(mode="after")

@@ -41,8 +41,8 @@ class Lever(Component):
         "the pivot over the square of that arm.",
     )
     arms: Mapping[Name, Length] = Field(
-        description="Ports, each with its distance from the pivot; of opposite sign on the other "
-        "side."
+        description="Ports, each with its distance from the pivot, with the opposite sign on "
+        "the other side."
     )
     carried: Mapping[Name, Mass] = Field(
         default_factory=dict, description="Masses m_p that move with a port."
@@ -73,7 +73,7 @@ class Lever(Component):
             ("effective_mass",),
             got=f"a moment of inertia of {self.moment:g} kg m^2 with the carried masses",
             expected="above 0 kg m^2, and no negative mass",
-            hint="without inertia a force would move it at once.",
+            hint="without inertia a force would accelerate it without limit.",
         )
         return self
 

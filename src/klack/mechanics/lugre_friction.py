@@ -137,7 +137,8 @@ class LuGreFriction(Component):
     )
     viscous: DampingCoefficient = Field(default=0.0, ge=0, description="Viscous part sigma_2.")
     bristle_stiffness: Stiffness = Field(
-        gt=0, description="Stiffness sigma_0 about a point of rest: F_s over the presliding way."
+        gt=0,
+        description="Stiffness sigma_0 about a point of rest: F_s over the presliding distance.",
     )
     bristle_damping: DampingCoefficient = Field(
         default=0.0, ge=0, description="Damping sigma_1 of the bristles."

@@ -184,7 +184,7 @@ class NonlinearSpring(Component):
     }
 
     stiffness: Stiffness | None = Field(
-        default=None, gt=0, description="Spring rate k at no deflection; or a table."
+        default=None, gt=0, description="Spring rate k at zero deflection; or give a table."
     )
     higher: tuple[Number, ...] = Field(
         default=(),
@@ -213,15 +213,15 @@ class NonlinearSpring(Component):
             ("stiffness",),
             got="a stiffness and a table" if self.deflection else "neither stiffness nor table",
             expected="either 'stiffness' (with 'higher') or 'deflection' with 'force'",
-            hint="write one of both curves.",
+            hint="give one of the two curves.",
         )
         if bool(self.higher) != (self.reference is not None) or (self.higher and self.deflection):
             raise CaseProblem(
                 ("higher",),
                 got=f"{len(self.higher)} terms"
                 + ("" if self.reference is None else " and a reference")
-                + (" beside a table" if self.deflection else ""),
-                expected="terms of the polynomial together with 'reference', or none of both",
+                + (" together with a table" if self.deflection else ""),
+                expected="terms of the polynomial together with 'reference', or neither",
                 hint="reference: 1 mm makes higher: [0.2] add 20 % at a deflection of 1 mm.",
             )
         refuse_key_if(
@@ -268,8 +268,8 @@ class NonlinearSpring(Component):
                     valid=(first, last),
                     law=f"the table of '{rows.component}'",
                     effect=lambda value: "Its force continues with the slope at that end.",
-                    advice=f"give components.{rows.component}.deflection a wider table; it ends at "
-                    f"{format_si(first, 'm')} and {format_si(last, 'm')}.",
+                    advice=f"extend the table components.{rows.component}.deflection, which ends "
+                    f"at {format_si(first, 'm')} and {format_si(last, 'm')}.",
                     key="start",
                     start=self.start,
                     ports=((end, 1.0), (base, -1.0)),

@@ -51,8 +51,8 @@ class PrescribedMotion(Component):
     )
     file: InputPath | None = Field(
         default=None,
-        description="Instead of both: CSV file whose first two columns are time and displacement; "
-        "lines without numbers are skipped.",
+        description="Instead of time and displacement: CSV file with these as its first two "
+        "columns; lines without numbers are skipped.",
     )
     time_unit: Text | None = Field(default=None, description="Unit of the first column: ms.")
     displacement_unit: Text | None = Field(default=None, description="Of the second: um.")
@@ -100,7 +100,7 @@ class PrescribedMotion(Component):
             (key,),
             got=f"{len(place)} displacements at {len(time)} times"
             + (", not rising" if len(time) == len(place) > 1 else ""),
-            expected="one displacement for each time, at least two, rising in time",
+            expected="one displacement for each time, at least two, with increasing times",
             hint="sort the points; write a jump as a short ramp, e.g. of 1 us.",
         )
         if self.between == "smooth" and len(time) > 2:
@@ -153,7 +153,8 @@ class PrescribedMotion(Component):
                         ("file",),
                         got=f"'{line[:60]}' in line {number}",
                         expected="two numbers, time and displacement",
-                        hint="a comma, semicolon or tab between columns, a point in numbers.",
+                        hint="separate columns with a comma, semicolon or tab, and use a decimal "
+                        "point.",
                     ) from None
         table = np.array(found).reshape(-1, 2)
         refuse_key_if(

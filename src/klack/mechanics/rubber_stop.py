@@ -107,7 +107,7 @@ def rubber_stop_step(par: Any, state: Any, inp: Any, out: Any) -> int:
 class MaxwellElement(Section):
     """Spring and dashpot in series: stiff when fast, without force when slow."""
 
-    stiffness: Stiffness = Field(gt=0, description="Stiffness k_i when fast.")
+    stiffness: Stiffness = Field(gt=0, description="Stiffness k_i at high speed.")
     time: Time = Field(gt=0, description="Relaxation time tau_i; loss peaks at 1/(2 pi tau_i).")
 
 
@@ -143,13 +143,13 @@ class RubberStop(Component):
     higher: tuple[Number, ...] = Field(
         default=(),
         max_length=HIGHEST_POWER - 1,
-        description="Terms a1, a2, ... of its stiffening, none negative.",
+        description="Terms a1, a2, ... of its stiffening, not negative.",
     )
     reference: Length | None = Field(
         default=None, gt=0, description="Indentation s_r at which a term has its value."
     )
     maxwell: tuple[MaxwellElement, ...] = Field(
-        default=(), max_length=20, description="Maxwell elements beside the spring."
+        default=(), max_length=20, description="Maxwell elements in parallel with the spring."
     )
 
     @model_validator(mode="after")
@@ -162,8 +162,8 @@ class RubberStop(Component):
                 if wrong
                 else f"{len(self.higher)} terms"
                 + ("" if self.reference is None else " and a reference"),
-                expected="terms of at least 0 together with 'reference', or none of both",
-                hint="rubber stiffens; reference: 1 mm makes higher: [0.2] add 20 % there.",
+                expected="terms of at least 0 together with 'reference', or neither",
+                hint="rubber stiffens; with reference: 1 mm, higher: [0.2] adds 20 % there.",
             )
         return self
 

@@ -36,7 +36,7 @@ class LinearStopLaw(Section):
 
     kind: Literal["linear"] = Field(description="Which law: linear.")
     stiffness: Stiffness = Field(
-        examples=["1e9 N/m"], gt=0, description="Stiffness k of the contact zone alone."
+        examples=["1e9 N/m"], gt=0, description="Stiffness k of only the contact zone."
     )
 
     def contact_law(self) -> LinearLaw:
@@ -62,7 +62,9 @@ class TableStopLaw(Section):
     """Monotone curve through measured or computed points, from the origin."""
 
     kind: Literal["table"] = Field(description="Which law: table.")
-    indentation: tuple[Length, ...] = Field(min_length=1, description="Increasing, from touch on.")
+    indentation: tuple[Length, ...] = Field(
+        min_length=1, description="Indentations from first touch, increasing."
+    )
     force: tuple[Force, ...] = Field(min_length=1, description="One force per indentation.")
 
     @model_validator(mode="after")
@@ -91,7 +93,7 @@ class AsperityStopLaw(Section):
 
     kind: Literal["asperity"] = Field(description="Which law: asperity.")
     force: Force = Field(gt=0, description="F0.")
-    height: Length = Field(gt=0, description="Height s over which the force grows by e.")
+    height: Length = Field(gt=0, description="Height s over which the force grows by a factor e.")
 
     def contact_law(self) -> TableLaw:
         """Table within 2e-4 up to 100 kN and straight beyond."""

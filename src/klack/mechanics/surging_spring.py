@@ -101,7 +101,7 @@ class SurgingSpring(Component):
     preload: Force = Field(
         description="Force F0 on 'end' at the start, positive in -z (closing); negative opens."
     )
-    mass: Mass = Field(gt=0, description="Mass m of the coils that move.")
+    mass: Mass = Field(gt=0, description="Mass m of the moving coils.")
     modes: Annotated[int, Strict()] = Field(
         default=6, ge=1, le=_MOST_MODES, description="Surge modes between fixed ends."
     )

@@ -114,7 +114,8 @@ def cylinder_joint(profiles: Mapping[str, Profile], name: str) -> Joint:
             name,
             got="an edge that is not parallel to the axis, or edges of several radii",
             expected="a cylinder: straight edges of one radius",
-            hint="a cone or a flat face cannot be pressed on; draw and name the cylinder.",
+            hint="press fits on cones and flat faces are not supported; draw and name the "
+            "cylinder.",
         )
     _require_same_ends(name, one, own, two, others)
     upwards = own[0].end[1] > own[0].start[1]  # the material is on the left: inside
@@ -146,9 +147,10 @@ def flat_joint(profiles: Mapping[str, Profile], name: str, ends: tuple[str, str]
     if max(heights) - min(heights) > SAME * size or any(c.centre is not None for c in own):
         raise JointError(
             name,
-            got="an edge that is not at a right angle to the axis, or edges of several heights",
+            got="an edge that is not perpendicular to the axis, or edges at several heights",
             expected="a flat face: straight edges of one z",
-            hint="bolts press along the axis; draw and name the flat face, a cone is not computed.",
+            hint="bolts press along the axis; draw and name the flat face (cones are not "
+            "supported).",
         )
     _require_same_ends(name, one, own, two, others)
     for end in ends:
@@ -157,10 +159,11 @@ def flat_joint(profiles: Mapping[str, Profile], name: str, ends: tuple[str, str]
         if len({solid for solid, _ in curves}) != 1 or not straight:
             raise JointError(
                 name,
-                got=f"bolts between {ends[0]} and {ends[1]}, where '{end}' is no straight edge of "
+                got=f"bolts between {ends[0]} and {ends[1]}, where '{end}' is not a straight "
+                f"edge of "
                 "one part, or lies on the axis",
-                expected="two edges: one under the head, one where the thread carries",
-                hint="name these edges in the parts; a nut presses as a head does.",
+                expected="two edges: one under the head, one at the thread",
+                hint="name these edges in the parts; a nut presses like a head.",
             )
     upper = own[0].end[0] > own[0].start[0]  # the material is on the left: above
     return FlatJoint(
@@ -185,8 +188,7 @@ def _require_same_ends(
             name,
             got=f"edges of '{one}' and '{two}' with different ends",
             expected="the same two ends in both parts",
-            hint="end the edge of either part where the other one ends, as for parts that are "
-            "glued.",
+            hint="end the edges of both parts at the same points, as for glued parts.",
         )
 
 

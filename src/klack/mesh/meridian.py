@@ -130,7 +130,7 @@ def _require_no_overlap(profiles: Mapping[str, Profile], shape: Any) -> None:
             "mesh_meridian: profiles",
             got=f"{regions} from {len(profiles)} profiles",
             expected=f"one region per profile, {expected:.6g} mm^2 (no overlap)",
-            hint="let neighbouring solids share their common edge and nothing else.",
+            hint="let neighbouring solids share only their common edge.",
         )
 
 

@@ -157,7 +157,7 @@ class Mesh:
         """Surface of a name."""
         if name not in self.surfaces:
             known = ", ".join(sorted(self.surfaces)) or "none"
-            got, hint = "a name that the mesh does not have", "check the spelling, or name the face"
+            got, hint = "a name that is not in the mesh", "check the spelling, or name the face"
             if name in self.node_sets:
                 got, hint = "a set of nodes, which has no faces", "name its faces as a surface"
             raise InputError(
@@ -179,7 +179,7 @@ class Mesh:
                 "mesh: rigid displacement",
                 got="an axisymmetric body",
                 expected="a solid",
-                hint="take 'model: swept' with 'layers: 18'; a shift along z is 'moved'.",
+                hint="use 'model: swept' with 'layers: 18'; for a shift along z use 'moved'.",
             )
         return replace(self, points=pose.of(self.points))
 

@@ -268,7 +268,7 @@ class Profile:
         if name not in self.names:
             raise InputError(
                 f"Profile.surface_area('{name}')",
-                got="a name that the profile does not have",
+                got="a name that is not in the profile",
                 expected=f"one of: {', '.join(self.names) or 'none'}",
                 hint="name the edge where the profile is made.",
             )
@@ -307,7 +307,7 @@ def _chain(start: Point, edges: tuple[Line | Arc, ...]) -> tuple[Curve, ...]:
             "Profile.edges",
             f"{len(edges)} edges" if len(edges) < 2 else "a coordinate that is not finite",
             "at least two edges with finite (r, z) in m",
-            "list the edges in turn, each with its end point.",
+            "list the edges in order, each with its end point.",
         )
     size = float(np.ptp(corners, axis=0).max())
     if np.linalg.norm(corners[-1] - corners[0]) > SAME * size:
@@ -329,7 +329,7 @@ def _chain(start: Point, edges: tuple[Line | Arc, ...]) -> tuple[Curve, ...]:
                 where,
                 f"a radius of {lowest * 1e3:.6g} mm",
                 "r >= 0 everywhere",
-                "draw the half of the section that lies at positive r.",
+                "draw the half of the section at positive r.",
             )
         curves.append(curve)
     return tuple(curves)
@@ -341,9 +341,9 @@ def _curve(where: str, start: NDArray, end: NDArray, edge: Line | Arc, size: flo
     if np.linalg.norm(end - start) <= SAME * size:
         raise _error(
             where,
-            "an edge without length",
+            "an edge of zero length",
             "different start and end",
-            "remove it; a full circle needs two arcs.",
+            "remove the edge; a full circle needs two arcs.",
         )
     if isinstance(edge, Line):
         return Curve(first, last, edge.name)
@@ -355,7 +355,7 @@ def _curve(where: str, start: NDArray, end: NDArray, edge: Line | Arc, size: flo
             where,
             f"a centre {ra * 1e3:.6g} mm from the start and {rb * 1e3:.6g} mm from the end",
             "the same distance (the radius) to both",
-            "the centre lies on the perpendicular bisector of start and end.",
+            "the centre must lie on the perpendicular bisector of start and end.",
         )
     angle = float(np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b))
     # put the centre on the bisector exactly, so that both ends lie on one circle
@@ -410,5 +410,5 @@ def _raise_crossing(curves: tuple[Curve, ...], i: int, j: int, point: NDArray) -
         f"Profile: edges {i + 1} '{curves[i].name}' and {j + 1} '{curves[j].name}'",
         f"a common point at {_text(point)}",
         "edges that meet only at the corners that join them",
-        "check the order of the edges and the sense of the arcs.",
+        "check the order of the edges and the direction of the arcs.",
     )

@@ -268,7 +268,7 @@ def require_positive_jacobians(
             f"{where}: element {number} ({block.family}, solid '{block.solid}') at {_place(place)}",
             got=f"a smallest scaled Jacobian of {quality:.3g}",
             expected=f"above {smallest:g} (1 is ideal, below 0 is inverted)",
-            hint="mesh finer where the boundary is curved, or check the order of the nodes.",
+            hint="refine the mesh where the boundary is curved, or check the order of the nodes.",
         )
         error.elements = mesh.element_count
         raise error

@@ -95,7 +95,7 @@ class MeshSizing:
                 "MeshSizing.grading",
                 got=f"{self.grading:g}",
                 expected="a number above 0 and up to 1",
-                hint="0.3 is usual; smaller grows slower.",
+                hint="0.3 is usual; smaller values grow more slowly.",
             )
 
     @property
@@ -110,7 +110,7 @@ class MeshSizing:
             if name not in known:
                 raise InputError(
                     f"MeshSizing.surfaces['{name}']",
-                    got="a name that the geometry does not have",
+                    got="a name that is not in the geometry",
                     expected=f"one of: {', '.join(sorted(set(known))) or 'none'}",
                     hint="check the spelling, or name the face in the CAD file.",
                 )
@@ -242,7 +242,7 @@ def require_meshable(
     require_memory(
         f"{where}: {worst}",
         needed,
-        what=f"{format_si(size, 'm', 3)}, which gives some {total:.1g} elements, a mesh",
+        what=f"{format_si(size, 'm', 3)}, which gives about {total:.1g} elements, a mesh",
         hint=f"a 'mesh: {worst}' of {format_si(fitting, 'm', 2)} or more; check its unit.",
     )
 

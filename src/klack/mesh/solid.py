@@ -128,7 +128,7 @@ def _require_areas(where: str, shape: Any) -> None:
         if not face.mass > _NO_AREA:
             raise InputError(
                 where,
-                got=f"face '{name}' without area",
+                got=f"face '{name}' with zero area",
                 expected="closed solids",
                 hint="export it again; open it in a CAD program and repair it.",
             )
@@ -209,7 +209,8 @@ def _require_upright(where: str, shape: Any, names: tuple[str, ...]) -> None:
                 f"{where}: solid '{name}'",
                 got=f"a volume of {solid.mass:.6g} mm^3",
                 expected="a volume above 0 (normals that point outwards)",
-                hint="the solid is inside out or not closed: reverse or heal it in CAD.",
+                hint="the solid is inside out or not closed: reverse or heal it in the CAD "
+                "program.",
             )
 
 
@@ -261,7 +262,7 @@ def _abaqus_order(points: NDArray[np.float64], nodes: NDArray[np.int64]) -> NDAr
     if len(set(order.tolist())) != 6:
         raise InputError(
             "netgen mesh",
-            got="mid nodes that are not near the middle of one edge each",
+            got="mid nodes that are not each near the middle of one edge",
             expected="one mid node per edge",
             hint="choose a smaller element size.",
         )

@@ -24,7 +24,7 @@ def solid_joint(mesh: Mesh, name: str) -> Joint:
     points, sizes, ways = faces.points, faces.sizes, faces.ways
     centre, extent = points.mean(axis=0), faces.extent
     if sizes[1] < _FLAT * sizes[2]:
-        raise _no_cylinder(name, "a flat face, or one that is hardly round")
+        raise _no_cylinder(name, "a flat face, or one with very little curvature")
 
     def cylinder(x: Floats) -> tuple[Floats, Floats]:
         axis = ways[:, 0] + ways[:, 1:] @ x[:2]
@@ -38,7 +38,7 @@ def solid_joint(mesh: Mesh, name: str) -> Joint:
     radius = extent * float(found.x[4])
     out = np.einsum("fi,fi->f", faces.normal, across(faces.middle, middle, axis))
     if np.abs(found.fun).max() * extent > _EVEN * radius or out.min() * out.max() <= 0.0:
-        raise _no_cylinder(name, "faces that are not one cylinder")
+        raise _no_cylinder(name, "faces that do not form one cylinder")
     one, two = faces.solids
     return Joint(
         name=name,
@@ -146,5 +146,6 @@ def _no_cylinder(name: str, got: str) -> JointError:
         name,
         got=got,
         expected="a cylinder: faces of one radius round one axis",
-        hint="a cone or a flat face cannot be pressed on; name the cylinder in the CAD file.",
+        hint="press fits on cones and flat faces are not supported; name the cylinder in the CAD "
+        "file.",
     )

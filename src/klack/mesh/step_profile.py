@@ -60,7 +60,7 @@ def _profile(where: str, solid: Any, faces: list[tuple[str, Any]]) -> Profile:
     cut = _cut(solid, low, high)
     if len(cut.faces) != 1 or len(cut.faces[0].wires) != 1:
         outlines = sum(len(face.wires) for face in cut.faces)
-        raise _not_turned(where, f"{outlines} outlines beside the z axis")
+        raise _not_turned(where, f"{outlines} outlines next to the z axis")
     curves = _chained(where, [_curve(where, edge, size) for edge in cut.edges], size)
     named = [_edge(curve, "" if on_axis(curve) else _name_at(curve, faces)) for curve in curves]
     profile = Profile(curves[0].start, tuple(named))
@@ -73,7 +73,9 @@ def _profile(where: str, solid: Any, faces: list[tuple[str, Any]]) -> Profile:
     ):
         if abs(found - expected) > _SAME * abs(expected):
             share = 100.0 * (expected / found - 1.0)
-            raise _not_turned(where, f"a {what} that differs by {share:.2g} % from that of a turn")
+            raise _not_turned(
+                where, f"a {what} that differs by {share:.2g} % from a body of revolution"
+            )
     return profile
 
 
@@ -152,7 +154,7 @@ def _chained(where: str, curves: list[Curve], size: float) -> list[Curve]:
                 walk.append(onward)
                 break
         else:
-            raise _not_turned(where, "an outline that does not close")
+            raise _not_turned(where, "an outline that is not closed")
     return [
         Curve(walk[i - 1].end, curve.end, "", curve.centre, curve.angle)
         for i, curve in enumerate(walk)

@@ -49,7 +49,7 @@ def _require_entities(path: Path) -> None:
     if missing := named - defined.keys():
         raise _refuse(path, f"a damaged STEP file: entity #{min(missing)} is missing")
     if twice := [number for number, count in defined.items() if count > 1]:
-        raise _refuse(path, f"a damaged STEP file: entity #{min(twice)} is there twice")
+        raise _refuse(path, f"a damaged STEP file: entity #{min(twice)} is defined twice")
 
 
 @cache  # a file that was refused is tried again: memory may have been short

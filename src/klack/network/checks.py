@@ -198,8 +198,8 @@ def _check_drive(components: Mapping[str, Component], node: Node) -> None:
             key,
             got=f"{_and([*drivers, *coils])} in one circuit",
             expected="one driver and one coil",
-            hint="give every coil its own driver, they may have equal settings; coils of one "
-            "magnetic-network without 'circuit' are in series.",
+            hint="give every coil a driver of its own, with equal settings if you like; coils of "
+            "one magnetic-network without 'circuit' are in series.",
         )
 
 
@@ -255,7 +255,7 @@ def check_rows(rows: Rows) -> None:
         refuse_key_if(
             interface.gap < -_TOUCHING,
             ("components", interface.component),
-            got=f"a gap of {format_si(interface.gap, 'm')} at the start: closed already",
+            got=f"a gap of {format_si(interface.gap, 'm')} at the start: already closed",
             expected="a gap of 0 or more",
             hint="start in contact (gap 0): a preload then compresses the stop.",
         )
@@ -276,7 +276,7 @@ def _check_driven(rows: Rows) -> None:
         refuse_key_if(
             driven & sides and sides <= fixed,
             ("components", component),
-            got="a prescribed motion on one side, and nothing that gives way on the other",
+            got="a prescribed motion on one side, and nothing that can yield on the other",
             expected="a body that its force can move",
             hint="leave it out, or give the other side a mass on a spring.",
         )
@@ -316,8 +316,8 @@ def _check_junctions(rows: Rows) -> None:
             raise CaseProblem(
                 ("components", moving[0]),
                 got=f"a face that moves at the junction '{row.component}', which has no volume",
-                expected="a chamber there: the face takes and leaves room for fluid",
-                hint="replace the junction by a chamber of the volume before the face.",
+                expected="a chamber there: the moving face displaces fluid",
+                hint="replace the junction with a chamber of the volume in front of the face.",
             )
 
 

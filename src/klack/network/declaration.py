@@ -159,7 +159,7 @@ class NetworkSection(Section):
         default=None, description="Fluid of the valve; none: a dry valve."
     )
     gas: Annotated[Any, BeforeValidator(_read_gas), LateGas()] = Field(
-        default=None, description="Gas of pneumatic components; none without them."
+        default=None, description="Gas of pneumatic components; not needed without them."
     )
     components: Mapping[Name, AnyComponent] = Field(
         min_length=1, description="name: {type: ..., and the keys of that type}."

@@ -112,7 +112,7 @@ def _node(
     refuse_key_if(
         not joints,
         ("connections", index),
-        got=f"no port beside {one_of(words)}",
+        got=f"no port other than {one_of(words)}",
         expected="at least one port of a component",
         hint="remove the connection, or add the missing port.",
     )
@@ -125,9 +125,9 @@ def _mixed_fluids(index: int, domains: Mapping[str, str]) -> CaseProblem:
     return CaseProblem(
         ("connections", index),
         got=" with ".join(f"{name} ({words.get(d, d)})" for name, d in domains.items()),
-        expected="ports of liquid alone, or of gas alone",
-        hint="they meet through a body: a pressure-face on the side of the liquid and a gas-face "
-        "on that of the gas; or take an accumulator, which has its gas inside.",
+        expected="only liquid ports, or only gas ports",
+        hint="join them through a body, with a pressure-face on the liquid side and a gas-face "
+        "on the gas side; or use an accumulator, which contains its own gas.",
     )
 
 
@@ -157,8 +157,8 @@ def _joint(key: tuple[str | int, ...], text: str, ports: Mapping[str, Mapping[st
             hint=nearest(
                 text,
                 full,
-                "a component has the ports of its type, and some only with certain "
-                "keys: supply of a boost-driver without a capacitance of its own.",
+                "a component has the ports of its type, some only with certain keys: a "
+                "boost-driver has 'supply' only without a capacitance of its own.",
             ),
         )
     return Joint(component, name, known[name])
@@ -172,7 +172,7 @@ def _example(text: str, ports: Mapping[str, Mapping[str, Port]]) -> str:
 def _joined_twice(key: tuple[str | int, ...], joint: Joint, first: int) -> CaseProblem:
     return CaseProblem(
         key,
-        got=f"{joint} a second time (first in connections[{first}])",
+        got=f"{joint} for the second time (first in connections[{first}])",
         expected="each port in one connection",
         hint="list all ports that meet there together: [a.x, b.y, c.z].",
     )

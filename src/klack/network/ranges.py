@@ -251,8 +251,8 @@ def _liquids(rows: Rows) -> list[LimitRow]:
             law=f"liquid '{fluid.name}' in '{row.component}'",
             source=f"absolute; it boils at {boils}",
             effect=_flows_out if row.prescribed else _begins,
-            advice="pressures are absolute: add that of the surroundings, usually 1.013 bar, to "
-            "a gauge pressure; check the temperature of the fluid.",
+            advice="pressures are absolute: add the ambient pressure, usually 1.013 bar, to a "
+            "gauge pressure; check the temperature of the fluid.",
             node=node,
             at_start=not row.prescribed,
         )
@@ -262,11 +262,11 @@ def _liquids(rows: Rows) -> list[LimitRow]:
 
 
 def _flows_out(pressure: float) -> str:
-    return "What flows from there is vapour, in part or all."
+    return "The flow from there is partly or wholly vapour."
 
 
 def _begins(pressure: float) -> str:
-    return "It begins with vapour, in part or all."
+    return "At the start it holds vapour, partly or wholly."
 
 
 def _gives_fluid(rows: Rows) -> bool:

@@ -746,7 +746,7 @@ class Rows:
     def _two_kinds(other: str, junction: str) -> InputError:
         return InputError(
             f"components.{junction}",
-            got=f"a junction where '{other}' is as well",
+            got=f"a junction at the same node as '{other}'",
             expected="one junction, or a volume, at one node",
             hint="remove the junction: where there is a volume, lines meet without one.",
         )

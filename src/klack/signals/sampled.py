@@ -75,7 +75,7 @@ class Spectrum:
             self.frequency.shape != self.values.shape or self.frequency.size < 2,
             f"Spectrum '{self.name}'",
             got=f"{self.frequency.size} frequencies and {self.values.size} values",
-            expected="the same number of both, at least two",
+            expected="an equal number of both, at least two",
             hint="use klack.acoustics.spectrum to make spectra from time series.",
         )
 

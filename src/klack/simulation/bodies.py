@@ -108,7 +108,7 @@ def rod_body(
             f"rod_body '{name}': support",
             got=repr(support),
             expected="'free' or 'bottom'",
-            hint="a seat body is fixed at the bottom and touched at the top.",
+            hint="a seat body is fixed at the bottom and has its contact at the top.",
         )
     return ReducedBody(
         name=name,

@@ -85,7 +85,7 @@ class ControlLoop:
                     f"{running.row.component}: controller",
                     got=f"the output {found!r} at {format_si(time, 's', 8)}",
                     expected="a finite number" + (" above 0 Pa" if running.least == 0.0 else ""),
-                    hint="check its law or function, and what it does with its signals.",
+                    hint="check its law or function, and how it uses its signals.",
                 )
             change = found - running.target[running.place]
             running.target[running.place] = found
@@ -147,7 +147,7 @@ class ControlLoop:
                 ("components", row.component, "sample_time"),
                 got=format_si(row.period, "s", 8),
                 expected=f"a whole number of steps of {format_si(self._look, 's', 8)}",
-                hint="choose one, or another run.step, run.coarse or run.record.",
+                hint="choose such a time, or another run.step, run.coarse or run.record.",
             )
         places = [self._column(row, i) for i in range(len(row.channels))]
         target, place, pushed = self._actuator(row)
@@ -171,7 +171,7 @@ class ControlLoop:
                 (*key, "channel"),
                 got=f"'{name}'",
                 expected="a recorded channel: a displacement, velocity, force, pressure or current",
-                hint=nearest(name, self._names, f"there are: {', '.join(self._names)[:600]}."),
+                hint=nearest(name, self._names, f"available are: {', '.join(self._names)[:600]}."),
             )
         column = self._names.index(name)
         si = self._units[column]

@@ -234,7 +234,10 @@ def _sentence(
     names = " and ".join(f"'{passage.row.component}'" for passage in named if passage.row)
     thin = ""
     if any(passage.liquid.thin for passage in named):
-        thin = " A hole counts as one in a thin plate: longer ones hold more; give its length."
+        thin = (
+            " A hole is taken as one in a thin plate; longer holes contain more liquid: give "
+            "the length."
+        )
     others = "".join(f" and '{name}'" for name in along)
     weight = format_si(1e3 * whole, "g", 3)
     at = f"at '{row.component}', where {weight} move together" if along else f"on its {weight}"

@@ -55,8 +55,8 @@ def check_energy_balance(
         faults.append(f"has a loss that returned {abs(least_loss):.1e} of it")
     if faults:
         warnings.warn(
-            f"{run}: the energy balance {' and '.join(faults)}, more than the {kept:.0e} to "
-            f"which this solver keeps it. Try: {advice}.",
+            f"{run}: the energy balance {' and '.join(faults)}, more than the {kept:.0e} that "
+            f"this solver normally achieves. Try: {advice}.",
             AccuracyWarning,
             stacklevel=3,
         )

@@ -287,9 +287,9 @@ def _preloaded(
         if np.any(np.abs(force[~held]) > _UNBALANCED * np.abs(contact_force[own]).max()):
             raise InputError(
                 f"preload of '{block.body.name}'",
-                got=f"{loads.max():g} N that nothing balances",
-                expected="a spring or a constant force that presses the body as much",
-                hint="add it, or leave the preload out.",
+                got=f"{loads.max():g} N that is not balanced",
+                expected="a spring or a constant force that presses the body equally",
+                hint="add this force, or leave the preload out.",
             )
         q[own] = np.where(held, force / np.where(held, w[own], 1.0) ** 2, 0.0) - block.rest
     closed = [_indentation(contact.law, contact.preload) for contact in system.contacts]
@@ -412,7 +412,7 @@ def simulate(
             f"simulate: velocity of '{name}'",
             got="a supported body",
             expected="a free body",
-            hint="only unsupported bodies can move as a whole.",
+            hint="only unsupported bodies can have a speed.",
         )
     flat = flatten(system, velocities, step)
     refuse_if(
@@ -420,7 +420,7 @@ def simulate(
         "simulate: system",
         got="bodies without a single mode",
         expected="at least one body that can move",
-        hint="a wall needs a needle that hits it.",
+        hint="add the needle that hits the wall.",
     )
     records = int(np.ceil(duration / (step * steps_per_record) * (1.0 - 1e-12)))
     contacts = len(system.contacts)
@@ -474,7 +474,7 @@ def simulate(
         ledger.residual,
         ledger.least_loss,
         limit=_BALANCE,
-        advice="a shorter step; bodies and laws of very different magnitudes cost digits",
+        advice="a shorter step; very different magnitudes of bodies and laws reduce the accuracy",
     )
     return SystemRecord(
         system=system,

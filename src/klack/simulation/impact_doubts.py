@@ -71,10 +71,11 @@ def impact_doubts(
         if late > _LATE:
             shorter = min(_rounded_down(step * sqrt(_AIM * _LATE / late)), step)
             yield (
-                f"{_named(event)} depends on the steps: before it left the stop the needle swung "
-                f"on it {times} times, each {format_si(period, 's', 2)} long, which its steps "
-                f"shift by about {format_si(late, 's', 1)} in all. Try: run.step: "
-                f"{format_si(shorter, 's', 3)}; or the restitution of the stop, which damps it."
+                f"{_named(event)} depends on the steps: before leaving the stop the needle "
+                f"oscillated on it {times} times, each {format_si(period, 's', 2)} long, and the "
+                f"steps shift this by about {format_si(late, 's', 1)} in total. Try: run.step: "
+                f"{format_si(shorter, 's', 3)}; or a restitution of the stop, which damps the "
+                "oscillation."
             )
         if event.contact_time < _FEWEST * _step_at(record, event.peak_time):
             yield _unresolved(event, _step_at(record, event.peak_time))
@@ -91,7 +92,7 @@ def impact_doubts(
             if at_touch
             else "the force rises and falls within a few steps"
         )
-        better = f"; or count with about {format_si(event.peak_force * (1.0 + share), 'N', 4)}"
+        better = f"; or assume about {format_si(event.peak_force * (1.0 + share), 'N', 4)}"
         is_known = at_touch or share <= _TRUSTED
         yield (
             f"{_named(event)} is too low by {'about ' if is_known else ''}{100.0 * share:.2g} %"

@@ -109,10 +109,10 @@ class _Assembly:
         refuse_if(
             nodes.slow_gas,
             "linearisation: fluid with release_time and absorption_time",
-            got="gas that leaves and enters the liquid over time",
-            expected="a fluid whose density follows from the pressure alone",
-            hint="leave both times out: for fast changes the gas is free, or, with "
-            "release_pressure and saturation_pressure alone, in equilibrium.",
+            got="gas that is released and absorbed over time",
+            expected="a fluid whose density depends only on the pressure",
+            hint="leave both times out: for fast changes the gas is free, or, with only "
+            "release_pressure and saturation_pressure, in equilibrium.",
         )
         self.p = network.node_state.p.copy()
         self.fluid = fluids_at(nodes.fluid, self.p) if self.p.size else np.zeros((0, 3))
@@ -151,12 +151,12 @@ class _Assembly:
             self.doubts.append(
                 f"'{row.component}' is not smooth at this point: its responses to a small change "
                 f"up and down differ by {percent_text(found.kink)} (hysteresis, an edge, or a "
-                "valve about to open). The linear law is the mean of both."
+                "valve about to open). The linear law is the mean of the two."
             )
         if found.doubt > _DOUBT:
             self.doubts.append(
                 f"the linear law of '{row.component}' changes by {percent_text(found.doubt)} "
-                "with the time step that it is taken from: something in it is faster than the step."
+                "with the time step used to derive it: part of it is faster than the step."
             )
         return found
 
@@ -171,10 +171,10 @@ class _Assembly:
             refuse_if(
                 at.kind[c] != NO_LAW and abs(gap[c]) <= _TOUCHING,
                 f"linearisation: components.{name}",
-                got="faces that just touch without a force",
+                got="faces that just touch without force",
                 expected="a contact that is closed by a force, or open",
-                hint="hold the body at another lift (--lift), or change a load a little: about "
-                "such a point stiffness and damping jump.",
+                hint="hold the body at another lift (--lift), or change a load slightly: "
+                "stiffness and damping jump at such a point.",
             )
             if force[c] > 0.0:
                 pressed = -float(slope[c])
@@ -187,8 +187,8 @@ class _Assembly:
                     )
                 if force[c] < _WEAK:
                     self.doubts.append(
-                        f"the contact '{name}' is about to open: it is closed by "
-                        f"{format_si(float(force[c]), 'N', 3)} only."
+                        f"the contact '{name}' is about to open: it is closed by only "
+                        f"{format_si(float(force[c]), 'N', 3)}."
                     )
             else:
                 if at.kind[c] != NO_LAW and gap[c] < _NEARLY:
@@ -203,8 +203,8 @@ class _Assembly:
             if slider.breakaway > 0.0:
                 self.doubts.append(
                     f"'{slider.component}' has dry friction, which holds a body at rest against "
-                    f"less than {format_si(slider.breakaway, 'N', 3)}: the linear model is that of "
-                    "motions that slide, with the viscous part alone."
+                    f"less than {format_si(slider.breakaway, 'N', 3)}: the linear model "
+                    "describes sliding motion, with only the viscous part."
                 )
         for i in range(self.network.nodes.volumes):
             if self.junction[i]:

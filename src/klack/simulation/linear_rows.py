@@ -129,9 +129,9 @@ def linear_row(at: RowPoint, h: float) -> LinearRow:
     refuse_if(
         not is_step_function(at.row.step),
         f"components.{at.row.component}",
-        got="a component that runs outside of compiled code (Python, or an FMU)",
+        got="a component that runs outside compiled code (Python, or an FMU)",
         expected="components with derivatives, for a linearisation",
-        hint="replace it by springs, masses and forces of klack about this point.",
+        hint="replace it with springs, masses and forces of klack about this point.",
     )
     sides = []
     for step in (h, 0.5 * h):
@@ -245,7 +245,7 @@ def _address(row: ElementRow | BranchRow) -> int:
             got="a step function that cannot carry derivatives: "
             + " ".join(str(error).split())[:200],
             expected="arithmetic and functions of math that klack differentiates",
-            hint="write it without ceil, floor and arrays of its own; int(x) rounds down.",
+            hint="write it without ceil, floor and local arrays; int(x) rounds down.",
         ) from error
 
 

@@ -100,7 +100,7 @@ class Mode:
     root [1/s]
         Imaginary part zero or above.
     uncertainty [1/s]
-        By which round-off may move it.
+        Possible shift by round-off.
     participation
         By component, the largest first; they add up to one.
     """

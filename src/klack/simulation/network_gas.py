@@ -47,9 +47,9 @@ def require_chambers(rows: Rows) -> None:
     if wrong:
         raise InputError(
             f"{wrong[0]}: fluid with release_time and absorption_time",
-            got="a part that holds fluid with all of its gas free",
-            expected="chambers, openings, pumps and given pressures only",
-            hint="leave both times out, or put a chamber and an inertance in its place.",
+            got="a part whose fluid has all of its gas free",
+            expected="only chambers, openings, pumps and prescribed pressures",
+            hint="leave both times out, or replace the part with a chamber and an inertance.",
         )
 
 

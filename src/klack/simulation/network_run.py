@@ -288,9 +288,9 @@ def simulate_network(
     for name, faces in result.faces.items():
         if faces.force > faces.known_force:
             warnings.warn(
-                f"the faces of '{name}' were pressed by {format_si(faces.force, 'N', 3)}, but what "
-                f"yield does to them is computed up to {format_si(faces.known_force, 'N', 3)} "
-                f"only; their law is a straight line from there. Raise the speed of stop '{name}'.",
+                f"the faces of '{name}' were pressed by {format_si(faces.force, 'N', 3)}, but "
+                f"their yield is computed only up to {format_si(faces.known_force, 'N', 3)}; "
+                f"beyond that their law is a straight line. Raise the speed of stop '{name}'.",
                 AccuracyWarning,
                 stacklevel=2,
             )
@@ -808,8 +808,8 @@ def restore_state(network: CompiledNetwork, clock: NDArray[np.int64], state: Sta
                 f"state: {key}",
                 got=came,
                 expected=f"shape {target.shape}",
-                hint="continue with the same network, step and coarse as those of the state, and "
-                "with its version of klack.",
+                hint="continue with the network, step, coarse and version of klack of the "
+                "stored state.",
             )
         target[...] = state[key]
     if f"{_SLIDERS}seen" not in state:  # of an earlier version

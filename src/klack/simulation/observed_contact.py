@@ -91,7 +91,7 @@ def observed_impact(
         "contact with a node as output",
         got=f"a gap that closes by {-opened:.3g} m when 1 N pushes the bodies apart for a step",
         expected="a node that moves with the load",
-        hint="take a node at the contact surface.",
+        hint="use a node on the contact surface.",
     )
     q, v = np.zeros(omega.size), np.zeros(omega.size)
     v[: upper.rigid_count] = -speed * upper.rigid_axial

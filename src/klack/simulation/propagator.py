@@ -73,7 +73,7 @@ def modal_propagator(
             "modal_propagator",
             got=f"{w.size} frequencies and {z.size} damping ratios, the least being "
             f"{w.min(initial=0):g} rad/s and {z.min(initial=0):g}",
-            expected="as many of both, none below zero",
+            expected="an equal number of both, none below zero",
             hint="give one damping ratio per mode.",
         )
     A11, A12, A21, A22, B1, S, SS = _matrices(w.tobytes(), z.tobytes(), float(step)).copy()

@@ -907,7 +907,7 @@ class _Balance:
                 depth > _DEEP * way > 0.0,
                 f"static equilibrium: components.{row.component}",
                 got=f"bodies pressed {format_si(float(depth), 'm', 3)} into each other",
-                expected=f"less than {_DEEP:g} times {format_si(way, 'm', 3)}, the whole "
+                expected=f"less than {_DEEP:g} times {format_si(way, 'm', 3)}, the total "
                 "clearance between the stops",
                 hint="check the stiffness of the stop and the forces at time zero, with their "
                 "units.",
@@ -1039,8 +1039,8 @@ class _Balance:
             filled = abs(float(p[i]) - ambient) > _FILLED * ambient
             if not (column or filled or self.given[i]):
                 told.append(
-                    f"'{names[i]}' is closed at the start: it starts at ambient "
-                    "pressure; give its 'pressure' if that differs."
+                    f"'{names[i]}' is closed at the start and starts at ambient pressure; give "
+                    "its 'pressure' if it differs."
                 )
         return tuple(told)
 
@@ -1061,19 +1061,19 @@ def _unheld(network: CompiledNetwork, bodies: list[int]) -> InputError:
         got=f"{' and '.join(names)}, unsupported against the forces at time zero",
         expected="a spring, a stop or enclosed fluid in the direction of the force, or friction "
         "above it",
-        hint="check the signs of preloads and forces (positive opens; the preload of a "
-        "spring closes), add a stop, let the force start later, or give the body a 'speed': then "
+        hint="check the signs of preloads and forces (positive opens; the preload of a spring "
+        "closes), add a stop, let the force start later, or give the body a 'speed', with which "
         "it starts in flight.",
     )
 
 
 def _out_of_range(limit: LimitRow, value: float) -> ConvergenceError:
     return ConvergenceError(
-        f"static equilibrium: {limit.component}: none found with a {limit.quantity} in the "
-        f"range of {limit.law}, {range_text(limit)}; the forces at time zero lead to "
+        f"static equilibrium: {limit.component}: none found with a {limit.quantity} in the range "
+        f"of {limit.law}, {range_text(limit)}; the forces at time zero lead to "
         f"{value_text(value, limit.unit)} and beyond.\n"
-        f"Try: {limit.advice} Or check for a magnet that is stronger at the start than the "
-        "stop that supports it."
+        f"Try: {limit.advice} Or check for a magnet whose force at the start exceeds that of the "
+        "supporting stop."
     )
 
 
@@ -1089,10 +1089,10 @@ def _without_outlet(network: CompiledNetwork, nodes: list[int]) -> InputError:
     names = [f"'{network.rows.nodes[network.node_order[i]].component}'" for i in nodes]
     return InputError(
         "operating point",
-        got=f"{' and '.join(names)} with a flow that is forced in or out, which no pressure up to "
+        got=f"{' and '.join(names)} with a forced flow in or out that no pressure up to "
         f"{format_si(_MOST_STEADY, 'Pa')} balances",
-        expected="a way for the fluid to a source or the surroundings that is open at rest and "
-        "wide enough",
+        expected="a path for the fluid to a source or to ambient that is open at rest and wide "
+        "enough",
         hint="open the valve there (another current, or another start), or replace the flow-source "
         "by a pressure-source.",
     )
@@ -1104,5 +1104,5 @@ def _emptied(network: CompiledNetwork, node: int, volume: float) -> InputError:
         f"components.{name}.volume",
         got=f"{format_si(volume, 'm^3', 3)} with its walls at their start positions",
         expected="more than 0 m^3",
-        hint="enlarge it: it is the volume with all faces at displacement 0.",
+        hint="enlarge the volume: it is measured with all faces at displacement 0.",
     )

@@ -64,14 +64,14 @@ def step_sizes(
             "accuracy",
             got=repr(accuracy),
             expected="one of: " + ", ".join(ACCURACIES),
-            hint="normal is right for most; fine takes about four times as long.",
+            hint="'normal' suits most cases; 'fine' takes about four times as long.",
         )
     if coarse is not None and coarse < 1:
         raise InputError(
             "coarse",
             got=str(coarse),
             expected="1 or more",
-            hint="1 switches macro steps off; left out, klack chooses.",
+            hint="1 switches macro steps off; without the key, klack chooses.",
         )
     h = fine_step(accuracy, step)
     chosen = _chosen(rows, ACCURACIES[accuracy][1], h) if coarse is None else coarse
@@ -93,7 +93,7 @@ def scaled(rows: Rows, sizes: StepSizes, factor: float) -> StepSizes:
             "steps twice as long",
             got=f"an exchange every {format_si(interval, 's')}",
             expected=f"whole steps of {format_si(factor * macro, 's')} in it",
-            hint="choose run.coarse so that an even number of macro steps makes the interval.",
+            hint="choose run.coarse to fit an even number of macro steps into the interval.",
         )
     return replace(sizes, step=factor * sizes.step, middle=1 if factor > 1.0 else sizes.middle)
 

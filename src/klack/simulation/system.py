@@ -56,9 +56,8 @@ class ContactPair:
         refuse_if(
             self.preload > 0.0 and (self.gap > 0.0 or self.series_compliance > 0.0),
             where,
-            got=f"a preload of {self.preload:g} N beside a gap or a series compliance",
-            expected="a contact that is closed at the start, all of whose compliance is in "
-            "modes and law",
+            got=f"a preload of {self.preload:g} N together with a gap or a series compliance",
+            expected="a contact that is closed at the start, with all compliance in modes and law",
             hint="leave one of them out.",
         )
         refuse_if(
@@ -157,8 +156,8 @@ class ReducedSystem:
         if remembering and (len(self.contacts) > 1 or remembering[0].series_compliance > 0.0):
             raise InputError(
                 f"contact {remembering[0].body_a}.{remembering[0].port_a}",
-                got="a law with memory beside other contacts or a series compliance",
-                expected="one contact, all of whose compliance is in modes and law",
+                got="a law with memory together with other contacts or a series compliance",
+                expected="one contact, with all compliance in modes and law",
                 hint="leave friction and yield of the faces out.",
             )
 

@@ -287,9 +287,9 @@ def _difference(
 def _jumps(name: str) -> InputError:
     return InputError(
         name,
-        got="a parameter with which numbers of the valve jump or bend: a table gets other points, "
-        "has a corner there, or the valve another start",
-        expected="one with which they change smoothly",
+        got="a parameter on which numbers of the valve depend with a jump or a kink: table "
+        "points change, a table has a corner there, or the start of the valve changes",
+        expected="a parameter on which they depend smoothly",
         hint="klack study with a few values of it computes the valve at each of them.",
     )
 

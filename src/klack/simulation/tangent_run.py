@@ -301,7 +301,8 @@ def run_tangents(
         "sensitivities",
         got="a component that calls Python or an FMU",
         expected="compiled components only",
-        hint="klack study with a few values of each parameter asks the program as it is.",
+        hint="run klack study with a few values of each parameter, which calls the unchanged "
+        "program.",
     )
     sizes = sizes or step_sizes(rows, accuracy, step=step, coarse=coarse)
     begin = process_time()
@@ -333,22 +334,22 @@ class _Running:
             raise InputError(
                 f"components.{driven[0]}",
                 got="derivatives of a run with a prescribed motion",
-                expected="bodies that forces move",
-                hint="take differences of runs (klack study).",
+                expected="bodies moved by forces",
+                hint="use differences of runs (klack study).",
             )
         if rows.controllers:
             raise InputError(
                 f"components.{rows.controllers[0].component}",
                 got="derivatives of a run with a controller",
                 expected="a valve without controllers",
-                hint="take differences of runs (klack study), or a driver without signals.",
+                hint="use differences of runs (klack study), or a driver without signals.",
             )
         if rows.waves:
             raise InputError(
                 f"components.{rows.waves[0].component}.properties",
                 got="derivatives of a run with a line of local properties",
                 expected="properties: fixed",
-                hint="take differences of runs (klack study), or properties: fixed with the "
+                hint="use differences of runs (klack study), or properties: fixed with the "
                 "working pressure.",
             )
         self.rows, self.directions, self.sizes = rows, tuple(directions), sizes
@@ -594,7 +595,7 @@ class _Running:
     def _keep_phase(self, parts: Sequence["_Part"], found: "_Found | None") -> None:
         """Stretch the steps so that the touch in the last part keeps its phase."""
         if found is None:
-            raise AssertionError("a repeated run does the same")
+            raise AssertionError("a repeated run behaves in the same way")
         rows = parts[-1].fine[found.interface]
         row, after = rows[found.row], rows[found.row + 1]
         speed = _quotient(row[4] - after[4], after[1])

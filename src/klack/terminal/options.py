@@ -51,22 +51,25 @@ Out = Annotated[
 ]
 Report = Annotated[bool, Parameter(help="Write report.html and report.pdf.")]
 Quiet = Annotated[
-    bool, Parameter(name=["--quiet", "-q"], negative="", help="No progress and no tables.")
+    bool, Parameter(name=["--quiet", "-q"], negative="", help="Print no progress and no tables.")
 ]
 Threads = Annotated[
     int | None, Parameter(name="--threads", help="Processor cores to use. [default: all]")
 ]
 StudyPath = Annotated[
     Path | None,
-    Parameter(name="--study", help="File with a section 'study'. [default: the one of the case]"),
+    Parameter(
+        name="--study", help="File with a section 'study'. [default: the section of the case]"
+    ),
 ]
 CheckSteps = Annotated[
     bool | None,
     Parameter(
         name="--check-steps",
-        help="Run strokes again with all steps twice as long; halve them where that changes first "
-        "impacts by more than half of what the accuracy promises. [default: as in the case, or "
-        "yes; in a search only for its front; in three dimensions only compared]",
+        help="Repeat every stroke with steps twice as long, and halve the steps where its first "
+        "impacts change by more than half the promised accuracy. [default: as in the case, "
+        "else yes; a search checks only its front; in three dimensions the two runs are "
+        "only compared]",
     ),
 ]
 Components = Annotated[
@@ -74,8 +77,8 @@ Components = Annotated[
     Parameter(
         name="--component",
         negative="",
-        help="Class of your own that the case may name as a type, package.module:Class; its "
-        "module is run. Several times for several classes.",
+        help="Class of your own, package.module:Class, that the case may name as a type; its "
+        "module is executed. Repeat the option for several classes.",
     ),
 ]
 Levels = Annotated[

@@ -33,7 +33,7 @@ _SHARE = 0.005  # of the time of a run that drawing may take
 _COLUMNS = 300  # of a drawing
 _SOON = 0.5  # s until the bar is there
 _KINDS = {
-    "klack:wait": "waiting for another process that compiles",
+    "klack:wait": "waiting while another process compiles",
     "numba:compile": "compiling (once)",
 }
 """Events and words, the first active one wins."""
@@ -145,7 +145,7 @@ class _Lines:
     def _tell(self, words: str) -> None:
         if words not in self._told:
             self._told.add(words)
-            print(f"{words}; 'klack warm' does it ahead", file=sys.stderr, flush=True)
+            print(f"{words}; 'klack warm' does this in advance", file=sys.stderr, flush=True)
 
     def __call__(self, stage: str, fraction: float) -> None:
         self.compiling.watch()

@@ -1,4 +1,4 @@
-"""Thermal conductance: heat in proportion to a difference of temperatures."""
+"""Thermal conductance: heat in proportion to a temperature difference."""
 
 from collections.abc import Mapping
 from typing import ClassVar
@@ -27,7 +27,9 @@ class Conductance(ThermalComponent):
     type: ClassVar[str] = "thermal-conductance"
     ports: ClassVar[Mapping[str, Port]] = {"a": HEAT, "b": HEAT}
 
-    conductance: ThermalConductance = Field(gt=0, description="G, heat flow per difference.")
+    conductance: ThermalConductance = Field(
+        gt=0, description="G, heat flow per temperature difference."
+    )
 
     def add_heat(self, heat: HeatRows) -> None:
         """Join both nodes."""

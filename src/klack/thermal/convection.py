@@ -30,7 +30,9 @@ class Convection(ThermalComponent):
         "surroundings": Port("thermal", Role.HEAT, optional=True),
     }
 
-    coefficient: HeatTransfer = Field(gt=0, description="h, with radiation unless that is apart.")
+    coefficient: HeatTransfer = Field(
+        gt=0, description="h, including radiation unless that is a component of its own."
+    )
     area: Area = Field(gt=0, description="A, of the surface.")
 
     def add_heat(self, heat: HeatRows) -> None:

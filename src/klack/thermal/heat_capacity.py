@@ -36,7 +36,7 @@ class HeatCapacity(ThermalComponent):
         default=None, gt=0, description="Copper 385, steel 460, brake fluid 2300 J/kg/K."
     )
     temperature: Temperature | None = Field(
-        default=None, gt=0, description="At the start; default that of the surroundings."
+        default=None, gt=0, description="At the start; default: the ambient temperature."
     )
 
     @model_validator(mode="after")

@@ -176,7 +176,7 @@ class _March:
         found = np.asarray(self.mean_heat(temperature), dtype=float)
         if not np.isfinite(found).all():
             raise ConvergenceError(
-                f"warm-up: the stroke at {time:.6g} s has a heat that is no finite number"
+                f"warm-up: the stroke at {time:.6g} s releases heat that is not a finite number"
             )
         return found
 
@@ -211,8 +211,8 @@ def warm_up(
             break
         if len(march.points) >= _MOST_POINTS:
             raise ConvergenceError(
-                f"warm-up: {_MOST_POINTS} strokes lead to {march.time:.6g} s only; perhaps the "
-                "heat of a stroke jumps with the temperature.\n"
+                f"warm-up: {_MOST_POINTS} strokes reached only {march.time:.6g} s; the heat of a "
+                "stroke may jump with the temperature.\n"
                 "Try: a larger thermal.tolerance and spacing, or a shorter thermal.duration."
             )
         step, stroke, heat, length = _step(march, T, Q)
@@ -243,8 +243,8 @@ def _require_way_out(network: HeatNetwork, flow: Array) -> None:
             names = " and ".join(f"'{network.names[i]}'" for i in nodes)
             raise InputError(
                 "warm-up",
-                got=f"{float(flow[list(nodes)].sum()):.3g} W into {names}, from where no path "
-                "leads to ambient: the temperatures would rise without end",
+                got=f"{float(flow[list(nodes)].sum()):.3g} W into {names}, without a path to "
+                "ambient: the temperatures would rise without limit",
                 expected="a path to ambient or to a fixed-temperature, or a duration",
                 hint="connect a convection to ambient, or give thermal.duration, e.g. 10 min.",
             )
@@ -263,8 +263,8 @@ def _started(march: _March) -> tuple[Array, Array]:
         T = new
         Q = march.heat(T, 0.0)
     raise ConvergenceError(
-        "warm-up: the nodes without capacity find no balance with the heat of a stroke.\n"
-        "Try: give them a heat capacity."
+        "warm-up: no thermal balance was found for the nodes without a heat capacity.\n"
+        "Try: give these nodes a heat capacity."
     )
 
 

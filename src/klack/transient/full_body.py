@@ -72,7 +72,7 @@ def scalar_mass(M: csr_array, dimension: int) -> csr_array:
         difference.nnz and difference.max() > 1e-9 * abs(m).max(),
         "mass matrix",
         got="a mass that differs between directions or couples them",
-        expected="the same mass matrix in every direction, as displacement elements have it",
+        expected="the same mass matrix in every direction, as of displacement elements",
         hint="leave point masses and rotary inertias out of a full-order impact.",
     )
     return m
@@ -151,9 +151,9 @@ def massless_nodes(M: csr_array, nodes: NDArray[np.int64], dimension: int) -> cs
     if np.any(total == 0.0):
         raise InputError(
             "massless contact nodes",
-            got=f"{int(np.count_nonzero(total == 0.0))} contact nodes that have only contact "
-            "nodes as neighbours",
-            expected="elements deeper than the contact surface",
+            got=f"{int(np.count_nonzero(total == 0.0))} contact nodes whose neighbours are all "
+            "contact nodes",
+            expected="elements below the contact surface",
             hint="use the scheme 'contact-stabilised-newmark', or a smaller reach.",
         )
     W = diags_array(1.0 / total) @ weights
@@ -383,7 +383,7 @@ class FullBody:
                 f"simulate_full_order: sideways motion of body '{self.name}'",
                 got=f"({velocity[0]:g}, {velocity[1]:g}) m/s, spin "
                 f"{np.linalg.norm(velocity[3:]):g} rad/s",
-                expected="none for an axisymmetric body, or one that is held sideways",
+                expected="none for an axisymmetric body, or for one held sideways",
                 hint="model a solid that is free to move across the axis.",
             )
         arm = self.body.mesh.points - self.body.centre_of_mass

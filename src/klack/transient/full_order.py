@@ -242,8 +242,8 @@ def simulate_full_order(
         refuse_if(
             bodies[0].supported,
             f"simulate_full_order: body '{bodies[0].name}'",
-            got="a body a that is fixed along z",
-            expected="a body that is free to move along z",
+            got="body a fixed along z",
+            expected="body a free to move along z",
             hint="fix only radial degrees of freedom of the needle, or swap the bodies.",
         )
         for body in bodies:
@@ -358,7 +358,7 @@ class _Run:
         touch = float(np.min(self.space.gap[facing] / axial[facing]))
         retraction = max(0.0, -touch)
         if retraction > 0:
-            _log.info("bodies overlap by %.3g um; body a starts further back", retraction * 1e6)
+            _log.info("bodies overlap by %.3g um; body a starts further away", retraction * 1e6)
         flown = 0
         if self.axial_force == 0.0 == needle.spring and not np.any(across):
             flown = max(0, floor(touch / (self.speed * self.step)) - 1)

@@ -308,7 +308,7 @@ def _axis(where: str, places: NDArray[np.float64]) -> NDArray[np.float64]:
     refuse_if(
         len(x) < 5 or not miss < _ROUND,
         where,
-        got=f"a surface that is off the nearest round one by {miss * size * 1e6:.3g} um",
+        got=f"a surface that deviates from the nearest round one by {miss * size * 1e6:.3g} um",
         expected="a cylinder around the axis of the body",
         hint="name only the cylindrical part of the shaft, or refine the mesh around it.",
     )

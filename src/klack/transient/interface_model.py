@@ -584,7 +584,7 @@ def _common_ways(contacts: Sequence[InterfaceContact]) -> int:
         "interface model: contacts",
         got="tangential directions at one contact and none at another",
         expected="tangential directions at all contacts, or none",
-        hint="give every contact faces; their friction may be 0.",
+        hint="give every contact its faces; their friction may be 0.",
     )
     return ways.pop()
 
@@ -654,7 +654,7 @@ def _static_compliance(
                 f"interface model: contact '{contact.name}'",
                 got=f"body '{name}'",
                 expected=f"one of: {', '.join(names)}",
-                hint="give every body of the contacts.",
+                hint="list every body of the contacts.",
             )
     for contact, place in zip(contacts, places, strict=True):
         C = contact.compliance

@@ -266,7 +266,7 @@ def _require_layer_alone(model: InterfaceModel) -> None:
         "interface level: layer",
         got=f"a layer of asperities and {beside}",
         expected="one of them",
-        hint="set the layer of the model to None, or leave the other out.",
+        hint="set the layer of the model to None, or remove the other feature.",
     )
 
 

@@ -370,7 +370,7 @@ def reduced_bodies(
         "interface model: contacts on rings",
         got="friction at one contact and none at another",
         expected="faces at all contacts, or none",
-        hint="give every contact faces; their friction may be 0.",
+        hint="give every contact its faces; their friction may be 0.",
     )
     counts = [len(contact.space.gap) for contact in contacts]
     places = row_places(counts, ways.pop())

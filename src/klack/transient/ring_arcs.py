@@ -68,9 +68,9 @@ class ArcWatch:
         if few and stop not in self.told:
             self.told.add(stop)
             warnings.warn(
-                f"the contact at '{arcs.stops[stop]}' is so short that {angles} of {arcs.count} "
-                f"angles of its rings carry at {peak:.3g} N, the peak of an impact; "
-                f"{FEWEST_ANGLES} or more are needed. Try: angles: "
+                f"the contact at '{arcs.stops[stop]}' is so short that only {angles} of "
+                f"{arcs.count} angles of its rings carry load at {peak:.3g} N, the peak of an "
+                f"impact; {FEWEST_ANGLES} or more are needed. Try: angles: "
                 f"{ceil(arcs.count * FEWEST_ANGLES / angles)}.",
                 AccuracyWarning,
                 stacklevel=2,

@@ -702,8 +702,8 @@ class RubbingPoints:
         refuse_if(
             len(fixed),
             "friction of the faces",
-            got=f"{len(fixed)} contact points that nothing can move across their normal",
-            expected="faces of which one can move across",
+            got=f"{len(fixed)} contact points that cannot move across their normal",
+            expected="faces of which at least one can move across the normal",
             hint="leave friction out, or do not fix the radial motion of both bodies.",
         )
 
@@ -745,9 +745,10 @@ class RubbingPoints:
             rounds = 0
         if rounds == 0:
             raise ConvergenceError(
-                f"no forces of the {n} contact points near the contact obey the law of friction, "
-                f"with coefficients up to {float(np.max(mu)):g}.\n"
-                "Try: a shorter time step, or less friction; faces that jam may have no solution."
+                f"no forces of the {n} contact points near the contact satisfy the law of "
+                f"friction, with coefficients up to {float(np.max(mu)):g}.\n"
+                "Try: a shorter time step, or less friction; faces that jam may have no "
+                "solution."
             )
         self.turns += rounds < 0
         self._found[:] = OPEN

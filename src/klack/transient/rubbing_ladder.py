@@ -158,11 +158,11 @@ def _opened(
     if min(force) < -_PULL * force[0]:
         raise LockedError(
             key,
-            got=f"{friction:g}: the faces lock, it takes {-min(force):.3g} N to part them after "
-            f"{force[0]:.3g} N",
-            expected="less than the slope of the faces, so that they part by themselves",
-            hint="lower the coefficient; levels without a local law, interface and full, have no "
-            "such limit.",
+            got=f"{friction:g}: the faces lock: {-min(force):.3g} N are needed to separate them "
+            f"after {force[0]:.3g} N",
+            expected="less than the slope of the faces: they then separate by themselves",
+            hint="lower the coefficient; the levels without a local law, interface and full, "
+            "have no such limit.",
         )
     return down, np.array(force)
 

@@ -98,10 +98,10 @@ class SideForces:
         for row, share in zip(self.rows, self.left_out, strict=True):
             if share > _LEFT_OUT:
                 warnings.warn(
-                    f"'{row.component}': where the needle is, the air gaps that act across its "
-                    f"axis have up to {100 * share:.2g} % less reluctance than on it. Flux and "
-                    "axial force are computed without that. Give more clearance, or less play in "
-                    "the guide.",
+                    f"'{row.component}': at the position of the needle, the air gaps that act "
+                    f"across its axis have up to {100 * share:.2g} % less reluctance than "
+                    "centred ones. Flux and axial force are computed without that. Give more "
+                    "clearance, or less play in the guide.",
                     AccuracyWarning,
                     stacklevel=2,
                 )

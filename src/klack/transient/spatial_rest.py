@@ -114,9 +114,9 @@ def settle_at_rest(
     state.carried[state.lam > 0.0] = True
     if left > _DOUBT:
         warnings.warn(
-            f"the needle is not at rest at the start: {left:.1e} of the force on it is left. "
-            "Nothing holds it across the axis, or keeps it from tilting: it moves. Check placement "
-            "and guide.",
+            f"the needle is not at rest at the start: {left:.1e} of the force on it is left. It "
+            "moves, because nothing holds it across the axis or keeps it from tilting. Check "
+            "placement and guide.",
             AccuracyWarning,
             stacklevel=2,
         )

@@ -365,10 +365,9 @@ class _Moving:
         faces.gap0[:] = gap0
         if left > _NOT_AT_REST:
             warnings.warn(
-                f"the start is not quite at rest: bodies and what acts on them differ by "
-                f"{format_si(left, 'm', 2)} of displacement, so the valve begins with a small "
-                "motion. Check the forces at time zero: something should press the needle on a "
-                "stop.",
+                f"the start is not quite at rest: the bodies are {format_si(left, 'm', 2)} away "
+                "from equilibrium, so the valve begins with a small motion. Check the forces at "
+                "time zero: the needle should be pressed on a stop.",
                 AccuracyWarning,
                 stacklevel=2,
             )
@@ -1029,7 +1028,7 @@ def _check(valve: SpatialValve, network: CompiledNetwork) -> None:
     elif lands := {row.component for row in rows.interfaces if row.film is not None} - {
         film.stop for film in valve.films
     }:
-        problem = f"a film at '{min(lands)}' that has no land"
+        problem = f"a film without a land at '{min(lands)}'"
     elif model.limit is not None or model.layer is not None:
         problem = "faces that yield, or with a layer of asperities"
     refuse_if(

@@ -87,7 +87,7 @@ def _raised(name: str, pose: Pose) -> tuple[str, ...]:
     if abs(rise) < _RAISED:
         return ()
     way = f"{format_si(abs(rise), 'm', 3)} {'above' if rise > 0 else 'below'}".replace("um", "µm")
-    return (f"{name} stands {way} its drawing; numbers beside it are those of the drawing.",)
+    return (f"{name} is shown {way} its drawn position; numbers next to it refer to the drawing.",)
 
 
 def _facts(case: CaseFile, told: Mapping[str, Inspected]) -> Facts:
@@ -103,9 +103,13 @@ def _valve_view(
     if shaped == set(case.bodies) and shaped:
         drawn = mesh_valve_bodies(case, progress)
     elif case.bodies:
-        notes.append("Bodies without surfaces (reduced models, nodes alone) are not drawn.")
+        notes.append(
+            "Bodies without surfaces (reduced models, nodes without elements) are not drawn."
+        )
     else:
-        notes.append("All bodies of this valve are rigid masses without a shape: its network only.")
+        notes.append(
+            "All bodies of this valve are rigid masses without a shape: only its network is shown."
+        )
     contacts = []
     for name, stop in case.stops.items():
         if stop.upper.body in drawn and stop.lower.body in drawn:
@@ -281,10 +285,11 @@ def _impact_view(study: ImpactStudy, folder: Path, progress: Progress) -> View:
         )
         if left_out:
             notes.append(
-                f"{left_out} of the highest modes are left out, for a page of a few megabytes."
+                f"{left_out} of the highest modes are left out, to limit the page to a few "
+                "megabytes."
             )
         if not any(body.motion and body.motion.amplitude.size for body in bodies):
-            notes.append("The level reduced was not computed: the impact does not move here.")
+            notes.append("The level 'reduced' was not computed, so the impact is not animated.")
     else:
         case = read_case(study.case_text, _place_of_case(study, folder))
         view = view_of_case(case, progress)
@@ -452,8 +457,8 @@ def _without_case(study: StrokeStudy, folder: Path, variant: StrokeVariant, erro
         time=variant.result.time,
         histories=_stroke_histories(study, variant),
         notes=(
-            "The case of this result cannot be read beside the result, so that bodies are not "
-            f"shown: {error.splitlines()[0]}",
+            "The case of this result cannot be read, so bodies are not shown: "
+            f"{error.splitlines()[0]}",
         ),
     )
     return _named(view, study, folder)

@@ -75,7 +75,7 @@ def _step_view(source: Path) -> "View":
 
     content, rows = step_content(source), inspect_file(source)
     longest = max(max(b - a for a, b in zip(s.low, s.high, strict=True)) for s in content.solids)
-    note = "Meshed coarsely for this picture alone."
+    note = "Meshed coarsely, only for this picture."
     try:
         profiles = profiles_of_step(source)
     except (NotTurnedError, InputError):  # or an outline that crosses itself, by a flaw of the file
@@ -97,7 +97,7 @@ def _solid_mesh(source: Path, longest: float) -> "Mesh":
     except PoorElementError as error:
         raise InputError(
             str(source),
-            got=f"a shape whose coarse mesh has elements that are inverted ({error.got})",
-            expected="a shape that elements of a twenty-fifth of its length can follow",
+            got=f"a shape whose coarse mesh has inverted elements ({error.got})",
+            expected="a shape that elements of 1/25 of its length can represent",
             hint="write a case with element sizes for it, and show the case.",
         ) from error

@@ -43,7 +43,7 @@ def spread_inside(
                 return deep[:count]
     raise InputError(
         "boundary elements: surface",
-        got="next to no room inside",
+        got="almost no volume inside",
         expected="a closed surface around a body",
-        hint="close openings, and let normals point into the air.",
+        hint="close openings, and orient the normals into the air.",
     )

@@ -89,7 +89,7 @@ def revolved_outline(structures: Sequence[Structure], size: float) -> Outline:
     """
     pieces = _seen_from_beside(_pieces(structures))
     if not len(pieces.face):
-        raise not_closed("no face that can be seen from beside")
+        raise not_closed("no face that is visible from the side")
     way = _closed(_in_order(pieces))
     radius = float(way.ends[..., 0].max())
     length = float(np.hypot(*(way.ends[:, 1] - way.ends[:, 0]).T).sum())
@@ -274,6 +274,6 @@ def not_closed(got: str) -> InputError:
     return InputError(
         "noise.radiation: elements",
         got=got,
-        expected="named surfaces of the held bodies that enclose the valve, but for openings",
+        expected="named surfaces of the held bodies that enclose the valve, except for openings",
         hint="name its whole outside in noise.surfaces, or take radiation: piston.",
     )

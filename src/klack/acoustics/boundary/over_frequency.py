@@ -172,7 +172,7 @@ def surface_radiation(
     """
     dimensions = {own.dimension for own in structures}
     if len(dimensions) > 1:
-        raise not_closed("bodies of revolution beside solids")
+        raise not_closed("bodies of revolution together with solids")
     if dimensions == {3}:
         outline = solid_outline(structures)
     else:
@@ -307,8 +307,8 @@ def _without_negative(groups: Cube, *, check: bool = True) -> Cube:
     if check and values[0] < -_NEGATIVE * max(float(values[-1]), 0.0):
         raise ConvergenceError(
             f"boundary elements: a motion of the body takes {-values[0] / values[-1]:.1e} of the "
-            f"largest power from the air instead of giving it (allowed: {_NEGATIVE:g}).\nTry: "
-            "smaller elements, or radiation: piston."
+            f"largest power from the air instead of radiating it (allowed: {_NEGATIVE:g}).\n"
+            "Try: smaller elements, or radiation: piston."
         )
     kept = vectors[:, values > 0.0]
     onto = kept @ kept.T

@@ -60,7 +60,7 @@ class Meridian:
         elif max(nodes[0, 0], nodes[-1, 0]) > 1e-9 * np.ptp(nodes[:, 1]):
             got = f"ends {nodes[0, 0]:g} m and {nodes[-1, 0]:g} m from the axis: it is not closed"
         elif _volume(nodes) <= 0.0:
-            got = "a way with the air to its left"
+            got = "a path with the air on its left"
         else:
             object.__setattr__(self, "nodes", nodes)
             return
@@ -69,7 +69,7 @@ class Meridian:
             got=got,
             expected="four points (r, z) or more, from the lower to the upper end of the axis, "
             "around the outside",
-            hint="close openings with straight lines; turn the way around if it runs downwards.",
+            hint="close openings with straight lines; reverse the path if it runs downwards.",
         )
 
     @cached_property

@@ -111,7 +111,7 @@ def _loops(named: _Faces) -> list[Ints]:
         while here != start:
             loop.append(here)
             if here not in after:
-                raise not_closed("free edges that make no loop")
+                raise not_closed("free edges that do not form a loop")
             here = after.pop(here)
         loops.append(np.array(loop))
     return loops

@@ -127,10 +127,11 @@ def radiation(mesh: BoundaryMesh, wave_number: float, velocity: Motions) -> Radi
                 mesh=mesh, wave_number=wave_number, velocity=v, pressure=p, residual=residual
             )
     raise ConvergenceError(
-        f"boundary elements at {wave_number:.4g} per metre: {100 * residual:.3g} % of the largest "
-        "pressure is left inside the body, where there must be none (allowed: "
-        f"{100 * LARGEST_RESIDUAL:g} %).\nTry: smaller elements, six or more to a wavelength and "
-        "two or more across the thinnest part."
+        f"boundary elements at {wave_number:.4g} per metre: {100 * residual:.3g} % of the "
+        "largest pressure remains inside the body, where it must vanish (allowed: "
+        f"{100 * LARGEST_RESIDUAL:g} %).\n"
+        "Try: smaller elements, six or more to a wavelength and two or more across the thinnest "
+        "part."
     )
 
 

@@ -53,14 +53,14 @@ class Triangles:
         if open_ones:
             got = f"{open_ones} edges without a neighbour, or with two"
         elif self.volume <= 0.0:
-            got = "normals into the body"
+            got = "normals that point into the body"
         else:
             return
         raise InputError(
             "boundary elements: triangles",
             got=got,
-            expected="a closed surface with its normals into the air",
-            hint="close openings, join points that are there twice, turn triangles round.",
+            expected="a closed surface whose normals point into the air",
+            hint="close openings, merge duplicate points, reverse triangles.",
         )
 
     @cached_property

@@ -220,8 +220,8 @@ def frequencies_within(frequency: Vector, receiver: MeasuredReceiver | HeardRece
     if inside.size < frequency.size:
         warnings.warn(
             f"{receiver.name}: measured from {known[0]:.4g} to {known[-1]:.4g} Hz; the band of "
-            f"{frequency[0]:.4g} to {frequency[-1]:.4g} Hz is cut to that. Levels hold for the "
-            "rest of the band alone.",
+            f"{frequency[0]:.4g} to {frequency[-1]:.4g} Hz is cut to that. Levels hold only for "
+            "the rest of the band.",
             AccuracyWarning,
             stacklevel=2,
         )
@@ -395,7 +395,7 @@ def _virtual(
     refuse_if(
         missing,
         f"{responses.name}: virtual point '{point}'",
-        got=f"no place of node {', '.join(missing[:6])}",
+        got=f"no position of node {', '.join(missing[:6])}",
         expected="coordinates of every node around it",
         hint="export the nodes (set 15 or 2411), or give positions.",
     )
@@ -454,10 +454,11 @@ def _inverse(where: str, R: Matrix, arms: list[Vector], freedoms: tuple[Freedom,
     refuse_if(
         count < len(freedoms) or lost,
         where,
-        got=f"{count} channels that do not tell {', '.join(dict.fromkeys(lost)) or 'them all'}",
+        got=f"{count} channels that do not determine "
+        f"{', '.join(dict.fromkeys(lost)) or 'them all'}",
         expected=f"at least {len(freedoms)} independent ones, better 9 (rank {len(freedoms)})",
         hint="spread them over three places that are not in one line and over three directions, "
-        "or ask for fewer freedoms.",
+        "or request fewer degrees of freedom.",
     )
     return np.asarray(scale[:, None] * np.linalg.pinv(R * scale))
 
@@ -474,9 +475,10 @@ def _doubt(name: str, point: str, consistency: Mapping[str, float]) -> None:
     worst = min(consistency, key=lambda channel: consistency[channel])
     if consistency[worst] < _CONSISTENT:
         warnings.warn(
-            f"{name}: around the virtual point '{point}' the channel {worst.split(': ')[1]} moves "
-            f"with a consistency of {consistency[worst]:.2f} (below {_CONSISTENT:g}): the face is "
-            "not rigid there, or the channel has another place, direction or sign.",
+            f"{name}: around the virtual point '{point}' the channel {worst.split(': ')[1]} "
+            f"moves with a consistency of {consistency[worst]:.2f} (below {_CONSISTENT:g}): the "
+            "face is not rigid there, or the position, direction or sign of the channel is "
+            "wrong.",
             AccuracyWarning,
             stacklevel=4,
         )
@@ -497,11 +499,11 @@ def _mobility(responses: FrequencyResponses, rows: list[_Row]) -> tuple[Complexe
     if lost:
         raise InputError(
             responses.name,
-            got=f"no response {', '.join(lost[:6])}{', ...' if len(lost) > 6 else ''} nor the "
-            "reciprocal one",
+            got=f"no response {', '.join(lost[:6])}{', ...' if len(lost) > 6 else ''} and not "
+            "its reciprocal either",
             expected="the responses between all freedoms of the interface",
             hint="measure the transfers between the mounts as well: on a plate they are as large "
-            "as the driving points.",
+            "as the driving-point responses.",
         )
     return Y, measured
 
@@ -542,8 +544,9 @@ def _transfers(
                 bool(np.any(np.isnan(values))),
                 f"{responses.name}: ear '{ear}'",
                 got=f"no pressure per force at {row.freedom}",
-                expected="the pressure per force on every freedom of the interface",
-                hint="strike there while the microphone listens, or leave out the freedom.",
+                expected="the pressure per force on every degree of freedom of the interface",
+                hint="strike there while the microphone records, or leave out the degree of "
+                "freedom.",
             )
             H[:, e, j] = values
     return H
@@ -572,7 +575,10 @@ def _on_one_grid(receiver: MeasuredReceiver, heard: FrequencyResponses) -> Measu
     )
     f = known[inside]
     transfers = _between(heard.frequency, receiver.transfers, f)
-    note = f"{heard.name}: pressures taken on the {f.size} lines of {receiver.name} in both ranges."
+    note = (
+        f"{heard.name}: pressures interpolated on the {f.size} lines of {receiver.name} in both "
+        "ranges."
+    )
     return MeasuredReceiver(
         name=receiver.name,
         points=receiver.points,

@@ -109,7 +109,7 @@ def body_receiver(
             f"receiver '{body.name}'",
             got=f"a port at the point '{freedom.point}'",
             expected=f"one of: {', '.join(point.name for point in points) or '(none)'}",
-            hint="give the points of all freedoms.",
+            hint="give the points of all degrees of freedom.",
         )
     columns = [body.port_index(name) for name in ports]
     return ModalReceiver(
@@ -195,17 +195,17 @@ def matrix_receiver(
     refuse_if(
         lost > _LOST,
         "noise.receiver.matrices",
-        got=f"a mode at {np.sqrt(squares[-1]) / (2.0 * np.pi):.2g} Hz, beside which those below "
+        got=f"a mode at {np.sqrt(squares[-1]) / (2.0 * np.pi):.2g} Hz, next to which modes below "
         f"{lost:.2g} Hz are lost in round-off",
         expected=f"round-off below {_LOST:g} Hz",
-        hint="condense rows of next to no mass, and what a penalty holds.",
+        hint="condense rows of almost no mass, and those held by a penalty.",
     )
     rigid = squares <= noise
     refuse_if(
         bool(np.any(squares < -max(_RIGID * squares[-1], noise))),
         "noise.receiver.matrices",
         got="a stiffness below 0",
-        expected="one of an elastic body at rest",
+        expected="the stiffness of an elastic body at rest",
         hint="check that K and M are not exchanged.",
     )
     omega = np.where(rigid, 0.0, np.sqrt(np.maximum(squares, 0.0)))

@@ -100,8 +100,8 @@ def _warn_thick(wavenumber: float, thickness: float) -> None:
         times = (_THICK / (wavenumber * thickness)) ** 2
         warnings.warn(
             f"Bending waves of the plate of {thickness * 1e3:.3g} mm are shorter than six "
-            f"thicknesses above {times:.2g} of the highest frequency: there it is no thin plate "
-            "and its mobility too low.",
+            f"thicknesses above {times:.2g} of the highest frequency: there the plate is not "
+            "thin and its mobility is too low.",
             AccuracyWarning,
             stacklevel=4,
         )
@@ -114,7 +114,7 @@ def _plate_freedoms(points: Sequence[InterfacePoint], radius: float) -> tuple[Fr
         refuse_if(
             not np.allclose(point.axes, np.eye(3)),
             f"point '{point.name}' of a plate",
-            got="axes of its own",
+            got="its own axes",
             expected="the axes of the plate, z along its normal",
             hint="turn the source instead (placement: axes).",
         )
@@ -203,8 +203,7 @@ class InfinitePlate:
                 f"ear '{name}'",
                 got=f"{np.degrees(np.arctan2(np.hypot(*ear[:2]), ear[2])):.3g} degrees from the "
                 "normal, where bending waves of the infinite plate are as fast as sound along it",
-                expected=f"a direction nearer to the normal, for {np.abs(s).max() / 2 / np.pi:.4g} "
-                "Hz",
+                expected=f"a direction nearer the normal, for {np.abs(s).max() / 2 / np.pi:.4g} Hz",
                 hint="put the ear above the mount, or take a plate of finite size.",
             )
             point = self.sound.spreading(s, ear) / (s * (plate.mass_per_area + stiff))

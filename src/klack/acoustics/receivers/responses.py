@@ -171,7 +171,7 @@ def _unknown_unit(text: str, where: str) -> InputError:
         where,
         got="no unit" if no_unit(text) else f"the unit '{text[:40]}'",
         expected="a motion or pressure per force: m/s/N, m/s^2/N, g/N, m/N, Pa/N, rad/s/(N m)",
-        hint="say in the file what the values are: accelerance and receptance look like mobility.",
+        hint="state the quantity in the file: accelerance and receptance look like mobility.",
     )
 
 
@@ -198,7 +198,7 @@ def response(
     refuse_if(
         source.direction == 0,
         where,
-        got=f"a force at '{source}' without direction",
+        got=f"a force at '{source}' without a direction",
         expected="x, y, z, rx, ry or rz after the name of a node",
         hint="write front.z for the force at 'front' along z.",
     )
@@ -206,7 +206,7 @@ def response(
         (quantity == "pressure") != (output.direction == 0),
         where,
         got=f"a {quantity} at '{output}'",
-        expected="a motion with a direction, or a pressure without",
+        expected="a motion with a direction, or a pressure without one",
         hint="check the direction of the channel and the quantity.",
     )
     frequency, values = np.asarray(frequency, dtype=float), np.asarray(values, dtype=complex)
@@ -239,7 +239,7 @@ def gathered(
     Raises
     ------
     InputError
-        If there is none, if one pair is there twice, or if no range of frequency is common.
+        If there is none, if one pair is defined twice, or if no range of frequency is common.
     """
     refuse_if(
         not found,
@@ -291,12 +291,12 @@ def _common_grid(name: str, found: Iterable[Response]) -> tuple[Vector, tuple[st
     refuse_if(
         len(coarse) < 2,
         name,
-        got="responses without a common range of frequency",
+        got="responses without a common frequency range",
         expected="at least two lines that all of them span",
         hint="export all responses over one range.",
     )
     note = (
-        f"{name}: responses have other lines of frequency; taken on the {len(coarse)} lines from "
-        f"{low:.4g} to {high:.4g} Hz of the coarsest, linear between lines."
+        f"{name}: responses have different frequency lines; interpolated on the {len(coarse)} "
+        f"lines from {low:.4g} to {high:.4g} Hz of the coarsest, linear between lines."
     )
     return np.clip(coarse, low, high), (note,)

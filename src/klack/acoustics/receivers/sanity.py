@@ -57,7 +57,7 @@ def check_taken_power(
             raise InputError(
                 f"{name}: {freedom} / {freedom}",
                 got=f"a real part below 0 at {100 * share:.0f} % of the lines"
-                + (f", as {like[0]} that is read as a mobility" if like else ""),
+                + (f", as of {like[0]} read as a mobility" if like else ""),
                 expected="a real part of 0 or more at a driving point: the receiver takes up power",
                 hint="check the quantity, and the sign and direction of sensor and hammer."
                 if like
@@ -68,14 +68,14 @@ def check_taken_power(
                 f"{name}: the real part of {freedom} / {freedom} is below 0 at "
                 f"{100 * share:.0f} % of the lines: noise, sensor and hammer apart"
                 + (f", or {like[0]} read as a mobility" if like else "")
-                + ". There the receiver would give power.",
+                + ". There the receiver would supply power.",
                 AccuracyWarning,
                 stacklevel=3,
             )
         if not freedom.is_rotation and float(np.median(np.abs(own))) > _SOFT:
             warnings.warn(
                 f"{name}: {freedom} / {freedom} is {np.median(np.abs(own)):.3g} m/(N s) in the "
-                "median, a thousand times that of a sheet: mm for m?",
+                "median, a thousand times the value of a metal sheet: mm instead of m?",
                 AccuracyWarning,
                 stacklevel=3,
             )
@@ -118,8 +118,8 @@ def check_reciprocity(
     if worst > _RECIPROCITY:
         warnings.warn(
             f"{name}: {pair[0]} / {pair[1]} and {pair[1]} / {pair[0]} differ by "
-            f"{100 * worst:.0f} % (reciprocity): directions, places or calibration. The coupling "
-            "is no better than that.",
+            f"{100 * worst:.0f} % (reciprocity): check directions, positions and calibration. "
+            "The coupling is no more accurate than that.",
             AccuracyWarning,
             stacklevel=3,
         )
@@ -139,8 +139,9 @@ def check_resolution(name: str, frequency: Vector, Y: Complexes) -> None:
     worst = 0.25 * float(np.max(apart / np.maximum(size, np.finfo(float).tiny)))
     if worst > _COARSE:
         warnings.warn(
-            f"{name}: lines are too far apart for its resonances; between them mobilities are off "
-            f"by about {100 * worst:.0f} % of their rms. At the lines themselves nothing is lost.",
+            f"{name}: lines are too far apart for its resonances; between lines mobilities are "
+            f"wrong by about {100 * worst:.0f} % of their rms. At the lines themselves they are "
+            "exact.",
             AccuracyWarning,
             stacklevel=3,
         )
@@ -156,5 +157,5 @@ def check_places(name: str, places: np.ndarray) -> None:
     span = float(np.ptp(places, axis=0).max()) if places.size else 0.0
     if span > _FAR:
         warnings.warn(
-            f"{name}: nodes are {span:.4g} m apart: mm for m?", AccuracyWarning, stacklevel=3
+            f"{name}: nodes are {span:.4g} m apart: mm instead of m?", AccuracyWarning, stacklevel=3
         )

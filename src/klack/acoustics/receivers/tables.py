@@ -100,7 +100,7 @@ def read_isolator(path: Path) -> MeasuredIsolator:
             set(blocks) not in ({"k21"}, {"k11", "k21", "k22"}),
             f"{path.name}: {DIRECTIONS[direction - 1]}",
             got=f"the stiffnesses {', '.join(blocks)}",
-            expected="k21 alone, or k11, k21 and k22",
+            expected="only k21, or k11, k21 and k22",
             hint="k12 and k21 are the same.",
         )
     return MeasuredIsolator(
@@ -160,7 +160,7 @@ def _pairs(path: Path, label: re.Pattern[str], example: str) -> tuple[Vector, Pa
             f"{path.name}: {'/'.join(pair_names)}",
             got=f"the columns {', '.join(columns)}",
             expected="re and im, or mag and phase",
-            hint="a magnitude alone does not couple.",
+            hint="a magnitude without a phase cannot be coupled.",
         )
         if "re" in columns:
             whole = columns["re"][0] + 1j * columns["im"][0]
@@ -191,7 +191,7 @@ def _table(path: Path) -> tuple[list[str], NDArray[np.float64]]:
         try:
             rows.append([float(c.replace(",", ".") if mark == ";" else c) for c in cells])
         except ValueError:
-            raise _no_table(path, f"line {number} with other than numbers") from None
+            raise _no_table(path, f"line {number}, not all of it numbers") from None
     table = np.array(rows)
     rising = len(rows) > 1 and np.all(np.isfinite(table)) and np.all(np.diff(table[:, 0]) > 0.0)
     if len(names) < 3 or not rising:
@@ -223,7 +223,7 @@ def _no_table(path: Path, got: str) -> InputError:
         str(path),
         got=got,
         expected="a line of names that begins with 'frequency [Hz]', then rows of numbers",
-        hint="separate by commas, semicolons or tabs; decimal commas need semicolons.",
+        hint="separate columns with commas, semicolons or tabs; decimal commas need semicolons.",
     )
 
 
@@ -286,7 +286,8 @@ def _quantity(path: Path, key: str, held: Arrays) -> str:
             f"{path.name}: {key}",
             got=f"the quantity '{said}'" if said else "no quantity",
             expected="a text 'quantity': mobility, accelerance, receptance or pressure",
-            hint="accelerance and receptance look like mobility: the file has to say it.",
+            hint="accelerance and receptance look like mobility: the file has to state the "
+            "quantity.",
         )
     return quantity
 
@@ -304,7 +305,7 @@ def _of_matrix(
         f"{path.name}: {key}",
         got=f"an array of shape {matrix.shape}",
         expected=f"{wanted}: {f.size} frequencies, the names '{rows}' and 'inputs'",
-        hint="store lists of channel names such as 101.z beside the matrix.",
+        hint="store lists of channel names such as 101.z with the matrix.",
     )
     return [
         response(
@@ -368,7 +369,7 @@ def _arrays(path: Path) -> Arrays:
 
 
 def _npz(path: Path) -> Arrays:
-    hint = "write it again with numpy.savez, arrays of numbers and texts alone."
+    hint = "write it again with numpy.savez, only arrays of numbers and texts."
     arrays: dict[str, Any] = {}
     with foreign_reading(str(path), "a NumPy file", hint), zipfile.ZipFile(path) as archive:
         for item in archive.infolist():
@@ -426,7 +427,7 @@ def _hdf5(path: Path) -> Arrays:
                 f"{path.name}: {key}",
                 got="values in another file, or more than 1 GB",
                 expected="values in this file",
-                hint="store the responses of the interface and the ears alone.",
+                hint="store only the responses of the interface and the ears.",
             )
             values = data[()]
             fields = (

@@ -60,7 +60,7 @@ def read_uff_responses(path: Path, *, quantity: str | None = None) -> FrequencyR
         str(path),
         got="no file, or more than 2 GB",
         expected="a universal file of frequency responses",
-        hint="check the path; export the nodes of the interface and the ears alone.",
+        hint="check the path; export only the nodes of the interface and the ears.",
     )
     damage = "export it again, as text (58) if binary (58b) fails."
     with foreign_reading(str(path), "a universal file", damage):
@@ -131,8 +131,8 @@ def _response(where: str, data: Any, units: tuple[float, float], quantity: str |
             f"{where} ({output} / {source})",
             got=f"a response of quantity {kind} per quantity {below}",
             expected="8 displacement, 11 velocity, 12 acceleration or 15 pressure per 13 force",
-            hint="say what it is with quantity: acceleration, velocity or displacement; files "
-            "that do not tell accelerance from receptance cannot be told apart.",
+            hint="state the quantity: acceleration, velocity or displacement; the file does not "
+            "distinguish accelerance from receptance.",
         )
     label = str(data.get("ordinate_axis_units_lab", "")).strip()
     factor = _labelled(where, label, what) if not no_unit(label) else None
@@ -146,7 +146,7 @@ def _response(where: str, data: Any, units: tuple[float, float], quantity: str |
         where,
         got=f"{values.size} values of type {values.dtype} for {int(data['num_pts'])} lines",
         expected="a complex value at each line",
-        hint="the file was truncated, or has magnitudes alone; export complex responses.",
+        hint="the file was truncated, or has only magnitudes; export complex responses.",
     )
     return response(
         where,
@@ -168,8 +168,8 @@ def _labelled(where: str, label: str, what: str) -> float | None:
     if named == what:
         return factor
     warnings.warn(
-        f"{where}: its axis has the unit '{label}', which is none of a {what} per force; taken as "
-        "the units of the file (set 164, or SI).",
+        f"{where}: its axis has the unit '{label}', which is not a unit of {what} per force; the "
+        "units of the file (set 164, or SI) are used.",
         AccuracyWarning,
         stacklevel=2,
     )
@@ -201,7 +201,7 @@ def _positions(
     if local:
         warnings.warn(
             f"{path.name}: the directions of node {', '.join(local[:5])} are in local coordinate "
-            "systems (set 2420), which are not read. Give the axes of these points.",
+            "systems (set 2420), which are not read. State the axes of these points.",
             AccuracyWarning,
             stacklevel=3,
         )

@@ -107,10 +107,10 @@ def affordable(
         counsels,
         dofs,
         f"The meshes for this target would have about {needed:.2g} degrees of freedom and need "
-        f"{memory_of(needed, dimension) / 1e9:.2g} GB: too many for the free memory, or more than "
-        f"{_MOST_GROWTH:g} times those of the case. The advice is for {looser:g} times the target. "
-        "Try: axisymmetric half sections where the supports allow them, or apply the advice "
-        "and run it again.",
+        f"{memory_of(needed, dimension) / 1e9:.2g} GB: too many for the free memory, or more "
+        f"than {_MOST_GROWTH:g} times as many as in the case. The advice is for {looser:g} times "
+        "the target. Try: axisymmetric half sections where the supports allow them, or apply "
+        "the advice and run it again.",
     )
 
 

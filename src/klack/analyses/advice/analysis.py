@@ -151,15 +151,15 @@ def _lowered(text: str) -> str:
 
 def _verdict_of_sums(advice: Advice) -> str:
     if advice.is_good:
-        text = "The case meets the target as it is"
+        text = "The case meets the target unchanged"
         return f"{text}; the advice reduces its cost." if advice.changes else f"{text}: keep it."
     if advice.meets:
         return "The case is expected to miss the target, and the advised one to meet it."
     return (
-        "By the sum of expected errors the target is not reached: the advice is limited "
-        "by extrapolation and by the size of the models."
+        "The sum of the expected errors exceeds the target: the advice is limited by "
+        "extrapolation and by the size of the models."
         + _narrower(advice)
-        + (" Run again, the advised case is within it." if _within(advice) else "")
+        + (" When run again, the advised case meets the target." if _within(advice) else "")
     )
 
 
@@ -170,7 +170,7 @@ def _narrower(advice: Advice) -> str:
     if not (met and advice.band_from_case):
         return ""
     return (
-        " Peak force, contact time and history are within it, third octaves are not. Try: "
+        " Peak force, contact time and history meet the target, third octaves do not. Try: "
         "--up-to with the highest frequency that matters, or a larger --bands."
     )
 
@@ -210,25 +210,26 @@ def _reaches(advice: Advice) -> list[str]:
             )
         if not item.reached and item.measured.ladder.scattered:
             lines.append(
-                f"Note: '{name}' scatters by more than its share of the target: refining "
-                "it does not reduce the changes, so nothing finer is advised."
+                f"Note: '{name}' scatters by more than its share of the target: refinement does "
+                "not reduce the changes, so nothing finer is advised."
             )
         elif not item.reached:
             lines.append(
                 f"Note: '{name}' does not reach its share of the target within {REACH:g} times "
-                "finer than the finest run. Try: apply the advice and ask again."
+                "the resolution of the finest run. Try: apply the advice, then run klack advise "
+                "again."
             )
         elif item.measured.ladder.scattered and item.measured.setting.group == "mesh":
             lines.append(
-                f"Note: refining '{name}' changes no less than it did before: what is left there "
-                "is the scatter of meshes."
+                f"Note: refining '{name}' changes the results as much as before: the remaining "
+                "error is the scatter between meshes."
             )
     for fixed in advice.fixed:
         limits = np.array([measure.limit for measure in advice.measures])
         if np.max(fixed.errors / limits) > 0.5:
             lines.append(
-                f"Note: '{fixed.name}' uses more than half of the target, and no "
-                f"setting changes it. Try: {fixed.remedy}."
+                f"Note: '{fixed.name}' uses more than half of the target, and no setting reduces "
+                f"it. Try: {fixed.remedy}."
             )
     return lines
 
@@ -301,13 +302,13 @@ _SETTING = JsonForm(
 )
 _FIXED = JsonForm(
     "FixedErrorJson",
-    "An error that no setting changes.",
+    "An error that no setting can reduce.",
     Key("name", str, of="item.name"),
     Key("error", dict[str, Real], of=lambda of: of.errors(of.item.errors)),
 )
 _ADVICE = JsonForm(
     "AdviceJson",
-    "``klack advise``: errors relative, or in dB where the name says so.",
+    "``klack advise``: errors are relative, or in dB where the name says so.",
     schema_key("klack-advise/1"),
     Key("case", str, of="advice.case"),
     Key("level", str, of="advice.level"),
@@ -343,7 +344,7 @@ _ADVICE = JsonForm(
     Key(
         "changes",
         dict[str, str],
-        "By key: what the advice writes.",
+        "Values written by the advice, by key.",
         lambda advised: {".".join(map(str, key)): x for key, x in advised.changes.items()},
     ),
     Key("notes", list[str], of="advice.notes"),

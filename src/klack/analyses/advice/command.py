@@ -25,18 +25,19 @@ _UpTo = Annotated[
 _Error = Annotated[
     str,
     Parameter(
-        name="--error", help="Accepted for peak force, contact time and force history, e.g. '1 %'."
+        name="--error",
+        help="Accepted error of peak force, contact time and force history, e.g. '1 %'.",
     ),
 ]
 _Bands = Annotated[
-    str, Parameter(name="--bands", help="Accepted in every third octave, e.g. '1 dB'.")
+    str, Parameter(name="--bands", help="Accepted error of every third octave, e.g. '1 dB'.")
 ]
 _Level = Annotated[
     str | None,
     Parameter(
         name="--level",
-        help="reduced or interface, level whose results are to meet the target. [default: reduced; "
-        "interface if off-axis]",
+        help="reduced or interface: level whose results are to meet the target. [default: "
+        "reduced; interface if off-axis]",
     ),
 ]
 _Write = Annotated[
@@ -117,7 +118,7 @@ def _within(option: str, text: str, value: float, most: float, example: str) -> 
         option,
         got=f"'{text}'",
         expected=f"above 0 and at most {shown:g} {unit}",
-        hint=f"write the unit as well: '{example}'.",
+        hint=f"write the value with its unit: '{example}'.",
     )
 
 

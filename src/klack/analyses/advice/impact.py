@@ -213,8 +213,8 @@ def _level(case: Case, asked: AdviceLevel | None) -> AdviceLevel:
                 "--level",
                 got=f"'{asked}'",
                 expected="reduced or interface",
-                hint="a full order has the meshes of both, and its step cannot be measured in "
-                "seconds: advise the interface level.",
+                hint="the full order has the meshes of both, and measuring its step would take "
+                "too long: advise the interface level.",
             )
         return asked
     centred = case.motion.placement.is_centred
@@ -227,12 +227,11 @@ def _require_surfaces(case: Case) -> None:
     if names:
         raise InputError(
             f"{case.path or 'case'}: bodies.{names[0]}",
-            got="a body without surfaces (a reduced model, or nodes alone)",
+            got="a body without surfaces (a reduced model, or only nodes)",
             expected="two bodies with meshed surfaces",
-            hint="such a body has a mesh error and missing modes that "
-            "cannot be measured here: compare klack impact of two such models, one from a finer "
-            "mesh and with more modes; for the step run the case again with half of "
-            "run.reduced_step.",
+            hint="such a body has a mesh error and missing modes that cannot be measured here: "
+            "compare klack impact of two such models, one from a finer mesh and with more "
+            "modes; for the step, run the case again with half of run.reduced_step.",
         )
 
 
@@ -276,7 +275,8 @@ def _require_one_pulse(base: _Base, history: ImpactHistory) -> None:
     if not np.isfinite(measures.restitution):
         raise InputError(
             f"{base.case.path or 'case'}: run.duration",
-            got=f"{format_si(base.case.run.duration, 's')}, and the bodies do not separate before",
+            got=f"{format_si(base.case.run.duration, 's')}, within which the bodies do not "
+            f"separate",
             expected="a time that covers the impact and the rebound",
             hint="increase run.duration until klack impact prints a restitution.",
         )
@@ -285,9 +285,9 @@ def _require_one_pulse(base: _Base, history: ImpactHistory) -> None:
             f"{base.case.path or 'case'}: level {base.level}",
             got=f"an impact of {measures.sub_contacts} contacts: the force rings on the modes",
             expected="one contact, whose peak and history converge",
-            hint="where faces meet all at once, only impulse, restitution and the plateau of the "
-            "full order converge: compare klack impact --level full on two meshes; where they "
-            "do not, use correction: consistent, or --level interface.",
+            hint="for faces that meet all at once, only impulse, restitution and the plateau of "
+            "the full order converge: compare klack impact --level full on two meshes; "
+            "otherwise use correction: consistent, or --level interface.",
         )
 
 
@@ -325,8 +325,8 @@ def _modes_and_step(
                 log.notes.append(
                     f"Even {within} modes of '{name}' end at "
                     f"{format_si(float(base.pools[name].frequency[-1]), 'Hz', 3)}, inside the "
-                    "target band: its upper end is a guess. Try: modes by participation from a "
-                    "larger pool."
+                    "target band, whose upper end is therefore uncertain. Try: modes by "
+                    "participation from a larger pool."
                 )
         measured.append(
             Measured(
@@ -418,8 +418,8 @@ def _family(base: _Base, log: _Log) -> _Family:
 def _too_big(dofs: int, factor: float, dimension: int) -> str:
     return (
         f"Refining meshes of {dofs} degrees of freedom could take more than half of the free "
-        f"memory (estimated {memory_of(larger(dofs, factor, dimension), dimension) / 1e9:.2g} GB): "
-        "they were made coarser instead, and an order was assumed."
+        f"memory (estimated {memory_of(larger(dofs, factor, dimension), dimension) / 1e9:.2g} "
+        "GB): they were coarsened instead, and an order of convergence was assumed."
     )
 
 
@@ -590,7 +590,7 @@ def _confirmed(
         advice,
         checked=checked,
         check_words=f"both run again{family.words}, against the interface level on {on}, with "
-        "twice the modes and half the step, or those of the advice where they are finer",
+        "twice the modes and half the step, or as advised where that is finer",
     )
 
 

@@ -143,9 +143,9 @@ def unmeshed_notes(bodies: Mapping[str, CaseBody], size_ratio: float = nan) -> l
         )
     if reduced:
         notes.append(
-            f"Reduced models ({_names(reduced)}): neither their meshes nor their omitted "
-            "modes can be measured here. Try: get a second one from their source, reduced from a "
-            "finer mesh with more modes, and compare both runs."
+            f"Reduced models ({_names(reduced)}): neither their meshes nor their omitted modes "
+            "can be measured here. Try: obtain a second model, reduced from a finer mesh with "
+            "more modes, and compare both runs."
         )
     return notes
 
@@ -158,9 +158,9 @@ def coarse_contact_notes(size_ratio: float) -> list[str]:
     if not size_ratio > COARSE:
         return []
     return [
-        f"Elements across the contact are {size_ratio:.2g} half widths long, and a run warns above "
-        f"{COARSE:g}. That rule is for pressures and the width of the contact; this advice is for "
-        "the numbers judged here, by runs with other elements."
+        f"Elements across the contact are {size_ratio:.2g} half widths long, and a run warns "
+        f"above {COARSE:g}. That rule applies to pressures and the width of the contact; this "
+        "advice applies to the numbers judged here, from runs with other elements."
     ]
 
 

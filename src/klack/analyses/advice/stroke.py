@@ -283,8 +283,8 @@ def _confirmed(
     return replace(
         advice,
         checked=(_deviation(reference, now), _deviation(reference, advised)),
-        check_words="both run again, against the valve with every setting at its finest, "
-        "that of the runs or of the advice",
+        check_words="both run again, against the valve with every setting at its finest value "
+        "in the runs or in the advice",
     )
 
 

@@ -89,7 +89,11 @@ _CALIBRATION = JsonForm(
         "First impacts, by stop, from the trigger.",
         by_name("impacts", "stop"),
     ),
-    Key("correlation", list[list[Real]], "Of the estimates, in the order of the parameters."),
+    Key(
+        "correlation",
+        list[list[Real]],
+        "Correlations of the estimates, in the order of the parameters.",
+    ),
     Key("warnings", list[str]),
 )
 

@@ -22,8 +22,8 @@ _Files = Annotated[
     Parameter(
         name="--measurement",
         negative="",
-        help="Recording of strokes: CSV, MDF4, TDMS, UFF, HDF5, MATLAB; several times for several "
-        "files.",
+        help="Recording of strokes: CSV, MDF4, TDMS, UFF, HDF5, MATLAB; repeat the option for "
+        "several files.",
     ),
 ]
 _Strokes = Annotated[int | None, Parameter(name="--strokes", help="Fit only the first N strokes.")]

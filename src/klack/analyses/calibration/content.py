@@ -106,7 +106,7 @@ def stroke_chart(study: CalibrationStudy, channel: FittedChannel) -> Chart:
         span=(float(study.time[0]), float(study.time[-1])),
         note=(
             "Shaded: fitted range. Outside, bounces magnify the differences between strokes. "
-            "Below: mean of the measured strokes less computed."
+            "Below: mean of the measured strokes minus computed."
         ),
     )
 
@@ -294,7 +294,7 @@ def _answer(study: CalibrationStudy) -> str:
     judged = "no more than" if study.misfit <= 1.5 else f"{study.misfit:.1f} times"
     text += f", {judged} the value expected from the scatter of the strokes and their noise."
     if study.warnings:
-        text += " Read the notes below before you use the numbers."
+        text += " Read the notes below before using the numbers."
     return text
 
 
@@ -381,11 +381,11 @@ def _correlations(study: CalibrationStudy) -> Section:
         [item.name for item in study.parameters],
         (
             ("of the estimates, from the scatter of the strokes", study.correlation),
-            ("of the sensitivities alone", study.design_correlation),
+            ("of the sensitivities only", study.design_correlation),
         ),
-        "Near +1 or −1 two parameters have the same effect on the data. Left: of the fitted "
-        "values, from the scatter of the strokes. Right: separable in principle from the measured "
-        "windows, if all samples scattered independently.",
+        "Near +1 or −1 two parameters have the same effect on the data. Left: correlation of "
+        "the fitted values, from the scatter of the strokes. Right: correlation from the "
+        "sensitivities in the measured windows, as if all samples scattered independently.",
     )
     return Section(title=title, picture=figure)
 
@@ -404,21 +404,21 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
     *glossary((SCATTER, *(item for item in CALIBRATION_MEASURES if item.key == "misfit"))),
     (
         "first impact",
-        "Time at which the fitted approach reaches the level of the stop, read off the mean "
-        "measured stroke and the computed ones in the same way.",
+        "Time at which the fitted approach reaches the level of the stop, determined for the "
+        "mean measured stroke and the computed strokes in the same way.",
     ),
     (
         "windows",
-        "Free flights and first impacts, up to the impact after the last one that is fitted. "
-        "Samples are weighted with the inverse variance between strokes.",
+        "Free flights and first impacts, up to the impact after the last fitted one. Samples "
+        "are weighted with the inverse variance between strokes.",
     ),
 )
 
 _LIMITS: tuple[tuple[str, str], ...] = (
     (
         "model",
-        "The errors come from the scatter of the strokes. Effects missing in the model shift the "
-        "fitted parameters, which no interval shows: check the residual over time.",
+        "The errors come from the scatter of the strokes. Effects missing from the model shift "
+        "the fitted parameters without widening any interval: check the residual over time.",
     ),
     (
         "sensor",

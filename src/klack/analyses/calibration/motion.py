@@ -169,7 +169,8 @@ def channel_names(
                 got=f"the channel '{role}', of which this valve has {len(names)}"
                 + (f" ({one_of(names)})" if names else ""),
                 expected=f"one of: {one_of(r for r, n in known.items() if len(n) == 1)}",
-                hint="trigger and fit channels that the computed stroke has exactly once.",
+                hint="use only channels that the computed stroke has exactly once for trigger "
+                "and fit.",
             )
         result[role] = names[0]
     return result

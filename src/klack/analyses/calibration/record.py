@@ -215,19 +215,20 @@ VALUE = _of_parameter(
     "value",
     "value",
     "theta",
-    "Where the weighted sum of squares between the mean measured stroke and the computed one is "
-    "smallest, inside the bounds.",
+    "Value with the smallest weighted sum of squares between the mean measured and the computed "
+    "stroke, within the bounds.",
     note="The computed stroke went through the same sensor, trigger and zero.",
 )
 STANDARD_ERROR = _of_parameter(
     "standard_error",
     "standard error",
     "s_theta",
-    "Standard error of the mean of all strokes; missing if the data do not see the parameter.",
+    "Standard error of the mean of all strokes; missing if the data do not depend on the "
+    "parameter.",
     2,
-    note="Every stroke alone asks for its own value (one Gauss-Newton step); the standard error is "
-    "the standard deviation of these over the root of their number. Residuals of one stroke "
-    "are correlated, so samples are not counted as independent.",
+    note="Every single stroke gives its own value (one Gauss-Newton step); the standard error "
+    "is the standard deviation of these values over the root of their number. Residuals of one "
+    "stroke are correlated, so samples are not counted as independent.",
 )
 INTERVAL = (
     _of_parameter("lower_95", "lower end, 95 %", "", "Lower end of the 95 % interval."),
@@ -237,11 +238,13 @@ SCATTER = _of_parameter(
     "scatter",
     "scatter of strokes",
     "s",
-    "Standard deviation of what the single strokes ask for.",
+    "Standard deviation of the values from the single strokes.",
     2,
-    note="It holds the true scatter of the valve and the noise of one record.",
+    note="It contains the true scatter of the valve and the noise of one record.",
 )
-START = _of_parameter("start", "start", "theta_0", "Value before, that of the case.", 4)
+START = _of_parameter(
+    "start", "start", "theta_0", "Value before the calibration, from the case.", 4
+)
 BOUNDS = (
     _of_parameter("lower", "lower bound", "", "Least value that is allowed.", 3),
     _of_parameter("upper", "upper bound", "", "Largest value that is allowed.", 3),
@@ -265,7 +268,7 @@ CALIBRATION_MEASURES: tuple[Measure[CalibrationStudy], ...] = described_in(
         name="residual of the lift",
         symbol="r",
         unit="um",
-        definition="Root mean square of the mean measured stroke less the calibrated one, inside "
+        definition="Root mean square of the mean measured minus the calibrated stroke, within "
         "the fitted windows.",
         read=lambda study: 1e6 * study.residual_rms,
         form="fixed",
@@ -295,7 +298,7 @@ CALIBRATION_MEASURES: tuple[Measure[CalibrationStudy], ...] = described_in(
         symbol="chi",
         definition="Weighted root mean square residual of the mean stroke in standard errors of "
         "the mean.",
-        note="About 1 or less if only scatter is left; far above, something in the model is wrong.",
+        note="About 1 or less if only scatter is left; far above 1, the model is wrong somewhere.",
         form="fixed",
         digits=2,
         page=True,
@@ -329,12 +332,12 @@ CALIBRATION_MEASURES: tuple[Measure[CalibrationStudy], ...] = described_in(
         kind="whole",
         page=True,
     ),
-    Measure(key="converged", definition="Whether the fit settled.", kind="truth"),
+    Measure(key="converged", definition="Whether the fit converged.", kind="truth"),
     Measure(key="wall_time", unit="s", definition="Wall time of the whole calibration.", digits=3),
     Measure(
         key="profile_time",
         unit="s",
-        definition="Wall time of the profiles of the likelihood alone.",
+        definition="Wall time of only the likelihood profiles.",
         digits=3,
     ),
 )
@@ -357,7 +360,7 @@ def _first_impact(key: str, name: str, definition: str, digits: int) -> Measure[
 
 FITTED_MEASURES = (
     _first_impact("measured", "measured", "First impact, median of the strokes.", 5),
-    _first_impact("scatter", "scatter", "Standard deviation of it from stroke to stroke.", 2),
+    _first_impact("scatter", "scatter", "Its standard deviation from stroke to stroke.", 2),
     _first_impact("before", "before", "Computed with the values of the case.", 5),
     _first_impact("after", "calibrated", "Computed with the calibrated values.", 5),
 )

@@ -356,8 +356,8 @@ def _repeatable(
         return windows, ()
     return (opening,), (
         f"The needle still bounces on the opening stop {1e3 * last:.3g} ms after the trigger, "
-        f"shortly before it closes: bounces too low to be measured determine that time, "
-        "so only the opening was fitted. Try: a longer stroke, or the wet valve.",
+        "shortly before it closes: bounces too small to be measured determine that time, so "
+        "only the opening was fitted. Try: a longer stroke, or the wet valve.",
     )
 
 
@@ -538,9 +538,9 @@ def _doubts(
         )
     if misfit > _POOR:
         notes.append(
-            f"The model does not explain the strokes: the residual is {misfit:.1f} times what "
-            "their scatter allows, so the intervals are too narrow. Check the residual "
-            "over time; something other than the parameters is wrong."
+            f"The model does not explain the strokes: the residual is {misfit:.1f} times the "
+            "value that their scatter allows, so the intervals are too narrow. Check the "
+            "residual over time; the cause lies outside the parameters."
         )
     if count == 1:
         notes.append(
@@ -549,7 +549,7 @@ def _doubts(
         )
     elif count < _FEW or count < parameters + 2:
         notes.append(
-            f"{count} strokes give the scatter of {parameters} parameters roughly: the single "
+            f"{count} strokes give only a rough scatter of {parameters} parameters: the single "
             "errors are valid (with Student's t), the correlations are not. Measure ten strokes "
             "or more."
         )

@@ -105,8 +105,8 @@ PROGRAM_MEASURES: tuple[Measure[LevelResult], ...] = (
     Measure(
         key="energy_balance",
         symbol="r_E",
-        definition="Energy gained (negative: lost) by the numerics of a run without damping, over "
-        "the energy turned over; friction of the faces is no loss of the numerics.",
+        definition="Energy gained (negative: lost) by the numerics of a run without damping, "
+        "over the energy throughput; friction of the faces is not a numerical loss.",
         source="theory/calculix",
         read=lambda run: energy_balance(run.history.ledger),
         form="power",
@@ -152,7 +152,7 @@ def level_of(study: ImpactStudy, name: str) -> LevelResult:
         raise InputError(
             f"result of case '{study.case}'",
             got="an impact of three bodies in a row",
-            expected="an impact of two bodies, which has sensors and a deck of CalculiX",
+            expected="an impact of two bodies, for which sensors and a CalculiX deck exist",
             hint="compare a stroke of the three bodies with its measurement.",
         )
     if name not in study.levels:
@@ -225,14 +225,14 @@ def _told(comparison: Comparison) -> Iterator[TextTable | str]:
         return
     if friction:
         yield (
-            f"Energy that {comparison.other.program} lost, to friction and its numerics: "
-            f"{100 * swing:.2f} % of that at the start; friction took {100 * friction:.2f} % in "
-            "klack."
+            f"Energy that {comparison.other.program} lost to friction and its numerics: "
+            f"{100 * swing:.2f} % of the energy at the start; friction dissipated "
+            f"{100 * friction:.2f} % in klack."
         )
     else:
         yield (
-            f"Energy of {comparison.other.program} within {swing:.1e} of that at the start at all "
-            "times."
+            f"Energy of {comparison.other.program} within {swing:.1e} of its initial value at "
+            "all times."
         )
 
 

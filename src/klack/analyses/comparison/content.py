@@ -50,8 +50,8 @@ __all__ = [
 
 _HIGHEST = (
     "The stroke that rebounds highest is usually taken for the centred one. The highest of many "
-    "readings is too high by their errors, and the highest of many strokes lies above the median "
-    "by chance alone; both are estimated here from the scatter."
+    "readings is too high because of their errors, and the highest of many strokes lies above "
+    "the median merely by chance; both effects are estimated here from the scatter."
 )
 _MOST_IMPACTS = 6
 
@@ -207,23 +207,24 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
     ),
     (
         "scatter",
-        "Of a number: standard deviation from stroke to stroke. Of a curve: root mean square of "
-        "the single strokes about their median, over all times, including the noise of the sensor. "
-        "Of a single stroke: the reading error.",
+        "For a number: standard deviation from stroke to stroke. For a curve: root mean square "
+        "of the single strokes about their median, over all times, including the noise of the "
+        "sensor. For a single stroke: the reading error.",
     ),
     (
         "reading error",
-        "Standard error with which a number is read off one stroke, median of the strokes; of "
-        "times, with the spacing of the samples that find the trigger. Where few strokes happen to "
-        "scatter less than that, differences count in reading errors.",
+        "Standard error with which a number is determined from one stroke, median of the "
+        "strokes; for times, including the spacing of the samples that define the trigger. "
+        "Where a few strokes happen to scatter less than that, differences are given in reading "
+        "errors.",
     ),
     (
         "time, approach speed, restitution",
-        "From smooth flights fitted to the lift before and after an impact, extrapolated to "
-        "the rest level of the needle on the stop; read off the computed lift in the same "
-        "way, with the same noise as the measured one (median of some readings). "
-        "They differ from the numbers of the centre of mass in a table of klack stroke: "
-        "vibration of the needle, squeeze films and the level of rest make a difference.",
+        "From smooth flights fitted to the lift before and after an impact, extrapolated to the "
+        "rest level of the needle on the stop; determined from the computed lift in the same "
+        "way, with the same noise as the measured one (median of several readings). They differ "
+        "from the numbers of the centre of mass in a table of klack stroke because of vibration "
+        "of the needle, squeeze films and the level of rest.",
     ),
     (
         "rebound height",
@@ -234,9 +235,9 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
 _LIMITS: tuple[tuple[str, str], ...] = (
     (
         "Scatter",
-        "A good test rig has little scatter, so small differences weigh much. A difference "
-        "in standard deviations shows whether a single stroke can be distinguished from the "
-        "model, not whether the model is good enough for a purpose.",
+        "A good test rig has little scatter, so even small differences are many standard "
+        "deviations. A difference in standard deviations shows whether a single stroke can be "
+        "distinguished from the model, not whether the model is good enough for a purpose.",
     ),
     (
         "Late bounces",
@@ -250,9 +251,9 @@ _DROP_DEFINITIONS: tuple[tuple[str, str], ...] = (
     (
         "highest rebound",
         "Rebounds of dry drops scatter, and the highest of many is usually taken for a centred "
-        "impact. The more drops, the higher the highest: 'mean highest' is what the "
-        "highest of as many computed shots as were measured has on average, and its bias is this "
-        "value minus the centred shot.",
+        "impact. The more drops, the higher the highest: 'mean highest' is the average over the "
+        "highest of as many computed shots as drops were measured, and its bias is this value "
+        "minus the centred shot.",
     ),
     (
         "restitution, rebound height",
@@ -262,16 +263,16 @@ _DROP_DEFINITIONS: tuple[tuple[str, str], ...] = (
     ),
     (
         "reading error",
-        "Standard error with which a number is read off one drop, median of the drops: it widens "
-        "the measured distribution.",
+        "Standard error with which a number is determined from one drop, median of the drops: "
+        "it widens the measured distribution.",
     ),
 )
 
 _DROP_LIMITS: tuple[tuple[str, str], ...] = (
     (
         "Distributions",
-        "The test finds differences, not reasons: other eccentricity, friction or preload than "
-        "assumed can give the same distribution.",
+        "The test finds differences, not reasons: an eccentricity, friction or preload other "
+        "than assumed can give the same distribution.",
     ),
 )
 
@@ -289,7 +290,7 @@ def measured_impact_content(study: MeasuredImpactStudy) -> Content:
     ]
     return page_of(
         study,
-        "Impact beside measured pulses",
+        "Impact against measured pulses",
         answer=f"{pulse_verdict(study)} {factor_sentence(study)}",
         numbers=Table(
             columns=("", *(pulse.name for pulse in study.pulses)),
@@ -312,8 +313,8 @@ def measured_impact_content(study: MeasuredImpactStudy) -> Content:
         limits=(
             (
                 "factor",
-                "Where it is fitted, the height of the pulse is not compared: neither the speed "
-                "nor the scale of the sensor is tested.",
+                "If a factor is fitted, the height of the pulse is not compared: neither the "
+                "speed nor the scale of the sensor is tested.",
             ),
             (
                 "shift",

@@ -58,11 +58,11 @@ def lift_chart(variant: ComparedVariant) -> Chart:
             ),
         ),
         note=(
-            f"{variant.count} measured strokes ({variant.source}). Thin: all of them; shaded: 5 to "
-            "95 % of the strokes at each time; below, the difference of the computed lift from the "
-            "median, in the same band. The computed lift is shown as the sensor would show it; "
-            "velocities are derived from both lifts by the same window (3 dB at "
-            f"{quantity(variant.velocity_bandwidth, 'Hz', 3)}, which leaves a noise of "
+            f"{variant.count} measured strokes ({variant.source}). Thin: all strokes; shaded: 5 "
+            "to 95 % of the strokes at each time; below, the difference of the computed lift "
+            "from the median, with the same band. The computed lift is shown as the sensor "
+            "would show it; velocities are derived from both lifts with the same window (3 dB "
+            f"at {quantity(variant.velocity_bandwidth, 'Hz', 3)}, which leaves a noise of "
             f"{quantity(variant.velocity_noise, 'm/s', 2)})."
         ),
     )
@@ -268,9 +268,9 @@ def measured_distribution_chart(of: MeasuredDistribution) -> Chart:
         ),
         note=(
             "Share of the shots up to each value. Points: the shot with the highest rebound of "
-            "each set. 'Centred' is the computed shot without eccentricity, tilt, out-of-roundness "
-            f"and friction; 'mean highest' is what the highest of {_known(of.measured).size} "
-            "computed shots has on average."
+            "each set. 'Centred' is the computed shot without eccentricity, tilt, "
+            "out-of-roundness and friction; 'mean highest' is the average over the highest of "
+            f"{_known(of.measured).size} computed shots."
         ),
     )
 

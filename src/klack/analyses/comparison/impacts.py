@@ -121,7 +121,7 @@ def gauge_of(study: ImpactStudy, level: str, output: str | None) -> GaugeRecord:
         raise InputError(
             f"result of case '{study.case}', level '{level}'",
             got="no outputs",
-            expected="an output where the sensor of the measurement sits",
+            expected="an output at the position of the measuring sensor",
             hint="add the section 'outputs' to the case, and run klack impact again.",
         )
     if output is None and len(gauges) == 1:
@@ -129,7 +129,7 @@ def gauge_of(study: ImpactStudy, level: str, output: str | None) -> GaugeRecord:
     if output not in gauges:
         raise InputError(
             "--output",
-            got="several outputs and no name" if output is None else f"'{output}'",
+            got="several outputs, but no name" if output is None else f"'{output}'",
             expected=f"one of: {', '.join(gauges)}",
             hint=f"--output {next(iter(gauges))}.",
         )
@@ -236,6 +236,6 @@ def _factor(path: Path, info: ChannelInfo, kind: GaugeKind) -> float:
             where,
             got=f"the unit '{info.unit}'",
             expected=f"a unit of a strain: {', '.join(_STRAINS)}",
-            hint="check that it is the right channel; volts of a bridge need its factor.",
+            hint="check that it is the right channel; the voltage of a bridge needs its factor.",
         )
     return _STRAINS[unit]

@@ -93,7 +93,7 @@ def _pair(key: str, definition: str) -> tuple[Measure[ComparedPulse], ...]:
         Measure(
             key=f"measured_{key}",
             unit="s",
-            definition=f"{definition} Of the measured pulse.",
+            definition=f"{definition} For the measured pulse.",
             read=lambda pulse: getattr(pulse.measured, key),
             column=Column(*_US, f"{words}, measured"),
             page=True,
@@ -101,7 +101,7 @@ def _pair(key: str, definition: str) -> tuple[Measure[ComparedPulse], ...]:
         Measure(
             key=f"computed_{key}",
             unit="s",
-            definition=f"{definition} Of the computed pulse.",
+            definition=f"{definition} For the computed pulse.",
             read=lambda pulse: getattr(pulse.computed, key),
             column=Column(*_US, "computed"),
             page=True,
@@ -113,15 +113,15 @@ PULSE_MEASURES: tuple[Measure[ComparedPulse], ...] = described_in(
     "reference/measured",
     Measure(
         key="factor",
-        definition="Measured over computed: the one factor that is fitted, unless the speed is "
-        "known.",
+        definition="Measured over computed: the single factor that is fitted, unless the speed "
+        "is known.",
         column=Column("", 1.0, ".4f"),
         page=True,
     ),
     Measure(
         key="shift",
         unit="s",
-        definition="Time of the computed pulse minus that of the measured one, fitted.",
+        definition="Fitted time shift, computed minus measured pulse.",
     ),
     Measure(
         key="measured_plateau",
@@ -131,14 +131,14 @@ PULSE_MEASURES: tuple[Measure[ComparedPulse], ...] = described_in(
     ),
     Measure(
         key="rms",
-        definition="Root mean square of the difference over the measured plateau, from 20 % of the "
-        "length before the front to 20 % behind the end.",
+        definition="Root mean square of the difference over the measured plateau, from 20 % of "
+        "the length before the front to 20 % after the end.",
         form="share",
         digits=2,
         column=Column("%", 100.0, ".2f", "rms"),
         page=True,
     ),
-    *_pair("length", "Between the crossings of half of the plateau."),
+    *_pair("length", "Between the crossings of half the plateau."),
     Measure(
         key="length_difference",
         definition="Computed length over the measured one, minus 1.",
@@ -173,6 +173,6 @@ PULSE_MEASURES: tuple[Measure[ComparedPulse], ...] = described_in(
         read=lambda pulse: pulse.computed.ripple,
         form="share",
     ),
-    *_pair("ripple_period", "From the first to the second crest behind the front."),
+    *_pair("ripple_period", "From the first to the second crest after the front."),
 )
 """Of one recording; catalogue of its page."""

@@ -20,7 +20,7 @@ __all__ = [
 
 _PULSE = JsonForm(
     "PulseJson",
-    "One recording beside the computed pulse.",
+    "One recording with the computed pulse.",
     Key("recording", str, of="name"),
     Key("channel", str, "Name in the file, with its unit."),
     *measured_keys(PULSE_MEASURES),
@@ -88,15 +88,13 @@ def factor_sentence(study: MeasuredImpactStudy) -> str:
         return "No factor was fitted: the speed is taken as known and the recordings as absolute."
     speeds = ", ".join(f"{pulse.factor * study.speed:.4g}" for pulse in pulses)
     said = (
-        "One factor and one shift in time were fitted to each recording: the height of a pulse is "
-        "no prediction."
+        "One factor and one shift in time were fitted to each recording: the height of a pulse "
+        "is not a prediction."
     )
     if not all(pulse.absolute for pulse in pulses):
-        return (
-            f"{said} A recording without a unit, or with a scale that is not known, has no speed."
-        )
+        return f"{said} A recording without a unit, or with an unknown scale, has no speed."
     if any(not 1.0 / _LIKELY < pulse.factor < _LIKELY for pulse in pulses):
-        return f"{said} The recordings are not absolute: they would be those of {speeds} m/s."
+        return f"{said} The recordings are not absolute: they would correspond to {speeds} m/s."
     return (
         f"{said} If the recordings are absolute, the speeds were {speeds} m/s "
         f"({study.speed:g} m/s computed)."
@@ -120,6 +118,6 @@ MEASURED_IMPACT = StoredAnalysis(
     json=_STUDY.type,
     to_json=_STUDY.json,
     told=_told,
-    measures={"pulse beside a measurement": PULSE_MEASURES},
+    measures={"pulse against a measurement": PULSE_MEASURES},
     measured=_measured,
 )

@@ -55,7 +55,7 @@ def _compared(
 
     return described_in(
         _THEORY,
-        measure("", "computed", "Read off the computed lift.", attrgetter("computed")),
+        measure("", "computed", "Determined from the computed lift.", attrgetter("computed")),
         measure("measured", "measured", "Median of the strokes.", attrgetter("measured")),
         measure(
             "scatter",
@@ -66,7 +66,7 @@ def _compared(
         measure(
             "reading_error",
             "reading error",
-            "Standard error of reading it off one stroke, median of the strokes.",
+            "Standard error of determining it from one stroke, median of the strokes.",
             attrgetter("error"),
         ),
         Measure(
@@ -107,14 +107,14 @@ COMPARED: tuple[tuple[str, tuple[Measure[ComparedImpact], ...]], ...] = (
         "approach speed [m/s]",
         _compared(
             "approach_speed", "v_0", "m/s", Column("m/s", 1.0, ".3f"),
-            "Speed at the level of the stop, by the flight before.", attrgetter("approach_speed"),
+            "Speed at the stop level, from the preceding flight.", attrgetter("approach_speed"),
         ),
     ),
     (
         "restitution",
         _compared(
             "restitution", "e", "1", Column("", 1.0, ".3f"),
-            "Speed after the impact over that before it, by both flights.",
+            "Speed after the impact over speed before it, from both flights.",
             attrgetter("restitution"),
         ),
     ),
@@ -181,7 +181,8 @@ LIFT = _compared(
     "s",
     "m",
     _LIFT,
-    "Rest on the opening stop less rest on the seat: the gap, and how far forces press stops in.",
+    "Rest level on the opening stop minus rest level on the seat: the gap plus the elastic "
+    "compression of the stops.",
     attrgetter("way"),
 )
 
@@ -202,7 +203,8 @@ VARIANT_MEASURES: tuple[Measure[ComparedVariant], ...] = described_in(
         name="bandwidth of the velocity",
         symbol="f_v",
         unit="Hz",
-        definition="3 dB of the differentiator that makes velocity of lift, computed and measured.",
+        definition="3 dB bandwidth of the differentiator from lift to velocity, for computed and "
+        "measured lift.",
         digits=3,
     ),
     *LIFT,
@@ -249,7 +251,7 @@ HIGHEST_MEASURES: tuple[Measure[HighestShot], ...] = described_in(
         key="strokes",
         name="of strokes",
         symbol="n",
-        definition="Strokes of which it is the highest.",
+        definition="Number of strokes of which it is the highest.",
         read=attrgetter("count"),
         kind="whole",
         column=Column("", 1.0, "d"),
@@ -258,7 +260,7 @@ HIGHEST_MEASURES: tuple[Measure[HighestShot], ...] = described_in(
     Measure(
         key="too_high_by_reading",
         unit="m",
-        definition="How much too high the highest of so many readings is by their errors alone.",
+        definition="Amount by which reading errors alone raise the highest of that many readings.",
         read=attrgetter("by_reading"),
         digits=3,
         column=Column("um", 1e6, ".2f"),
@@ -267,8 +269,8 @@ HIGHEST_MEASURES: tuple[Measure[HighestShot], ...] = described_in(
         key="above_median",
         name="above the median",
         unit="m",
-        definition="How far the highest of so many strokes lies above the median, without reading "
-        "errors.",
+        definition="Amount by which the highest of that many strokes lies above the median, "
+        "without reading errors.",
         digits=3,
         column=Column("um", 1e6, ".2f"),
     ),
@@ -325,15 +327,15 @@ DISTRIBUTION_MEASURES: tuple[Measure[MeasuredDistribution], ...] = described_in(
         "reading_error",
         "reading error",
         "",
-        "Standard error of reading it off one drop, median of the drops.",
+        "Standard error of determining it from one drop, median of the drops.",
         "error",
     ),
-    _in_its_unit("centred", "centred shot", "x_0", "Of the computed shot that is centred."),
+    _in_its_unit("centred", "centred shot", "x_0", "Value of the centred computed shot."),
     _in_its_unit(
         "expected_highest",
         "mean highest",
         "",
-        "Mean over the highest of any computed shots, as many as were measured.",
+        "Mean of the highest of as many computed shots as drops were measured.",
     ),
     _in_its_unit("highest_bias", "bias of the highest", "", "Mean highest minus the centred shot."),
     Measure(

@@ -75,7 +75,7 @@ class ComparedImpact:
     stop
         ``"opening"`` or ``"seat"``.
     number
-        1 for the first on this stop.
+        1 for the first impact on this stop.
     time [s]
         Of first touch, from the trigger.
     approach_speed [m/s]

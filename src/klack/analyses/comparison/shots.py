@@ -146,8 +146,8 @@ def _first_impacts(
             + (f" ({unread[0].name}: {unread[0].reason})" if unread else ""),
             expected=f"at least {_FEWEST}",
             hint="with 'measurement: {zero: none}' the lift is measured from first touch; "
-            "otherwise the needle must come to rest on its seat in the record; a sensor that "
-            "counts backwards takes scale: -1 in measurement.channels.lift.",
+            "otherwise the needle must come to rest on its seat in the record; for a sensor of "
+            "reversed sign set scale: -1 in measurement.channels.lift.",
         )
     return tuple(names), tuple(impacts), tuple(unread)
 

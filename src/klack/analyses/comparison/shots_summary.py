@@ -69,12 +69,12 @@ _STUDY = JsonForm(
     ),
     Key("verdict", str, of=lambda study: drop_verdict(study)),
     Key("bias", str, of=lambda study: bias_sentence(study)),
-    Key("rule", str, "How the verdict is found.", lambda study: drop_rule(study)),
+    Key("rule", str, "Rule of the verdict.", lambda study: drop_rule(study)),
 )
 
 
 def _told(study: MeasuredShotsStudy) -> Iterator[TextTable | Notes | str]:
-    title = f"{study.title}: beside {len(study.names)} measured drops"
+    title = f"{study.title}: against {len(study.names)} measured drops"
     yield TextTable(title=title, columns=DROP_COLUMNS, rows=drop_rows(study), left=2)
     for item in study.rejected:
         yield f"Discarded: {item.name}: {item.reason}"
@@ -96,7 +96,7 @@ def drop_verdict(study: MeasuredShotsStudy) -> str:
 
 
 def drop_rule(study: MeasuredShotsStudy) -> str:
-    """How the verdict is found."""
+    """Rule of the verdict."""
     return (
         "Rule: two distributions agree if shots of one and the same valve would differ more in "
         f"at least {100 * study.likely:g} of 100 repetitions (test of Kolmogorov and Smirnov)."
@@ -111,8 +111,8 @@ def bias_sentence(study: MeasuredShotsStudy) -> str:
         text = _value(d.highest_bias, d.unit, sign=True)
         found.append(f"{text} in the {d.name} (highest measured: {_value(d.measured_highest, d)})")
     return (
-        f"Taking the highest rebound of {count} shots for the centred impact is off, on average "
-        f"over the computed shots, by {' and by '.join(found)}."
+        f"Taking the highest rebound of {count} shots for the centred impact is wrong, on "
+        f"average over the computed shots, by {' and by '.join(found)}."
     )
 
 
@@ -164,7 +164,7 @@ MEASURED_SHOTS = StoredAnalysis(
     told=_told,
     measures={
         "measured drops": DROPS_MEASURES,
-        "distribution beside a measurement": DISTRIBUTION_MEASURES,
+        "distribution against a measurement": DISTRIBUTION_MEASURES,
     },
     measured=_measured,
 )

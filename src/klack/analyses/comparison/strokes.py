@@ -48,8 +48,8 @@ _NOTICED = 0.05
 _REACHED = 0.1
 """Share of the way that may be missing at the opening stop."""
 _BY_DRAWING = (
-    "The needle never rests on the opening stop in some strokes; there its level is that of the "
-    "seat plus the lift of the drawing."
+    "The needle never rests on the opening stop in some strokes; there its level is the level "
+    "of the seat plus the lift in the drawing."
 )
 _REPLICAS, _SEED = 5, 1
 """Noisy copies of the computed lift."""
@@ -103,7 +103,8 @@ def _variant(study: StrokeStudy, name: str) -> StrokeVariant:
             f"--measurement {name}=...",
             got=f"a result without the variant '{name}'",
             expected=f"one of: {', '.join(study.variants)}",
-            hint=f"run `klack stroke {study.case} --variant {name}` first, or name another.",
+            hint=f"run `klack stroke {study.case} --variant {name}` first, or name another "
+            f"variant.",
         )
     return study.variants[name]
 
@@ -175,9 +176,9 @@ def require_same_way(source: str, computed: Floats, measured: Floats) -> None:
         raise InputError(
             f"{source}: lift",
             got=f"a lift that moves against the computed one (correlation {together:.2f})",
-            expected="lift that grows as the valve opens",
-            hint="if the sensor counts backwards, say so in the case: measurement: {channels: "
-            "{lift: {name: NAME, scale: -1}}}.",
+            expected="a lift that grows as the valve opens",
+            hint="if the sign of the sensor is reversed, state it in the case: measurement: "
+            "{channels: {lift: {name: NAME, scale: -1}}}.",
         )
 
 

@@ -51,11 +51,11 @@ IMPACT_COLUMNS = ("impact", "number", *heads(LIFT))
 HIGHEST_COLUMNS = ("highest rebound", "stroke", *heads(HIGHEST_MEASURES))
 
 RULE = (
-    "Rule: the agreement is excellent if every number of the first impact on each stop lies within "
-    "{excellent:g} standard deviations of single strokes from the measured median, and the root "
-    "mean square differences of lift and velocity are at most {excellent:g} times those of single "
-    "strokes; fair up to {fair:g}. Later impacts and the lift between the stops are shown, not "
-    "counted."
+    "Rule: the agreement is excellent if every number of the first impact on each stop lies "
+    "within {excellent:g} standard deviations of single strokes from the measured median, and "
+    "the root mean square differences of lift and velocity are at most {excellent:g} times "
+    "those of single strokes; fair up to {fair:g}. Later impacts and the lift between the stops "
+    "are shown, but not judged."
 )
 
 _STOP = Key("stop", str, "``opening`` or ``seat``.")
@@ -63,7 +63,7 @@ _IMPACT = JsonForm(
     "ComparedImpactJson",
     "One impact, computed and measured.",
     _STOP,
-    Key("number", int, "1 for the first on this stop."),
+    Key("number", int, "1 for the first impact on this stop."),
     *measured_keys(IMPACT_MEASURES),
 )
 _HIGHEST = JsonForm(
@@ -105,8 +105,8 @@ _STUDY = JsonForm(
     *CASE,
     Key("variant", str, of=lambda study: next(iter(study.variants))),
     *inherited(_VARIANT, lambda study: next(iter(_variants(study).values()))),
-    Key("variants", {str: _VARIANT}, "All of them by name.", _variants),
-    Key("rule", str, "How the verdict is found.", lambda study: rule(study)),
+    Key("variants", {str: _VARIANT}, "All variants by name.", _variants),
+    Key("rule", str, "Rule of the verdict.", lambda study: rule(study)),
 )
 
 
@@ -151,14 +151,18 @@ def verdict(study: MeasuredStrokeStudy, variant: ComparedVariant) -> str:
     width = "standard deviations" if variant.count > 1 else "times the reading error"
     called = {"excellent": "Excellent agreement", "fair": "Fair agreement", "none": "No agreement"}
     return (
-        f"{called[found]} of '{variant.variant}' with {strokes}: the largest difference that "
-        f"counts is {worst:.1f} {width}, in the {words}."
-        + ("" if variant.count > 1 else " One stroke does not show the scatter of strokes.")
+        f"{called[found]} of '{variant.variant}' with {strokes}: the largest difference that is "
+        f"judged is {worst:.1f} {width}, in the {words}."
+        + (
+            ""
+            if variant.count > 1
+            else " A single stroke does not show the scatter between strokes."
+        )
     )
 
 
 def rule(study: MeasuredStrokeStudy) -> str:
-    """How the verdict is found."""
+    """Rule of the verdict."""
     return RULE.format(excellent=study.excellent, fair=study.fair)
 
 
@@ -227,8 +231,8 @@ MEASURED_STROKES = StoredAnalysis(
     to_json=_STUDY.json,
     told=_told,
     measures={
-        "variant beside a measurement": VARIANT_MEASURES,
-        "impact beside a measurement": IMPACT_MEASURES,
+        "variant against a measurement": VARIANT_MEASURES,
+        "impact against a measurement": IMPACT_MEASURES,
         "highest measured rebound": HIGHEST_MEASURES,
     },
     measured=_measured,

@@ -12,14 +12,14 @@ from klack.terminal.progress import show_progress
 __all__ = ["heat"]
 
 _Variant = Annotated[
-    str | None, Parameter(name="--variant", help="Of the strokes. [default: the first one]")
+    str | None, Parameter(name="--variant", help="Variant of the strokes. [default: the first one]")
 ]
 _Soak = Annotated[
     str | None,
     Parameter(
         name="--soak",
         allow_leading_hyphen=True,
-        help='Strokes of a valve that is at these temperatures throughout, "-30 degC, 120 degC", '
+        help='Strokes of a valve that has these temperatures throughout, "-30 degC, 120 degC", '
         "instead of a warm-up; compared with 20 degC, cause by cause.",
     ),
 ]
@@ -27,7 +27,8 @@ _Duration = Annotated[
     str | None,
     Parameter(
         name="--duration",
-        help='Of the warm-up, "10 min". [default: as in the case, else to the steady state]',
+        help='Duration of the warm-up, "10 min". [default: as in the case, otherwise to the '
+        "steady state]",
     ),
 ]
 
@@ -51,9 +52,9 @@ def heat(
     if temperatures and duration is not None:
         raise InputError(
             "--duration",
-            got="a duration beside --soak",
+            got="a duration together with --soak",
             expected="one of them",
-            hint="--soak computes single strokes, at temperatures that stay.",
+            hint="--soak computes single strokes at constant temperatures.",
         )
     with show_progress(wanted.quiet):
         from klack.case.any_case import load_valve_case

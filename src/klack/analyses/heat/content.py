@@ -134,27 +134,30 @@ def heat_content(record: HeatStudy) -> Content:
             *((name, text) for name, (_, text) in NUMBERS.items()),
             (
                 "causes",
-                "Strokes in which one thing alone has the temperatures of the state, all others "
-                "those of the base.",
+                "Strokes in which only one quantity has the temperatures of the state, all "
+                "others those of the base.",
             ),
             (
                 "gain",
-                "Rise of the steady temperature per rise of the temperature: from 1 on the heat "
-                "grows faster than it is given off.",
+                "Rise of the steady temperature per rise of the temperature: at 1 or more the "
+                "heat grows faster than it is given off.",
             ),
         ),
         limits=(
             (
                 "averaging",
-                "Within a stroke temperatures stand still, and between strokes the mean heat "
-                "counts: a node that one stroke warms noticeably swings round the mean.",
+                "Within a stroke temperatures are constant, and between strokes the mean heat "
+                "acts: a node that one stroke warms noticeably oscillates about the mean.",
             ),
             (
                 "strokes",
-                "Every stroke begins at rest at its temperatures: fields and pressures left by the "
-                "stroke before are not there.",
+                "Every stroke begins at rest at its temperatures: fields and pressures left by "
+                "the previous stroke are not included.",
             ),
-            ("nodes", "Each node has one temperature; the network is as good as its conductances."),
+            (
+                "nodes",
+                "Each node has one temperature; the network is only as good as its conductances.",
+            ),
         ),
     )
 

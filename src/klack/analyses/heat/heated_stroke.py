@@ -163,7 +163,7 @@ def _thermal(case: ValveCase) -> CaseThermal:
         raise InputError(
             f"{case.path or 'case'}: thermal",
             got="no section 'thermal'",
-            expected="the heat of its strokes, and what follows the temperatures",
+            expected="the heat of its strokes, and the quantities that follow the temperatures",
             hint="add 'thermal: {period: ..., heat: [...]}'; klack schema has the keys.",
         )
     return case.thermal
@@ -189,8 +189,8 @@ def _within_range(case: ValveCase, temperature: float) -> tuple[float, tuple[str
     definition = case.network.fluid.definition()
     if isinstance(definition.properties, FixedProperties):
         return temperature, (
-            f"fluid '{definition.name}' has the same numbers at every temperature: nothing of it "
-            "follows the heat. Take a fluid of the library, or a table over temperature.",
+            f"fluid '{definition.name}' has the same properties at every temperature, so it does "
+            "not follow the heat. Use a fluid of the library, or a table over temperature.",
         )
     low, high = definition.lowest_temperature, definition.highest_temperature
     if low <= temperature <= high:
@@ -199,7 +199,7 @@ def _within_range(case: ValveCase, temperature: float) -> tuple[float, tuple[str
     return nearest, (
         f"fluid '{definition.name}' is known from {low - _ZERO_CELSIUS:.6g} to "
         f"{high - _ZERO_CELSIUS:.6g} °C: beyond that its properties at "
-        f"{nearest - _ZERO_CELSIUS:.6g} °C are taken.",
+        f"{nearest - _ZERO_CELSIUS:.6g} °C are used.",
     )
 
 
@@ -218,7 +218,7 @@ NUMBERS: Mapping[str, tuple[str, str]] = {
     "first peak at the stop": ("N", "Largest force of the first impact on the opening stop."),
     "first peak at the seat": ("N", "Largest force of the first impact on the seat."),
     "rebound": ("m", "Largest distance from the seat after its first touch."),
-    "restitution": ("1", "Of the first impact on the seat."),
+    "restitution": ("1", "Restitution of the first impact on the seat."),
 }
 """What is followed: name, unit and meaning."""
 
@@ -302,8 +302,8 @@ def _uncommanded(way: str, delay: float, commands: Sequence[float]) -> tuple[str
     if commands or isnan(delay):
         return ()
     return (
-        f"no driver says when its command for {way} is: the {way} delay counts from the start of "
-        "the stroke. Its changes with temperature still describe the valve.",
+        f"no driver states the time of its command for {way}: the {way} delay is counted from "
+        "the start of the stroke. Its changes with temperature still describe the valve.",
     )
 
 
@@ -322,8 +322,8 @@ def _still_driven(result: NetworkResult) -> tuple[str, ...]:
             size = np.abs(channel.values)
             if size[-1] > _LEFT * size.max() > 0.0:
                 found.append(
-                    f"{name} does not end with the stroke: its heat from there to the next stroke "
-                    "is missing. Give a longer run.duration, or let the driver end."
+                    f"{name} does not end with the stroke: its heat from then until the next "
+                    "stroke is missing. Give a longer run.duration, or let the driver end."
                 )
     return tuple(found)
 
@@ -333,7 +333,7 @@ def _gas(result: NetworkResult) -> tuple[str, ...]:
     if "gas heat" not in result.books.supplies:
         return ()
     return (
-        "gas stands apart from the heat network: its walls and sources keep the temperatures of "
+        "gas is separate from the heat network: its walls and sources keep the temperatures of "
         "the case, and the heat between gas and walls warms no node.",
     )
 
@@ -353,7 +353,7 @@ def sent_heat(thermal: CaseThermal, losses: Mapping[str, float]) -> dict[str, fl
                 f"thermal.heat.{i}.loss",
                 got=f"'{sent.loss}', which the stroke does not have",
                 expected=f"one of: {one_of(losses)}",
-                hint=nearest(sent.loss, losses, "name a component alone for all its losses."),
+                hint=nearest(sent.loss, losses, "name only the component for all its losses."),
             )
         found[sent.node] = found.get(sent.node, 0.0) + sent.share * sum(named.values())
     return found

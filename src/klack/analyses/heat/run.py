@@ -325,7 +325,8 @@ def _ripple(
         if network.capacity[i] > 0.0 and most[i] > thermal.tolerance * network.capacity[i]:
             found.append(
                 f"one stroke warms '{name}' by {most[i] / network.capacity[i]:.3g} K: within a "
-                "period its temperature swings by about as much round the mean that is shown."
+                "period its temperature oscillates by about as much about the mean that is "
+                "shown."
             )
     return tuple(found)
 
@@ -338,8 +339,8 @@ def _lost(strokes: Sequence[HeatedStroke]) -> tuple[str, ...]:
         if 0 < missing < len(strokes):
             way = "open to 90 % of its lift" if name == "opening delay" else "touch its seat"
             found.append(
-                f"{missing} of {len(strokes)} strokes have no {name}: there the valve does not "
-                f"{way} within the stroke."
+                f"{missing} of {len(strokes)} strokes have no {name}: in these the valve does "
+                f"not {way} within the stroke."
             )
     return tuple(found)
 

@@ -35,9 +35,9 @@ _COLUMN = JsonForm(
 )
 _CAUSE = JsonForm(
     "CauseJson",
-    "A stroke with one cause at other temperatures than the base.",
+    "A stroke with one cause at temperatures other than the base.",
     Key("state", str, "At which temperatures."),
-    Key("cause", str, "base, one aspect, or all of them."),
+    Key("cause", str, "base, one cause, or all of them."),
     Key("numbers", dict[str, Real], "SI, by the names of 'strokes'."),
 )
 
@@ -59,7 +59,7 @@ HEAT_FORM = JsonForm(
         Literal["steady", "duration", "runaway", "hot", "soaked"],
         "How it ended; soaked: strokes at given temperatures.",
     ),
-    Key("gain", Real, "From 1 on there is no steady state."),
+    Key("gain", Real, "At 1 or more there is no steady state."),
     Key("time_s", list[Real], "null for the steady state.", "time"),
     Key("temperature_K", dict[str, list[Real]], "By node.", _values("temperature")),
     Key("heat_W", dict[str, list[Real]], "Mean heat of the strokes.", _values("heat")),
@@ -68,7 +68,7 @@ HEAT_FORM = JsonForm(
     Key("causes", [_CAUSE]),
     Key("supplied_J", dict[str, float], "Heat into each node.", "supplied"),
     Key("stored_J", dict[str, float], of="stored"),
-    Key("given_off_J", dict[str, float], "To each known temperature.", "given_off"),
+    Key("given_off_J", dict[str, float], "Heat to each known temperature.", "given_off"),
     Key("energy_residual", float),
     Key("unsent_W", dict[str, float], "Losses that warm no node.", "unsent"),
     Key("stroke_count", int, of="strokes"),
@@ -98,7 +98,8 @@ def heat_told(record: HeatStudy) -> Iterator[TextTable | str]:
     if len(record.time) > _TOLD:
         yield f"The first {_TOLD} of {len(record.time)} points; all of them are in the CSV file."
     yield TextTable(
-        title="Causes: change against the base, each alone at the temperatures of the state",
+        title="Causes: change against the base, with only one at a time at the temperatures of "
+        "the state",
         columns=("state", "cause", *record.causes[0].numbers),
         rows=rows_of_causes(record),
         left=2,
@@ -194,9 +195,9 @@ def answer(record: HeatStudy) -> str:
     ends = {
         "steady": f"steady after {time_cell(last)}: {at}",
         "duration": f"the duration ends after {time_cell(last)}: {at}",
-        "runaway": f"thermal runaway: there is no steady state. From {time_cell(last)} on the heat "
-        f"grows {record.gain:.3g} times as fast with the temperature as it is given off; then {at}."
-        " --duration follows it further",
+        "runaway": f"thermal runaway: there is no steady state. From {time_cell(last)} the heat "
+        f"grows {record.gain:.3g} times as fast with the temperature as it is given off; then "
+        f"{at}. --duration continues beyond that",
         "hot": f"no steady state below 2000 K: after {time_cell(last)} {at}",
     }
     unsent = ""

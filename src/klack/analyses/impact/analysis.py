@@ -65,9 +65,9 @@ class _Ends(NamedTuple):
 
 _OUTPUT = JsonForm(
     "OutputJson",
-    "What one sensor shows during the impact.",
+    "Signal of one sensor during the impact.",
     Key("kind", str, "displacement, velocity, strain or stress.", "record.kind"),
-    Key("unit", str, "Of the two values; 1 for a strain.", "record.unit"),
+    Key("unit", str, "Unit of the two values; 1 for a strain.", "record.unit"),
     Key("lowest", Real),
     Key("lowest_at_s", Real, of="lowest_at"),
     Key("highest", Real),
@@ -80,7 +80,7 @@ _OBLIQUE = JsonForm(
 )
 _BACKING = JsonForm(
     "BackingJson",
-    "Contact of the struck body with the one behind it.",
+    "Contact of the struck body with the body behind it.",
     *measured_keys(BACKING_MEASURES),
 )
 _LEVEL = JsonForm(
@@ -99,7 +99,7 @@ _LEVEL = JsonForm(
         "Null for two bodies.",
         lambda level: None if level.backing is None else level,
     ),
-    Key("doubts", list[str], "Why the level may be wrong."),
+    Key("doubts", list[str], "Reasons why the level may be wrong."),
     Key(
         "outputs",
         {str: _OUTPUT},
@@ -112,12 +112,12 @@ _RUNNING_IN = JsonForm(
     "Impacts one after another on the same faces, a number each.",
     Key("level", str),
     Key("asked", int),
-    Key("run_in", bool, "The last one does not yield any more."),
+    Key("run_in", bool, "Whether the last impact no longer yields."),
     Key("peak_force_N", list[Real], of="peak_force"),
     Key("contact_time_s", list[Real], of="contact_time"),
     Key("restitution", list[Real]),
     Key("lost_J", list[Real], "In yield.", "lost"),
-    Key("set_m", list[Real], "How much lower the bodies touch after it.", "set"),
+    Key("set_m", list[Real], "Lowering of the first touch after it.", "set"),
     Key("land_m", list[Real], "Width of the strip in contact so far; level reduced.", "land"),
 )
 _STUCK = JsonForm(
@@ -126,7 +126,12 @@ _STUCK = JsonForm(
     "and across the normal while all points stick: d = normal P + coupling T, "
     "s = coupling P + tangential T.",
     Key("normal_m_per_N", Real, of="normal"),
-    Key("tangential_m_per_N", Real, "Null round the axis of half sections.", "tangential"),
+    Key(
+        "tangential_m_per_N",
+        Real,
+        "Null in the circumferential direction of half sections.",
+        "tangential",
+    ),
     Key("coupling_m_per_N", Real, "The same.", "coupling"),
     Key("force_N", Real, "Axial force of the static state.", "force"),
 )
@@ -145,7 +150,7 @@ _FIT = JsonForm(
     Key(
         "stress_Pa",
         dict[str, float],
-        "Largest equivalent one of each part, as the pressure.",
+        "Largest equivalent stress of each part, like the pressure.",
         "stress",
     ),
     Key("yield_Pa", dict[str, float], "Of parts whose material yields.", "yield_stress"),
@@ -159,7 +164,7 @@ _FIT = JsonForm(
 )
 _BOLTS = JsonForm(
     "BoltsJson",
-    "Two parts of a body that bolts press together, of all bolts together.",
+    "Two parts of a body pressed together by bolts; numbers of all bolts together.",
     Key("body", str),
     Key("joint", str),
     Key("lower", str),
@@ -174,18 +179,18 @@ _BOLTS = JsonForm(
     Key("least_pressure_Pa", Real, "Zero where the joint is open.", "least_pressure"),
     Key("largest_pressure_Pa", Real, "Away from sharp corners.", "largest_pressure"),
     Key("open_share", Real, "Of the joint, under the preload."),
-    Key("stress_Pa", dict[str, float], "Largest equivalent one of each part.", "stress"),
+    Key("stress_Pa", dict[str, float], "Largest equivalent stress of each part.", "stress"),
     Key("yield_Pa", dict[str, float], "Of parts whose material yields.", "yield_stress"),
     Key("bolt_stiffness_N_per_m", Real, of="bolt_stiffness"),
     Key("part_stiffness_N_per_m", Real, "Of the clamped parts.", "part_stiffness"),
-    Key("load_factor", Real, "Part of a force between the ends that the bolts take."),
+    Key("load_factor", Real, "Share of a force between the ends that the bolts carry."),
     Key("lifting_force_N", Real, "Between the ends.", "lifting_force"),
     Key("carried_N", (Real, None), "Twice the largest contact force.", "carried"),
     Key("opens", bool, "The impact may open the joint: carried_N is above the preload."),
 )
 _LAYER = JsonForm(
     "LayerJson",
-    "A layer between two parts of a body, and the share that its modes have in it.",
+    "A layer between two parts of a body, and its share in the modes.",
     Key("body", str),
     Key("layer", str, of="name"),
     Key("first", str),
@@ -195,12 +200,12 @@ _LAYER = JsonForm(
     Key("tangential_N_per_m", Real, "Of the whole area.", "tangential"),
     Key("stiffness_at_Hz", Real, "Null: of no frequency.", "taken"),
     Key("frequency_Hz", list[Real], "Of the elastic modes.", "frequency"),
-    Key("energy_share", list[Real], "Of their strain energy, in the layer.", "share"),
+    Key("energy_share", list[Real], "Share of their strain energy in the layer.", "share"),
     Key("loss_factor", list[Real], "By the layer.", "loss"),
     Key(
         "shift",
         list[Real],
-        "Relative, of each frequency, by the stiffness there; left out.",
+        "Relative shift of each frequency by the stiffness there, left out of the impact.",
     ),
 )
 STUDY = JsonForm(
@@ -215,15 +220,15 @@ STUDY = JsonForm(
     Key(
         "deviation",
         (DEVIATION, None),
-        "Of the level reduced from the reference.",
+        "Deviation of the level reduced from the reference.",
         lambda study: study.deviations.get("reduced"),
     ),
-    Key("deviations", {str: DEVIATION}, "Of every level that is not the reference."),
+    Key("deviations", {str: DEVIATION}, "Deviation of every level that is not the reference."),
     Key(
         "estimated_error",
         {str: (DEVIATION, None)},
-        "Of every reduced level, and of the steps of the full order, by a run at the interface "
-        "level.",
+        "Estimated error of every reduced level, and of the steps of the full order, from a run "
+        "at the interface level.",
         lambda study: {
             name: item if study.estimates_settled else None
             for name, item in study.estimates.items()
@@ -232,14 +237,14 @@ STUDY = JsonForm(
     Key(
         "estimate_margin",
         {str: DEVIATION},
-        "So far may each be off; no signs.",
+        "Uncertainty of each; without sign.",
         "estimate_margins",
     ),
     Key("contact", CONTACT, "All levels but lumped share it."),
     Key(
         "contact_compliance",
         (_STUCK, None),
-        "Of half sections, and of faces that rub.",
+        "For half sections and faces with friction.",
         lambda study: study.contact.stuck,
     ),
     Key("running_in", (_RUNNING_IN, None), "Null for one impact, or elastic faces."),
@@ -345,8 +350,8 @@ def answer_line(study: ImpactStudy) -> str:
     touch = f"{m.approach_speed:.4g} m/s at first touch"
     if m.cut_off:
         return (
-            f"{begin}{touch}; the run is cut off in contact, at {m.peak_force:.2f} N so far: "
-            "no peak force, no contact time, no restitution."
+            f"{begin}{touch}; the run ends in contact, at {m.peak_force:.2f} N so far: no peak "
+            "force, no contact time, no restitution."
         )
     contacts = f", {m.sub_contacts} contacts" if m.sub_contacts > 1 else ""
     return (
@@ -370,9 +375,9 @@ def no_estimate(study: ImpactStudy) -> str:
     if study.estimates and not study.estimates_settled:
         advice = "" if "full" in study.levels else " Compare with --level full."
         return (
-            "No error estimate: the interface level itself has not converged "
-            f"(its force history changes by {100 * study.estimate_spread:.0f} % with half the "
-            f"modes in longer steps), as when flat faces meet all at once.{advice}"
+            "No error estimate: the interface level itself has not converged (its force history "
+            f"changes by {100 * study.estimate_spread:.0f} % with half the modes in longer "
+            f"steps), as for flat faces that meet all at once.{advice}"
         )
     return ""
 

@@ -107,23 +107,23 @@ def check_yield(
         if first < force:
             told.append(
                 f"'{body.name}' ({material.name}, {format_si(limit, 'Pa', 3)}) from about "
-                f"{format_si(first, 'N', 2)} on, at {100 * _speed(static, first, force):.2g} % of "
+                f"{format_si(first, 'N', 2)}, at {100 * _speed(static, first, force):.2g} % of "
                 "the speed of this impact"
             )
     if told and not computed:
         warnings.warn(
             f"contact {surfaces} yields before the {format_si(force, 'N', 3)} of this impact: "
             f"{' and '.join(told)}. Elastic levels are too hard there: the first impact on new "
-            "faces is softer and returns less. What has yield: the levels reduced, in the "
-            "meridian plane, and interface of klack impact, klack shots, and the stops of klack "
-            "stroke along the axis; bodies of three dimensions have to be drawn as profiles.",
+            "faces is softer and rebounds less. Yield is included in the levels reduced (in the "
+            "meridian plane) and interface of klack impact, in klack shots, and at the stops of "
+            "klack stroke along the axis; three-dimensional bodies have to be drawn as profiles.",
             AccuracyWarning,
             stacklevel=2,
         )
     for words in doubtful.values():
         warnings.warn(
-            f"contact {surfaces}: the yield stress of {words}. How much yields depends on it. Try: "
-            "'yield' from a tensile test, or both ends of its range (klack study).",
+            f"contact {surfaces}: the yield stress of {words}. The amount of yielding depends on "
+            "it. Try: 'yield' from a tensile test, or both ends of its range (klack study).",
             AccuracyWarning,
             stacklevel=2,
         )
@@ -384,8 +384,9 @@ def _corner(
             f"contact: more than half of the force acts on a sharp edge of '{body.name}' "
             f"({body.name}.{surface.name}, at {_at(edges, nearest)}, {angle:.0f} deg). Such a "
             "contact is as narrow as its elements: its width and pressure depend on the mesh, "
-            "its force and time may be off by 7 %. Try: give the edge its real radius (an arc or "
-            "fillet; 10 to 100 um for most turned or ground parts), with five elements along it."
+            "its force and time may be wrong by 7 %. Try: give the edge its real radius (an arc "
+            "or fillet; 10 to 100 um for most turned or ground parts), with five elements along "
+            "it."
         )
     return None
 
@@ -404,10 +405,10 @@ def _blunt(sides: tuple[_Side, _Side], space: ContactSpace, lam: NDArray[np.floa
         return (
             f"contact: an edge of '{body.name}' lies in it ({body.name}.{surface.name}, at "
             f"{_at(edges, most)}, {180.0 - np.degrees(edges.angle[most]):.4g} deg). Force, time "
-            "and width converge with smaller elements, pressure and stress at the edge do not: "
-            "they rise with each of them, and the yield stress that elastic faces need is left "
-            "out. Try: the real radius of the edge (an arc or fillet), with five elements along "
-            "it, where pressure, yield or wear count."
+            "and width converge with smaller elements, but pressure and stress at the edge do "
+            "not: they rise with every refinement, and the yield stress needed to stay elastic "
+            "is left out. Try: the real radius of the edge (an arc or fillet), with five "
+            "elements along it, if pressure, yield or wear matter."
         )
     return None
 
@@ -442,8 +443,8 @@ def _end(body: ElasticBody, surface: Surface, name: str, at: str, surfaces: str)
     return (
         f"contact {surfaces}: it reaches the edge of '{body.name}.{surface.name}' at {at}, but "
         f"the body continues there {where}, which is not included: the force is too low. Try: "
-        f"add {what} to '{surface.name}' (a profile: give both edges the same name; STEP: both "
-        "faces the same name in the CAD program; a mesh: one set that holds both)."
+        f"add {what} to '{surface.name}' (profile: give both edges the same name; STEP: give "
+        "both faces the same name in the CAD program; mesh: one set with both)."
     )
 
 
@@ -465,15 +466,15 @@ def _coarse(
     width = static.half_width_at(force)
     size = ratio * width
     text = (
-        f"contact: elements of {size * 1e6:.3g} um across a contact that is {width * 1e6:.3g} um "
-        f"in half width on this mesh, at {force:.4g} N (ratio {ratio:.2g}, good up to 1, doubtful "
-        f"above {COARSE:g})."
+        f"contact: elements of {size * 1e6:.3g} um across a contact of {width * 1e6:.3g} um half "
+        f"width on this mesh, at {force:.4g} N (ratio {ratio:.2g}, good up to 1, doubtful above "
+        f"{COARSE:g})."
     )
     advised = _rounded_down(_SIZE * expected)
     if not advised < size:
         return text + " Try: 'klack advise', which measures the effect of finer elements."
     return text + (
-        f" Its shape and load make {expected * 1e6:.2g} um: refine both contact surfaces to "
+        f" Its shape and load give {expected * 1e6:.2g} um: refine both contact surfaces to "
         f"{format_si(advised, 'm', 2)}{_extent(case, pair, expected)}."
     )
 

@@ -49,8 +49,8 @@ _WITHOUT_FRICTION: tuple[tuple[str, Callable[[ImpactMeasures], str]], ...] = (
 
 
 _CENTRED = (
-    "Of the centred bodies, in the meridian plane. The interface level, which meets off-axis, has "
-    "no such law."
+    "Law of the centred bodies, in the meridian plane. The interface level, which is off-axis, "
+    "has no such law."
 )
 
 
@@ -66,7 +66,7 @@ def report_content(study: ImpactStudy) -> Content:
     sections = [_estimates(study), _computed(study)]
     sections += [_bodies_in_space(study), _bodies_at_peak(study)]
     sections.append(Section(title="Force over time", charts=named("force")))
-    sections.append(Section(title="The body behind the struck one", charts=named("backing")))
+    sections.append(Section(title="The body behind the struck body", charts=named("backing")))
     sections.append(_pressure(study))
     sections.append(_friction(study))
     sections.append(_running_in(study))
@@ -132,9 +132,9 @@ def _bodies_in_space(study: ImpactStudy) -> Section:
 
         return Section(title=title, picture=solid_figure(study))
     text = (
-        "No picture: this result holds no surfaces of the bodies. Results of earlier versions "
-        "have none; 'klack impact CASE' adds them. In a new result the warnings name what "
-        "failed."
+        "No picture: this result contains no surfaces of the bodies. Results of earlier "
+        "versions have none; 'klack impact CASE' adds them. In a new result the warnings state "
+        "what failed."
     )
     return Section(title=title, paragraphs=(text,))
 
@@ -151,7 +151,7 @@ def _bodies_at_peak(study: ImpactStudy) -> Section:
     if "full" in study.failures:
         text += "which failed; see the warnings."
     elif leaves_axis(study):
-        text += "which axisymmetric bodies do not have off-axis."
+        text += "which axisymmetric bodies do not support off-axis."
     else:
         text += (
             "which was not computed. 'klack impact CASE --level reduced,full' adds it, for bodies "
@@ -216,7 +216,7 @@ def _computed(study: ImpactStudy) -> Section:
             facts.append(
                 (
                     "off-axis",
-                    "the rows below: a centred contact, as loaded as the worst\n"
+                    "the rows below: a centred contact with the load of the worst\n"
                     "part of the ring, in the meridian plane",
                 )
             )
@@ -306,7 +306,7 @@ def _friction(study: ImpactStudy) -> Section:
     rubbing = [r for r in study.ordered if r.energies.get("friction")]
     rows = [
         (
-            "lost in friction, of the energy before",
+            "share of the initial energy lost in friction",
             *(
                 f"{100 * r.energies['friction'] / r.energies['initial kinetic']:.2f} %"
                 for r in rubbing
@@ -340,11 +340,13 @@ def _running_in(study: ImpactStudy) -> Section:
     )
     if found.level == "reduced":
         text += (
-            " The land is the strip that has been in contact, as wide as an elliptic pressure of "
-            "the same second moment."
+            " The land is the strip that has been in contact; its width is that of an elliptic "
+            "pressure with the same second moment."
         )
     if not found.run_in:
-        text += " The faces still yield at the last one: run.run_in: true adds what is missing."
+        text += (
+            " The faces still yield at the last impact: run.run_in: true adds the missing impacts."
+        )
     return Section(
         title=title,
         paragraphs=(text,),
@@ -428,11 +430,11 @@ def _definitions(study: ImpactStudy) -> tuple[tuple[str, str], ...]:
         *glossary(DEVIATION_MEASURES),
         (
             "spectrum",
-            "Magnitude of the Fourier integral of the force of the first impact, |∫ F(t) exp(−2πi "
-            "f t) dt| in N s, without a window (the force begins and ends at zero), as a level "
-            "relative to 1 µN s: 20 lg(|F|/1 µN s). A third-octave level is the integral of "
-            "2 |F|² over the band (IEC 61260-1, base ten) relative to 1 pN² s; all bands together "
-            "hold the integral of F² over time.",
+            "Magnitude of the Fourier integral of the force of the first impact, |∫ F(t) "
+            "exp(−2πi f t) dt| in N s, without a window (the force begins and ends at zero), as "
+            "a level relative to 1 µN s: 20 lg(|F|/1 µN s). A third-octave level is the "
+            "integral of 2 |F|² over the band (IEC 61260-1, base ten) relative to 1 pN² s; all "
+            "bands together contain the integral of F² over time.",
         ),
         (
             "local law",
@@ -459,11 +461,11 @@ def _definitions_point_by_point(study: ImpactStudy) -> tuple[tuple[str, str], ..
         found.append(
             (
                 "estimated error",
-                "Deviation of a reduced level from one interface-level run at the same condition, "
-                "with more modes than the reduced level keeps. It includes the error of the local "
-                "law and of the omitted modes, not of the mesh. The number after ± is the "
-                "deviation of that run from one with half the modes in longer steps. The steps "
-                "of the full order have an error of their own, found by the same run with the "
+                "Deviation of a reduced level from one interface-level run at the same "
+                "condition, with more modes than the reduced level keeps. It includes the error "
+                "of the local law and of the omitted modes, not of the mesh. The number after ± "
+                "is the deviation of that run from one with half the modes in longer steps. The "
+                "steps of the full order have their own error, found from the same run with the "
                 "periods and steps of the full order.",
             )
         )
@@ -497,7 +499,9 @@ def _bodies_of(study: ImpactStudy) -> str:
     yielding = [one.label for one in study.levels.values() if "plastic" in one.energies]
     if not yielding:
         return "Linear elastic, isotropic bodies"
-    return f"Isotropic bodies whose faces yield at {' and '.join(yielding)}, linear elastic else,"
+    return (
+        f"Isotropic bodies whose faces yield at {' and '.join(yielding)}, otherwise linear elastic,"
+    )
 
 
 def _limits(study: ImpactStudy) -> tuple[tuple[str, str], ...]:
@@ -520,9 +524,9 @@ def _limits(study: ImpactStudy) -> tuple[tuple[str, str], ...]:
         ),
         (
             "Resolution",
-            f"The elements across the contact are {study.contact.size_ratio:.2g} half widths long; "
-            "up to 1 is good, above 1.5 is doubtful. All levels share the same meshes: "
-            "their agreement does not show the error of the meshes."
+            f"The elements across the contact are {study.contact.size_ratio:.2g} half widths "
+            "long; up to 1 is good, above 1.5 is doubtful. All levels share the same meshes: "
+            "their agreement does not reveal the error of the meshes."
             if isfinite(study.contact.size_ratio)
             else "The bodies meet at ports, without contact points: neither their models nor the "
             "local law are checked against a mesh.",
@@ -540,8 +544,8 @@ def _limits(study: ImpactStudy) -> tuple[tuple[str, str], ...]:
         (
             "Damping",
             "Losses in joints, fluid and material are included only as far as the case "
-            "gives modal damping; the energy left in vibration therefore rings longer than in a "
-            "real valve.",
+            "specifies modal damping; residual vibration therefore rings longer than in a real "
+            "valve.",
         )
     )
     return tuple(limits)

@@ -175,7 +175,7 @@ def backing_chart(result: LevelResult, contact: BackingContact) -> Chart:
         title="Forces on both sides of the struck body",
         x=_TIME,
         panels=tuple(panels),
-        note=f"From the start to the end of the run. Gap: of {contact.surfaces}, where it is open."
+        note=f"From the start to the end of the run. Gap: at {contact.surfaces}, where it is open."
         if contact.open_time > 0.0
         else "From the start to the end of the run; the lower contact stays closed.",
     )
@@ -432,7 +432,7 @@ def law_chart(study: ImpactStudy) -> Chart:
     note += f"The straight line is fitted between {low:.3g} and {high:.3g} N."
     if len(curves) == 3 or np.isfinite(law.classical_stiffness):
         note += (
-            " The classical stiffness is that of a static submodel of the contact region alone "
+            " The classical stiffness is that of a static submodel of only the contact region "
             f"(radius {quantity(law.classical_size, 'm', 3)}); it belongs to modes with static "
             "correction, not to bare modes."
         )
@@ -485,8 +485,8 @@ def approach_chart(study: ImpactStudy) -> Chart:
         panels=tuple(panels),
         note=(
             "Frictionless static contact of the two complete bodies, counted from first touch. "
-            "The rest of the compliance is in the kept modes; 20 to 80 % in "
-            "the law is a good division."
+            "The rest of the compliance is in the kept modes; a share of 20 to 80 % in the law "
+            "is good."
             if contact.points
             else "Local law and modes of both bodies at their ports, in series."
         ),
@@ -516,7 +516,7 @@ def energy_bars(study: ImpactStudy) -> BarChart:
         x=AxisSpec(label=f"share of the {next(iter(results[0].energies))} energy", unit="%"),
         rows=tuple(result.label for result in results),
         parts=tuple(parts),
-        note="After separation. Shares below 0.05 % are in the table only.",
+        note="After separation. Shares below 0.05 % appear only in the table.",
     )
 
 

@@ -96,8 +96,9 @@ def simulate_in_full(
 
 
 _JUMPS = (
-    "faces that hold more than they rub with jump, and how may depend on the step, which this "
-    "level does not check. Try: level interface, which does, or half of run.full_step."
+    "faces with more static than kinetic friction jump (stick-slip), and the jumps may depend "
+    "on the step, which this level does not check. Try: level interface, which does, or half of "
+    "run.full_step."
 )
 
 

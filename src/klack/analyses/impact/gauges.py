@@ -254,8 +254,8 @@ def interface_gauges(
     history = segment.history
     if not len(segment.point_force):
         warnings.warn(
-            "outputs: level interface has none, for its run is too long to keep the forces of all "
-            "contact points. Try: a shorter run.duration, or a longer run.interface_step.",
+            "outputs: none at level interface, because its run is too long to keep the forces "
+            "of all contact points. Try: a shorter run.duration, or a longer run.interface_step.",
             AccuracyWarning,
             stacklevel=2,
         )

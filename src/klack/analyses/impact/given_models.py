@@ -100,7 +100,7 @@ def require_given_levels(case: Case, levels: Sequence[str]) -> tuple[str, ...]:
                 f"{case.path or 'case'}: level",
                 got=f"'{level}', and {one_of(names)} without surfaces",
                 expected=f"levels among: {one_of(GIVEN_LEVELS)}",
-                hint="a reduced model has contact at its port; point-resolved contact needs a "
+                hint="a reduced model has its contact at a port; point-resolved contact needs a "
                 "mesh.",
             )
     return wanted

@@ -446,11 +446,11 @@ def _step_doubts(
     if same:
         return
     yield (
-        f"faces that hold more than they rub with jump, and how depends on the step: peak force "
-        f"{at.peak_force:.4g} N and restitution {at.restitution:.4f} at {format_si(step, 's', 3)}, "
-        f"{other.peak_force:.4g} N and {other.restitution:.4f} at "
-        f"{format_si(step / _OTHER_STEP, 's', 3)}. Try: take that as scatter, or leave out "
-        "contact.static_friction."
+        "faces with more static than kinetic friction jump (stick-slip), and the jumps depend "
+        f"on the step: peak force {at.peak_force:.4g} N and restitution {at.restitution:.4f} at "
+        f"{format_si(step, 's', 3)}, {other.peak_force:.4g} N and {other.restitution:.4f} at "
+        f"{format_si(step / _OTHER_STEP, 's', 3)}. Try: treat the difference as scatter, or "
+        "leave out contact.static_friction."
     )
 
 
@@ -523,9 +523,9 @@ def _angle_doubts(case: Case, model: InterfaceModel, result: InterfaceResult) ->
         if 0 < angles < FEWEST_ANGLES:
             stop = "" if name == CONTACT else " with the upper stop"
             yield (
-                f"the contact{stop} is so short that {angles} of {count} angles of the ring carry "
-                f"at peak force, {FEWEST_ANGLES} or more are needed. Try: contact.angles: "
-                f"{ceil(count * FEWEST_ANGLES / angles)}."
+                f"the contact{stop} is so short that {angles} of {count} angles of the ring "
+                f"carry load at peak force, {FEWEST_ANGLES} or more are needed. Try: "
+                f"contact.angles: {ceil(count * FEWEST_ANGLES / angles)}."
             )
 
 
@@ -536,7 +536,7 @@ def set_doubts(model: InterfaceModel, result: InterfaceResult) -> Iterator[str]:
     deepest, known = float(result.worn.max()), model.limit.deepest
     if deepest > _SET_BEYOND * known:
         yield (
-            f"the set of the faces reaches {format_si(deepest, 'm', 3)}, beyond the "
+            f"the permanent set of the faces reaches {format_si(deepest, 'm', 3)}, beyond the "
             f"{format_si(known, 'm', 3)} to which their pressure limit was fitted, and is an "
             "estimate. Try: less eccentricity, tilt or speed."
         )

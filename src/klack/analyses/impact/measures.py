@@ -74,10 +74,11 @@ CONTACT_TIME = Measure[LevelResult](
 RESTITUTION = Measure[LevelResult](
     key="restitution",
     symbol="e",
-    definition="Velocity of the centre of mass after the impact over that before it (relative "
-    "velocity of both centres where both are free; of three bodies in a row, of the upper one).",
-    note="It is a result of the vibration left in the bodies, never an input, and not "
-    "the velocity of a point on the surface.",
+    definition="Velocity of the centre of mass after the impact over its velocity before "
+    "(relative velocity of both centres where both are free; of three bodies in a row, of the "
+    "upper one).",
+    note="It results from the vibration left in the bodies; it is never an input, and does not "
+    "refer to a point on the surface.",
     page=True,
     read=lambda level: level.measures.restitution,
     form="fixed",
@@ -90,8 +91,9 @@ OBLIQUE_MEASURES: tuple[Measure[LevelResult], ...] = described_in(
     Measure(
         key="tangential_restitution",
         symbol="e_t",
-        definition="Sideways velocity of the centre of mass after the impact over that before it, "
-        "along the sideways direction (relative velocity of both centres where both are free).",
+        definition="Sideways velocity of the centre of mass after the impact over its velocity "
+        "before, along the sideways direction (relative velocity of both centres where both are "
+        "free).",
         page=True,
         read=_oblique(lambda motion: motion.tangential_restitution),
         form="fixed",
@@ -100,8 +102,8 @@ OBLIQUE_MEASURES: tuple[Measure[LevelResult], ...] = described_in(
     Measure(
         key="impulse_ratio",
         symbol="J_t/J",
-        definition="Impulse on the moving body across the axis over that along it; the coefficient "
-        "of friction where flat faces slip all the time.",
+        definition="Impulse on the moving body across the axis over the impulse along it; the "
+        "coefficient of friction where flat faces slip all the time.",
         page=True,
         read=_oblique(lambda motion: motion.impulse_ratio),
         form="fixed",
@@ -152,8 +154,8 @@ BACKING_MEASURES: tuple[Measure[LevelResult], ...] = described_in(
         key="backing_peak_force",
         symbol="F_2",
         unit="N",
-        definition="Largest force between the struck body and the one behind it in the whole run, "
-        "with the preload.",
+        definition="Largest force between the struck body and the body behind it in the whole "
+        "run, including the preload.",
         page=True,
         read=_backing(lambda contact: contact.peak_force),
         column=Column("N", 1.0, ".2f", "peak"),
@@ -162,7 +164,7 @@ BACKING_MEASURES: tuple[Measure[LevelResult], ...] = described_in(
         key="backing_least_force",
         symbol="F_2min",
         unit="N",
-        definition="Smallest force there from its first contact on; 0 where the struck body lifts.",
+        definition="Smallest force there after first contact; 0 if the struck body lifts.",
         page=True,
         read=_backing(lambda contact: contact.least_force),
         column=Column("N", 1.0, ".2f", "least"),
@@ -171,8 +173,8 @@ BACKING_MEASURES: tuple[Measure[LevelResult], ...] = described_in(
         key="lift_off",
         symbol="t_off",
         unit="s",
-        definition="When the struck body first leaves the one behind it, from the start of the "
-        "run.",
+        definition="Time from the start of the run at which the struck body first leaves the "
+        "body behind it.",
         page=True,
         read=_backing(lambda contact: contact.lift_off),
         column=Column("us", 1e6, ".3f", "lifts at"),
@@ -181,7 +183,7 @@ BACKING_MEASURES: tuple[Measure[LevelResult], ...] = described_in(
         key="open_time",
         symbol="t_open",
         unit="s",
-        definition="How long the two are apart in all, after their first contact.",
+        definition="Total time that the two are apart after their first contact.",
         page=True,
         read=_backing(lambda contact: contact.open_time),
         column=Column("us", 1e6, ".3f", "open"),
@@ -206,8 +208,8 @@ LEVEL_MEASURES: tuple[Measure[LevelResult], ...] = described_in(
         key="impulse",
         symbol="J",
         unit="N s",
-        definition="Integral of the contact force over the impact, with all contacts that follow "
-        "each other closely.",
+        definition="Integral of the contact force over the impact, including all contacts that "
+        "follow each other closely.",
         page=True,
         read=lambda level: level.measures.impulse,
         column=Column("mN s", 1e3, ".4f"),
@@ -255,7 +257,7 @@ LEVEL_MEASURES: tuple[Measure[LevelResult], ...] = described_in(
     Measure(
         key="strongest_contact",
         symbol="k",
-        definition="Which contact of the impact has the peak force, counted from 1.",
+        definition="Number of the contact with the peak force, counted from 1.",
         read=lambda level: level.measures.strongest,
         kind="whole",
     ),
@@ -271,7 +273,7 @@ LEVEL_MEASURES: tuple[Measure[LevelResult], ...] = described_in(
         key="peak_time",
         symbol="t_max",
         unit="s",
-        definition="When the peak force acts, counted from first touch.",
+        definition="Time of the peak force, counted from first touch.",
         read=lambda level: level.measures.peak_time,
         given=_whole,
     ),
@@ -279,7 +281,7 @@ LEVEL_MEASURES: tuple[Measure[LevelResult], ...] = described_in(
         key="first_touch",
         symbol="t_0",
         unit="s",
-        definition="When the bodies first touch, from the start of the run.",
+        definition="Time of first touch from the start of the run.",
         read=lambda level: level.measures.first_touch,
     ),
     Measure(
@@ -292,7 +294,7 @@ LEVEL_MEASURES: tuple[Measure[LevelResult], ...] = described_in(
     ),
     Measure(
         key="cut_off",
-        definition="Whether the run ends while the bodies touch.",
+        definition="Whether the run ends while the bodies are in contact.",
         read=lambda level: level.measures.cut_off,
         kind="truth",
     ),
@@ -300,7 +302,7 @@ LEVEL_MEASURES: tuple[Measure[LevelResult], ...] = described_in(
         key="highest_force",
         symbol="F",
         unit="N",
-        definition="Highest force so far, also where the run is cut off.",
+        definition="Highest force so far, also of a run that ends in contact.",
         read=lambda level: level.measures.peak_force,
     ),
     Measure(
@@ -317,8 +319,8 @@ LEVEL_MEASURES: tuple[Measure[LevelResult], ...] = described_in(
     Measure(
         key="degrees_of_freedom",
         symbol="n",
-        definition="Of the time integration: free displacements of the full order; modes and rigid "
-        "motions of the reduced and interface levels.",
+        definition="Degrees of freedom of the time integration: free displacements of the full "
+        "order; modes and rigid motions of the reduced and interface levels.",
         page=True,
         kind="whole",
         column=Column("", 1.0, "d"),

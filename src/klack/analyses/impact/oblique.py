@@ -60,8 +60,9 @@ _TILTED, _OTHER_RESTITUTION = 0.02, 0.01  # of the impulse ratio, of the restitu
 _SMOOTH = 0.01  # impulse ratio below which that of friction is none
 _CARRIED = 0.02  # share of the moment of friction that contact points take with them
 _NO_FRICTION = (
-    "the faces are without friction: motion.sideways_speed and motion.spin change nothing on a "
-    "face across the axis, and act only through its slope elsewhere. Try: contact.friction."
+    "the faces have no friction: motion.sideways_speed and motion.spin have no effect on a face "
+    "perpendicular to the axis, and act only through the slope of other faces. Try: "
+    "contact.friction."
 )
 
 
@@ -78,15 +79,16 @@ def oblique_doubts(problem: ContactProblem, level: LevelResult) -> Iterator[str]
     angle = float(np.linalg.norm(spin)) * time
     if angle > _LARGEST_TURN:
         yield (
-            f"the body turns by {np.degrees(angle):.2g} degrees while it touches, and only small "
-            f"rotations are right, up to {np.degrees(_LARGEST_TURN):.0f} degrees. Try: less "
+            f"the body turns by {np.degrees(angle):.2g} degrees during contact, and only small "
+            f"rotations are accurate, up to {np.degrees(_LARGEST_TURN):.0f} degrees. Try: less "
             "motion.spin."
         )
     carried = 0.5 * float(np.hypot(*spin[:2])) * time / max(motion.impulse_ratio, 1e-12)
     if level.level == "full" and motion.impulse_ratio > 0.0 and carried > _CARRIED:
         yield (
-            "contact points of the full order turn with the body, which brakes its spin by about "
-            f"{100 * carried:.1f} %. Try: level interface, whose contact stays below the centre."
+            "contact points of the full order rotate with the body, which reduces its spin by "
+            f"about {100 * carried:.1f} %. Try: level interface, whose contact stays below the "
+            "centre."
         )
 
 
@@ -108,9 +110,9 @@ def _slide_doubts(
         width = static.half_width_at(force)
         if way > width:
             yield (
-                f"the body moves {format_si(way, 'm', 3)} sideways while it touches, more than the "
-                f"half width of its ring of contact, {format_si(width, 'm', 3)}: the faces keep "
-                "the normals of their first touch. Try: less motion.sideways_speed."
+                f"the body moves {format_si(way, 'm', 3)} sideways during contact, more than the "
+                f"half width of its contact ring, {format_si(width, 'm', 3)}, while the faces "
+                "keep their normals of first touch. Try: less motion.sideways_speed."
             )
         return
     if speed == 0.0:
@@ -123,8 +125,8 @@ def _slide_doubts(
     other = 2.0 * tilt * speed / measures.approach_speed
     if tilt > _TILTED * max(motion.impulse_ratio, _SMOOTH) or other > _OTHER_RESTITUTION:
         yield (
-            f"the body moves {format_si(way, 'm', 3)} sideways over a curved lower face while it "
-            "touches, and the faces keep the normals of their first touch: the impulse across the "
-            f"axis is wrong by about {tilt:.2g} of the one along it, the restitution by "
+            f"the body moves {format_si(way, 'm', 3)} sideways over a curved lower face during "
+            "contact, while the faces keep their normals of first touch: the impulse across the "
+            f"axis is wrong by about {tilt:.2g} of the impulse along it, the restitution by "
             f"{other:.2g}. Try: less motion.sideways_speed, or a flat lower face."
         )

@@ -132,8 +132,9 @@ _SHARES = "RdYlBu_r"
 _LITTLE = 1e-3
 """Share of the highest force below which nothing is shown."""
 _NOTE = (
-    "Friction on the moving body over the most that the pressed points can hold. Dark red: they "
-    "slip and friction pushes it {first}; dark blue: {second}; pale: they stick. White: no contact."
+    "Friction on the moving body over the largest friction that the pressed points can carry. "
+    "Dark red: the points slip and friction pushes the body {first}; dark blue: {second}; pale: "
+    "they stick. White: no contact."
 )
 
 
@@ -177,7 +178,7 @@ def friction_figure(views: Sequence[FrictionView]) -> Picture:
         )
         note = _NOTE.format(first=first, second=second)
         if shape == "ring":
-            note += " Above: along the face, away from the axis. Below: round the axis."
+            note += " Above: along the face, away from the axis. Below: around the axis."
         return Picture(svg(figure), note)
 
 

@@ -194,7 +194,7 @@ def pressure_note(views: Sequence[PressureView]) -> str:
             f"force over its area; nothing is interpolated.{common}"
         )
     where = (
-        "round the ring, counted from +x towards +y"
+        "around the ring, counted from +x towards +y"
         if shape == "ring"
         else "along x, counted from the middle of the contact"
     )

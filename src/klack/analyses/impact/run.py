@@ -374,9 +374,9 @@ class _Work:
                 self.ran = self.ran or at_points
         if self.ran is None and asks_for_more(self.case):
             warnings.warn(
-                "run.impacts: all impacts are like the first, for no level with yield was computed "
-                "or nothing yields. Try: level reduced (bodies in the meridian plane) or "
-                "interface, and a material with 'yield'.",
+                "run.impacts: all impacts equal the first, because no level with yield was "
+                "computed or nothing yields. Try: level reduced (bodies in the meridian plane) "
+                "or interface, and a material with 'yield'.",
                 AccuracyWarning,
                 stacklevel=2,
             )
@@ -431,7 +431,7 @@ class _Work:
         problem, pools, own = self.problem, self.pools, self.own
         if self.classical is None:
             clock("classical stiffness", 0.0)
-            what = "the stiffness of the contact zone alone"
+            what = "the stiffness of only the contact zone"
             self.classical = for_comparison(what, lambda: classical_stiffness(problem, self.peak))
         if self.case.run.transfer is not None:
             found = for_comparison(
@@ -599,7 +599,7 @@ def _certificate(
     clock("error estimate", 0.0)
     whole = [n for n in results if n.startswith("reduced") and not results[n].measures.cut_off]
     if not whole and _has_reduced(tuple(results)):
-        return _Certificate(doubt="the reduced level is cut off by the end of the run")
+        return _Certificate(doubt="the run of the reduced level ends in contact")
     count, steps = certificate_modes(problem.case), problem.case.run
     histories = {name: twins.get(name, results[name].history) for name in whole}
 

@@ -153,7 +153,7 @@ def _solid_section(mesh: Mesh, values: Floats, body: str) -> tuple[Floats, Float
             f"section of body '{body}'",
             got="no element that the half plane y = 0, x > 0 passes through",
             expected="a body around the z axis",
-            hint="move the body so that its axis is the z axis.",
+            hint="move the axis of the body onto the z axis.",
         )
     return _compact(points[:, :2], points[:, 3:6], triangles, edges)
 

@@ -74,7 +74,8 @@ def _note(study: ImpactStudy, factor: float) -> str:
     for picture in closing:
         note += (
             f" The rigid motion of the {picture.body} ({quantity(picture.closing, 'm', 3)} along "
-            "the axis) is left out of the shape, not out of the colour; this is why a gap opens."
+            "the axis) is left out of the shape, but not of the colour, which is why a gap "
+            "opens."
         )
     if factor > 1:
         note += " Elements at the contact that magnification would turn inside out are left out."

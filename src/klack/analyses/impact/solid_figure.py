@@ -336,15 +336,16 @@ def _shortened(name: str) -> str:
 
 def _note(study: ImpactStudy, touching: list[NDArray[np.bool_]]) -> str:
     note = (
-        "The surfaces of the meshes at the start, cut open by a quarter; pale is what is cut. "
-        "Right: the framed part. Parallel projection: the scale bars hold across the line of sight."
+        "The surfaces of the meshes at the start, with a quarter cut away; cut faces are pale. "
+        "Right: the framed part. Parallel projection: the scale bars apply perpendicular to the "
+        "line of sight."
     )
     touch = study.pictures[1].touch
     if len(touch):
         what = "ring" if goes_round(touch) else "points"
-        note += f" The {what} of first touch of the centred bodies can be seen through them."
+        note += f" The {what} of first touch of the centred bodies is visible through them."
     if any(picture.held.any() for picture in study.pictures):
-        note += " Striped is what is held in all directions."
+        note += " Surfaces held in all directions are striped."
     for picture, own in zip(study.pictures, touching, strict=True):
         if not own.any():
             note += f" The contact face of the {picture.body} is not known and not coloured."

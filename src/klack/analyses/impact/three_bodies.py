@@ -41,12 +41,13 @@ __all__ = ["run_three_bodies"]
 _LEVEL = "reduced"
 _WITH_PRELOAD = "initial kinetic and preload"
 _SPEEDED_UP = (
-    "the needle leaves faster than it came: it follows the struck body, pushed by the closing "
-    "forces, until the one behind throws both back. Its restitution is that of all this together."
+    "the needle leaves faster than it arrived: it follows the struck body, pushed by the "
+    "closing forces, until the body behind throws both back. Its restitution includes all of "
+    "this."
 )
 _NO_ESTIMATE = (
-    "only the level 'reduced' has three bodies. Try: twice as many modes (reduction.modes), and "
-    "compare."
+    "only the level 'reduced' supports three bodies. Try: twice as many modes "
+    "(reduction.modes), and compare."
 )
 
 
@@ -161,14 +162,14 @@ def _doubts(
         if peak > contact.closing.max_force:
             yield (
                 f"{surfaces} is pressed with {format_si(peak, 'N', 3)}, beyond the "
-                f"{format_si(contact.closing.max_force, 'N', 3)} of its static contact: its law "
-                "continues straight. Try: a shorter run, or klack stroke with stops.speed and "
-                "force of this contact."
+                f"{format_si(contact.closing.max_force, 'N', 3)} of its static contact, where "
+                "its law continues as a straight line. Try: a shorter run, or klack stroke with "
+                "stops.speed and force of this contact."
             )
         if contact.loops is not None:
             yield (
-                f"the faces {surfaces} yield, which laws of several contacts leave out. Try: klack "
-                "stroke of the same bodies."
+                f"the faces {surfaces} yield, which the laws of several contacts do not include. "
+                "Try: klack stroke of the same bodies."
             )
         if name == BACKING:
             yield from (
@@ -194,8 +195,8 @@ def _early_opening(row: BodyRow, level: LevelResult) -> Iterator[str]:
         yield (
             f"{below.surfaces} opens {format_si(after, 's', 2)} after the needle touches, within "
             f"the shortest period of the kept modes of '{pair.upper.name}' "
-            f"({format_si(1.0 / highest, 's', 2)}): so early the modes that are left out decide, "
-            f"and the time of opening is known to that period. Try: more modes "
+            f"({format_si(1.0 / highest, 's', 2)}): at such short times the omitted modes "
+            "matter, and the opening time is accurate only to that period. Try: more modes "
             f"(reduction.modes.{pair.upper.name}), and compare."
         )
 

@@ -142,11 +142,12 @@ def _lost_waves(result: LevelResult) -> Iterator[str]:
         share = max(gauge.upper_share for gauge in here)
         needed = format_si(max(2.0 * _LOBE / time, 1.5 * kept), "Hz", 2)
         yield (
-            f"{' and '.join(repr(gauge.name) for gauge in here)} may move before the wave arrives, "
-            f"and have another peak: a contact of {format_si(time, 's', 3)} sends waves through "
-            f"'{body}' that are shorter than those of its kept modes, which end at "
-            f"{format_si(kept, 'Hz', 3)}; those above 0.7 of that add {100.0 * share:.0f} % of the "
-            f"highest value. Try: level full, or reduction.modes.{body}: {{frequency: {needed}}}."
+            f"{' and '.join(repr(gauge.name) for gauge in here)} may move before the wave "
+            f"arrives, and its peak may differ: a contact of {format_si(time, 's', 3)} sends "
+            f"waves through '{body}' that are shorter than its kept modes, which end at "
+            f"{format_si(kept, 'Hz', 3)}; modes above 0.7 of that contribute {100.0 * share:.0f} "
+            f"% of the highest value. Try: level full, or reduction.modes.{body}: {{frequency: "
+            f"{needed}}}."
         )
 
 
@@ -160,10 +161,10 @@ def _named(names: list[str]) -> str:
 
 def _verdict(name: str, apart: Deviation, answer: str, best: LevelResult) -> str:
     return (
-        f"level '{name}' is off by {100 * apart.peak_force:+.1f} % in peak force, "
+        f"level '{name}' deviates by {100 * apart.peak_force:+.1f} % in peak force, "
         f"{100 * apart.contact_time:+.1f} % in contact time and {apart.restitution:+.4f} in "
-        f"restitution from level '{answer}' ({best.label}). The answer is from level "
-        f"'{answer}', not from level '{name}'."
+        f"restitution from level '{answer}' ({best.label}). The answer is from level '{answer}', "
+        f"not from level '{name}'."
     )
 
 
@@ -197,9 +198,9 @@ def doubts_of_history(
     """
     if measures.cut_off:
         return (
-            "the run ends before separation: peak force, contact time and impulse are "
-            "cut off, so are spectrum and sound, and there is no restitution. Try: a longer "
-            "run.duration, two to three times the contact time.",
+            "the run ends before separation: peak force, contact time, impulse, spectrum and "
+            "sound are incomplete, and there is no restitution. Try: a longer run.duration, two "
+            "to three times the contact time.",
         )
     shortest = _shortest_contact(history, measures)
     if shortest < STEPS_PER_CONTACT * step:
@@ -218,10 +219,10 @@ def doubts_of_history(
         )
     if (rise := _rise(history, measures)) < _STEPS_OF_RISE * step:
         return (
-            f"the force rises within {rise / step:.2g} steps of {format_si(step, 's')}, as where "
-            "flat faces meet all at once: its peak depends on step and mesh, impulse and "
-            f"restitution hardly do. Try: {key}: {_rounded(step / 4)}, and check whether "
-            "the peak converges.",
+            f"the force rises within {rise / step:.2g} steps of {format_si(step, 's')}, as for "
+            "flat faces that meet all at once: its peak depends on step and mesh, impulse and "
+            f"restitution hardly do. Try: {key}: {_rounded(step / 4)}, and check whether the "
+            "peak converges.",
         )
     return ()
 
@@ -296,10 +297,11 @@ def flat_doubt(case: Case, pair: BodyPair, static: StaticContact, highest: Itera
         return ""
     contact = case.contact
     if case.backing is not None:
-        advice = "Try: faces as crowned in the drawing as real ones are, or more modes."
+        advice = "Try: faces with their real crown in the drawing, or more modes."
     elif contact.has_form or contact.roughness is not None:
         advice = (
-            "Try: more modes, or level full; the form that the case gives closes within that time."
+            "Try: more modes, or level full; the form of the faces in the case closes "
+            "within that time."
         )
     else:
         advice = (

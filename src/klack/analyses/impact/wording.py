@@ -41,7 +41,7 @@ def answer(study: ImpactStudy) -> str:
             "and is still in contact when the record ends, "
             f"{quantity(numbers.contact_time, 's', 3)} after first touch: the force has reached "
             f"{quantity(numbers.peak_force, 'N', 3)} by then, and peak force, contact time, "
-            "impulse and restitution are cut off. "
+            "impulse and restitution are incomplete. "
         )
     else:
         text += (
@@ -58,7 +58,7 @@ def answer(study: ImpactStudy) -> str:
     if study.reference == "full":
         text += ", which follows every degree of freedom and every contact point"
     elif study.reference == "interface":
-        text += ", which has the bodies as modes and a point-resolved contact"
+        text += ", which represents the bodies by modes and has a point-resolved contact"
     text += "."
     if doubt := contact_doubt(study.contact):
         text += f" {doubt}"
@@ -98,8 +98,8 @@ def _across(level: LevelResult) -> str:
     if isfinite(motion.tangential_restitution):
         sideways = f"keeps {share(motion.tangential_restitution, 1)} of its sideways speed, leaves"
     return (
-        f"It {sideways} with a spin of {hypot(*motion.spin_after):.4g} rad/s, and "
-        f"the impulse across the axis is {motion.impulse_ratio:.4f} of the one along it. "
+        f"It {sideways} with a spin of {hypot(*motion.spin_after):.4g} rad/s, and the impulse "
+        f"across the axis is {motion.impulse_ratio:.4f} of the impulse along it. "
     )
 
 
@@ -179,18 +179,18 @@ def estimate_sentence(study: ImpactStudy) -> str:
         return ""
     steps = ""
     if "full" in study.estimates:
-        steps = f"The steps of the full order put it off by {_off(study.estimates['full'])}."
+        steps = f"The steps of the full order shift it by {_off(study.estimates['full'])}."
     reduced = [name for name in study.estimates if name != "full"]
     if not reduced:
-        return f"{steps} So says the {study.estimate_basis}."
+        return f"{steps} This follows from the {study.estimate_basis}."
     name = "reduced" if "reduced" in reduced else reduced[0]
     estimate, true = study.estimates[name], _true(study, name)
     text = (
         f"Compared with one run of the {study.estimate_basis}, at the same condition, the "
-        f"'{name}' level is off by {_off(estimate)}: {_verdict(study, name)}."
+        f"'{name}' level deviates by {_off(estimate)}: {_verdict(study, name)}."
     )
     if true is not None:
-        text += f" Compared with the full order, which was run too, it is off by {_off(true)}."
+        text += f" Compared with the full order, which was run too, it deviates by {_off(true)}."
     return f"{text} {steps}".rstrip()
 
 

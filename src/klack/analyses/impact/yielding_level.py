@@ -80,11 +80,11 @@ def tell_yield(result: LevelResult, elastic: ImpactHistory, surfaces: str) -> No
         return
     other = measure_impact(elastic)
     warnings.warn(
-        f"contact {surfaces}, first impact on new faces: yield takes {100 * lost:.2g} % of the "
-        f"energy (peak {format_si(result.measures.peak_force, 'N', 4)}, restitution "
+        f"contact {surfaces}, first impact on new faces: yielding dissipates {100 * lost:.2g} % "
+        f"of the energy (peak {format_si(result.measures.peak_force, 'N', 4)}, restitution "
         f"{result.measures.restitution:.3f}; elastic bodies "
         f"{format_si(other.peak_force, 'N', 4)} and {other.restitution:.3f}). Later impacts are "
-        "harder and return more.",
+        "harder and rebound more.",
         AccuracyWarning,
         stacklevel=2,
     )
@@ -100,9 +100,9 @@ def doubt_large_strain(result: LevelResult, loops: YieldingLoops) -> LevelResult
     if strain < _LARGE:
         return result
     return result.doubted(
-        f"plastic strain reaches {100 * strain:.2g} % at the peak, where small strain and linear "
-        "hardening hold to about 10 %; set and land are estimates. Try: a lower speed, or a yield "
-        "stress that suits the body."
+        f"plastic strain reaches {100 * strain:.2g} % at the peak, but small strain and linear "
+        "hardening hold to about 10 %; set and land are estimates. Try: a lower speed, or a "
+        "realistic yield stress."
     )
 
 
@@ -117,8 +117,8 @@ def doubt_elastic_levels(
     if lost < SMALL_YIELD:
         return dict(results)
     doubt = (
-        f"its bodies are elastic, but yield takes {100 * lost:.2g} % of the energy of the first "
-        f"impact. Try: level {next(iter(yielding))}, which has it."
+        f"its bodies are elastic, but yielding dissipates {100 * lost:.2g} % of the energy of "
+        f"the first impact. Try: level {next(iter(yielding))}, which includes yield."
     )
     return {
         name: result if name in yielding else result.doubted(doubt)

@@ -36,12 +36,12 @@ _EIGENVALUE = JsonForm(
     "One eigenvalue, or one of a conjugate pair.",
     Key("real_1_s", float, of="mode.real"),
     Key("imaginary_1_s", float, of="mode.imaginary"),
-    Key("uncertainty_1_s", float, "By which round-off may move it.", "mode.uncertainty"),
+    Key("uncertainty_1_s", float, "Possible shift by round-off.", "mode.uncertainty"),
     Key("frequency_Hz", Real, of="mode.frequency"),
     Key("damping_ratio", Real, of="mode.damping"),
     Key("time_constant_s", Real, "Null where it neither decays nor grows.", "mode.time_constant"),
     Key("verdict", Literal["decays", "grows", "neutral"], of="mode.verdict"),
-    Key("participation", dict[str, float], "By component, from 1 % on.", "parts"),
+    Key("participation", dict[str, float], "By component, 1 % and above.", "parts"),
 )
 _RESPONSE = JsonForm(
     "ResponseJson",
@@ -61,20 +61,20 @@ _LOOP = JsonForm(
     Key("gain_margin_frequency_Hz", Real, of="gain_frequency"),
     Key("phase_margin_deg", Real, of="phase_margin"),
     Key("phase_margin_frequency_Hz", Real, of="phase_frequency"),
-    Key("distance", float, "Least distance of the open loop from -1."),
+    Key("distance", float, "Smallest distance of the open loop from -1."),
     Key("distance_frequency_Hz", float, of="distance_frequency"),
 )
 _SWEEP = JsonForm(
     "SweepJson",
-    "The oscillation that decays the slowest along a sweep; null where there is none.",
+    "The slowest decaying oscillation along a sweep; null where there is none.",
     Key("name", str),
     Key("unit", str, "SI; 1 for a pure number."),
     Key("values", list[float]),
     Key("growth_1_s", list[Real], of="growth"),
     Key("frequency_Hz", list[Real], of="frequency"),
     Key("damping_ratio", list[Real], of="damping"),
-    Key("unstable", list[int], "Eigenvalues that grow; -1 where there is no point."),
-    Key("failures", list[str], "Why there is no point; else empty."),
+    Key("unstable", list[int], "Number of growing eigenvalues; -1 where there is no point."),
+    Key("failures", list[str], "Reason why there is no point; otherwise empty."),
 )
 
 
@@ -116,7 +116,11 @@ LINEAR_MODEL = JsonForm(
             _Shared(mode, record.parts(k)) for k, mode in enumerate(record.eigenvalues)
         ],
     ),
-    Key("unconfirmed", int, "Of the matrices, without a root with delays."),
+    Key(
+        "unconfirmed",
+        int,
+        "Eigenvalues of the matrices without a root of the equation with delays.",
+    ),
     Key("responses", [_RESPONSE]),
     Key("loops", [_LOOP]),
     Key("sweeps", [_SWEEP]),
@@ -252,7 +256,7 @@ def linear_model_told(record: LinearModel) -> Iterator[TextTable | str]:
         yield TextTable(title="Stability margins", columns=LOOP_HEADS, rows=loop_rows(record))
     for swept in record.sweeps:
         yield TextTable(
-            title=f"Oscillation that decays the slowest, over {swept.short}",
+            title=f"Slowest decaying oscillation over {swept.short}",
             columns=SWEEP_HEADS,
             rows=sweep_rows(swept),
             left=2,

@@ -23,11 +23,13 @@ _Current = Annotated[
     Parameter(
         name="--current",
         negative="",
-        help='Steady current of all coils, "3 A", or of one, "coil=3 A". [default: that of the '
+        help='Steady current of all coils, "3 A", or of one, "coil=3 A". [default: as at the '
         "start of a run]",
     ),
 ]
-_Voltage = Annotated[_Texts, Parameter(name="--voltage", negative="", help="Instead of a current.")]
+_Voltage = Annotated[
+    _Texts, Parameter(name="--voltage", negative="", help="Steady voltage, instead of a current.")
+]
 _Lift = Annotated[
     _Text, Parameter(name="--lift", help='Hold the needle at this displacement, "40 um".')
 ]
@@ -52,12 +54,16 @@ _From = Annotated[
     Parameter(
         name="--from",
         negative="",
-        help="Input of a frequency response, coil.voltage; several times. A wrong name lists all.",
+        help="Input of a frequency response, coil.voltage; repeatable. An unknown name lists all.",
     ),
 ]
 _To = Annotated[
     _Texts,
-    Parameter(name="--to", negative="", help="Output, needle.velocity; several times."),
+    Parameter(
+        name="--to",
+        negative="",
+        help="Output of a frequency response, needle.velocity; repeatable.",
+    ),
 ]
 _Frequencies = Annotated[
     tuple[str, str] | None,
@@ -80,7 +86,7 @@ _Loop = Annotated[
         name="--loop",
         negative="",
         help="Output at which a loop is opened for gain and phase margin, spring.end.force; "
-        "several times.",
+        "repeatable.",
     ),
 ]
 

@@ -193,7 +193,7 @@ def _response_chart(response: Response) -> Chart:
                 ),
             ),
         ),
-        note="Of small motions about the operating point; delays of lines are exact.",
+        note="Response to small motions about the operating point; delays of lines are exact.",
     )
 
 
@@ -247,7 +247,7 @@ def _sweep_chart(swept: StabilitySweep) -> Chart:
     x = factor * swept.values
     return Chart(
         name=file_word(f"stability over {swept.short}"),
-        title=f"Oscillation that decays the slowest, over {swept.short}",
+        title=f"Slowest decaying oscillation over {swept.short}",
         x=spec,
         panels=(
             Panel(
@@ -264,7 +264,7 @@ def _sweep_chart(swept: StabilitySweep) -> Chart:
                 curves=(Curve(x=x, y=swept.frequency, colour="orange", drawn="points", width=3.0),),
             ),
         ),
-        note="Below zero the valve oscillates. Every dot is a point of its own.",
+        note="Below zero the valve oscillates. Every dot is computed separately.",
     )
 
 
@@ -365,7 +365,7 @@ def linear_model_content(record: LinearModel) -> Content:
             ),
             (
                 "margins",
-                "What the loop bears before the limit of stability: a factor on it, a lag, and its "
+                "Margins of the loop to the limit of stability: a factor, a phase lag, and the "
                 "distance from -1.",
             ),
         ),
@@ -374,7 +374,7 @@ def linear_model_content(record: LinearModel) -> Content:
                 "small motions",
                 "Linear: contacts stay closed or open, nothing switches, and amplitudes are small.",
             ),
-            ("friction", "Dry friction is left out; what it holds at rest is more stable."),
+            ("friction", "Dry friction is left out; parts that it holds at rest are more stable."),
             (
                 "lines",
                 "Eigenvalues and matrices of valves with lines hold up to the band; the frequency "

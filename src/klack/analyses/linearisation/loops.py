@@ -60,8 +60,8 @@ def pid_loop(
         raise InputError(
             f"--loop {name}",
             got=f"a controller of the kind '{'function' if law is None else law.kind}'",
-            expected="a pid: a switch has no linear law",
-            hint="a stroke shows whether it swings; its limit cycle is not a matter of margins.",
+            expected="a pid controller: a switch has no linear law",
+            hint="a stroke shows whether it oscillates; margins do not describe a limit cycle.",
         )
     sensor = part.sensors[law.sensor]
     source = _place(system.inputs, _actuator(name, network, rows), f"--loop {name}")
@@ -105,7 +105,7 @@ def _place(signals: Sequence[Signal], name: str, where: str) -> int:
     if plain_name(name) not in names:
         raise InputError(
             where,
-            got=f"'{name}', which the linear model has not",
+            got=f"'{name}', which is not in the linear model",
             expected=f"one of: {one_of([x.name for x in signals])}",
             hint="give the sensor a displacement, velocity, pressure, flow or current.",
         )

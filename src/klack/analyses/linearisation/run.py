@@ -261,26 +261,26 @@ def _stability(
 
 def _notes(network: Network, lost: int, band: float) -> list[str]:
     told = [
-        f"the controller '{name}' holds the output that it has at the start: the linear model is "
-        "that of the valve with this loop open (--loop gives the margins of a pid)."
+        f"the controller '{name}' holds its output at the start: the linear model describes the "
+        "valve with this loop open (--loop gives the margins of a pid)."
         for name in controllers_of(network)
     ]
     told += [
-        f"the driver '{name}' switches to and fro: the coil has a constant voltage in its place, "
-        "the model is that between two switchings."
+        f"the driver '{name}' switches repeatedly: in the model the coil has a constant voltage "
+        "instead, as between two switchings."
         for name, part in network.components.items()
         if isinstance(part, Driver) and part.program().switching
     ]
     told += [
-        f"the capacitor, diodes and switches of the driver '{name}' are no part of the model: the "
-        "coil has a constant voltage and its own resistance alone."
+        f"the capacitor, diodes and switches of the driver '{name}' are not part of the model: "
+        "the coil has a constant voltage and only its own resistance."
         for name, part in network.components.items()
         if isinstance(part, Driver) and part.program().stage is not None
     ]
     if lost:
         told.append(
-            f"{lost} eigenvalues of the matrices below {band:.4g} Hz lead to no root of the "
-            "equation with delays: raise --band to see whether they change."
+            f"{lost} eigenvalues of the matrices below {band:.4g} Hz do not lead to a root of "
+            "the equation with delays: raise --band to see whether they change."
         )
     return told
 
@@ -296,8 +296,8 @@ def _place(option: str, signals: Sequence[Signal], name: str, others: Iterable[s
         raise InputError(
             option,
             got=f"'{name}'",
-            expected=f"one of: {one_of(names)}" if names else "a valve that has one",
-            hint=nearest(name, names, "take a name from this list."),
+            expected=f"one of: {one_of(names)}" if names else "a valve with one",
+            hint=nearest(name, names, "choose a name from this list."),
         )
     return plain.index(plain_name(name))
 

@@ -117,7 +117,7 @@ MAGNET_MEASURES: tuple[Measure[MagnetRecord], ...] = described_in(
     ),
     Measure(
         key="force_error_of_mesh",
-        definition="Twice the largest change of a force by a mesh of twice the size, over the "
+        definition="Twice the largest change of a force with a mesh of twice the size, over the "
         "largest force.",
         read=lambda record: _largest(record.force_mesh, record.force),
         form="share",
@@ -126,8 +126,8 @@ MAGNET_MEASURES: tuple[Measure[MagnetRecord], ...] = described_in(
     ),
     Measure(
         key="force_error_of_air",
-        definition="Largest change of a force by half as much air around, over the largest one; "
-        "several times the true error.",
+        definition="Largest change of a force with half as much surrounding air, over the "
+        "largest force; several times the true error.",
         read=lambda record: _largest(record.force_air, record.force),
         form="share",
         column=Column("%", 100.0, ".2g"),
@@ -135,7 +135,7 @@ MAGNET_MEASURES: tuple[Measure[MagnetRecord], ...] = described_in(
     ),
     Measure(
         key="linkage_error",
-        definition="Both errors of a flux linkage, over the largest one.",
+        definition="Both errors of a flux linkage, over the largest linkage.",
         read=lambda record: _largest(record.map.linkage_error, record.linkage),
         form="share",
         column=Column("%", 100.0, ".2g"),
@@ -143,8 +143,8 @@ MAGNET_MEASURES: tuple[Measure[MagnetRecord], ...] = described_in(
     ),
     Measure(
         key="virtual_work",
-        definition="Largest difference of a force to the slope of the co-energy of the linkages, "
-        "over the largest force; few gaps or currents make it larger.",
+        definition="Largest difference between a force and the slope of the co-energy from the "
+        "linkages, over the largest force; few gaps or currents increase it.",
         form="share",
         read=lambda record: record.virtual_work,
         column=Column("%", 100.0, ".2g"),
@@ -169,16 +169,17 @@ def run_magnet(case: MagnetCase, *, progress: Progress = silent) -> MagnetRecord
         raise InputError(
             "magnet.moving",
             got=f"a force of {format_si(strongest, 'N', 2)} at most, no more than its error",
-            expected="iron that the coil pulls",
-            hint="correct its place, or that of the coil, in the drawing.",
+            expected="iron that is attracted by the coil",
+            hint="correct the position of iron or coil in the drawing.",
         )
     if np.all(found.force[-1] >= 0.0):
         other = "downward" if drawing.opens == "upward" else "upward"
         raise InputError(
             "magnet.opens",
             got=f"a force that opens the gap at {found.current[-1]:g} A and every gap",
-            expected="one that closes it",
-            hint=f"opens: {other}, where the gap opens the other way, or correct the drawing.",
+            expected="a force that closes the gap",
+            hint=f"opens: {other}, if the gap opens in the other direction, or correct the "
+            f"drawing.",
         )
     try:
         made = FluxMap.of(current=found.current, gap=found.gap, linkage=found.linkage, force=None)
@@ -216,13 +217,13 @@ def _doubts(found: FieldMap, beyond: float) -> Iterator[str]:
     if found.error > _DOUBTFUL:
         yield (
             f"the error of the map is {share(found.error)} of its largest value. Try: a smaller "
-            "mesh_size, or more room between the parts where they nearly touch."
+            "mesh_size, or more distance between the parts where they nearly touch."
         )
     if beyond > _SATURATED:
         yield (
             f"{share(beyond)} of the volume of a part lies beyond the last measured point of its "
-            "magnetisation curve, where it is continued as saturated. Try: points up to a higher "
-            "flux density, or smaller currents."
+            "magnetisation curve, where the curve continues as saturated. Try: points up to a "
+            "higher flux density, or smaller currents."
         )
 
 
@@ -230,10 +231,10 @@ def _work_doubts(compared: ForceComparison) -> Iterator[str]:
     if compared.share > _FEW_POINTS:
         low, high, gap = compared.step
         yield (
-            f"a stroke takes the force from the linkages: at {compared.current:.4g} A and a gap of "
-            f"{format_si(compared.gap, 'm')} that is {compared.derived:.4g} N, where the fields "
-            f"have {compared.given:.4g} N ({share(compared.share)} of the largest force). The "
-            f"points are too far apart, most of all from {low:.4g} A to {high:.4g} A at "
+            f"a stroke derives the force from the linkages: at {compared.current:.4g} A and a "
+            f"gap of {format_si(compared.gap, 'm')} that gives {compared.derived:.4g} N, but the "
+            f"fields give {compared.given:.4g} N ({share(compared.share)} of the largest force). "
+            f"The points are too far apart, mainly from {low:.4g} A to {high:.4g} A at "
             f"{format_si(gap, 'm')}. Try: more currents there, or more gaps."
         )
 
@@ -269,7 +270,7 @@ _MAGNET = JsonForm(
     Key("force_mesh_error_N", list[list[float]], of="force_mesh"),
     Key("linkage_air_error_Wb", list[list[float]], of="linkage_air"),
     Key("force_air_error_N", list[list[float]], of="force_air"),
-    Key("beyond_curve", float, "Largest share of a volume beyond its curve.", "beyond"),
+    Key("beyond_curve", float, "Largest share of the volume of a part beyond its curve.", "beyond"),
     Key("wall_time_s", Real, of="wall_time"),
     Key("warnings", list[str]),
 )

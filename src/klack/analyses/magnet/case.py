@@ -18,14 +18,16 @@ from klack.units import LENGTH, Current, Length, LengthUnit, format_si
 
 __all__ = ["MagnetCase", "load_magnet_case", "magnet_case_schema"]
 
-_CORNERS = "Corners (r, z) of the half section in turn; two of them: those of a rectangle."
+_CORNERS = "Corners (r, z) of the half section in order; two corners define a rectangle."
 
 
 class MagnetPart(Section):
     """A body of revolution of iron."""
 
     corners: tuple[tuple[Number, Number], ...] = Field(min_length=2, description=_CORNERS)
-    iron: IronChoice | None = Field(default=None, description="If other than that of the magnet.")
+    iron: IronChoice | None = Field(
+        default=None, description="Material, if other than that of the magnet."
+    )
 
 
 class MagnetCoil(Section):
@@ -40,22 +42,24 @@ class Drawing(Section):
 
     unit: LengthUnit = Field(description="Unit of all coordinates, e.g. mm.")
     iron: IronChoice = Field(description="Magnetisation curve: a name of the library, or a curve.")
-    fixed: dict[Name, MagnetPart] = Field(min_length=1, description="Iron that stays, by name.")
-    moving: dict[Name, MagnetPart] = Field(min_length=1, description="Iron that moves, by name.")
-    coil: MagnetCoil = Field(description="Its section, without bobbin.")
+    fixed: dict[Name, MagnetPart] = Field(min_length=1, description="Fixed iron parts, by name.")
+    moving: dict[Name, MagnetPart] = Field(min_length=1, description="Moving iron parts, by name.")
+    coil: MagnetCoil = Field(description="Section of the coil, without bobbin.")
     drawn_gap: Length = Field(default=0.0, ge=0, description="Working gap of the drawing.")
     opens: Literal["upward", "downward"] = Field(
         default="upward", description="Motion along z that opens the working gap."
     )
     current: tuple[Current, ...] = Field(
-        min_length=2, description="Currents of the map, increasing; that of 0 A may be left out."
+        min_length=2, description="Currents of the map, increasing; 0 A may be left out."
     )
-    gap: tuple[Length, ...] = Field(min_length=3, description="Its working gaps, increasing.")
+    gap: tuple[Length, ...] = Field(
+        min_length=3, description="Working gaps of the map, increasing."
+    )
     mesh_size: Length | None = Field(
         default=None,
         gt=0,
-        description="At corners of the iron; at most the shortest distance between what moves and "
-        "what does not, which is the default.",
+        description="Element size at corners of the iron; at most the shortest distance between "
+        "moving and fixed parts, which is the default.",
     )
 
     _magnet: DrawnMagnet = PrivateAttr()

@@ -75,7 +75,7 @@ _BODY = JsonForm(
 )
 _FREEDOM = JsonForm(
     "MountFreedomJson",
-    "One freedom of a mount; its curves are in the files of the source.",
+    "One degree of freedom of a mount; its curves are in the files of the source.",
     *measured_keys(MOUNT_MEASURES),
     Key(
         "free_velocity_dB",
@@ -97,13 +97,13 @@ _MOUNTS = JsonForm(
     Key(
         "balance",
         Real,
-        "Sum of forces and momentum, less what enters, over the largest force; null of an impact.",
+        "Sum of forces and momentum minus the inflow, over the largest force; null for an impact.",
     ),
-    Key("repaid", float, "Force that takes back energy of macro steps, over the largest force."),
+    Key("repaid", float, "Force that removes energy of macro steps, over the largest force."),
     Key(
         "entering_N",
         float,
-        "Largest change of the force by columns of fluid, mouths and from outside.",
+        "Largest change of the force by fluid columns, mouths and outside components.",
         attrgetter("entering"),
     ),
     Key(
@@ -120,7 +120,7 @@ _MOUNTS = JsonForm(
 )
 _INTERFACE = JsonForm(
     "InterfaceFreedomJson",
-    "One freedom between valve and machine.",
+    "One degree of freedom between valve and machine.",
     *measured_keys(INTERFACE_MEASURES),
     Key("band_center_Hz", [float], of=lambda item: list(item.force_bands.middle)),
     Key(
@@ -132,24 +132,24 @@ _INTERFACE = JsonForm(
     Key(
         "energy_J",
         [float],
-        "Into the machine by band.",
+        "Energy into the machine by band.",
         lambda item: list(item.energy_bands.energy),
     ),
 )
 _PATH = JsonForm(
     "PathJson",
-    "What one freedom brings to an ear.",
+    "Contribution of one degree of freedom to an ear.",
     *measured_keys(PATH_MEASURES),
     Key(
         "third_octave_dB",
         [float],
-        "By itself, re (20 uPa)^2 s; empty where nothing acts.",
+        "Level of this path by itself, re (20 uPa)^2 s; empty where nothing acts.",
         lambda path: _levels(path.bands, PRESSURE_REFERENCE),
     ),
 )
 _EAR = JsonForm(
     "EarJson",
-    "Sound of one click at an ear; what is over time is null where no signal is known.",
+    "Sound of one click at an ear; measures over time are null where no signal is known.",
     *measured_keys(EAR_MEASURES),
     Key("band_center_Hz", [float], of=lambda ear: list(ear.bands.middle)),
     Key(
@@ -161,11 +161,13 @@ _EAR = JsonForm(
     Key("paths", {str: _PATH}, "By freedom.", by_name("paths")),
 )
 _IN_SITU_FREEDOM = JsonForm(
-    "InSituFreedomJson", "One freedom of a virtual test.", *measured_keys(IN_SITU_MEASURES)
+    "InSituFreedomJson",
+    "One degree of freedom of a virtual test.",
+    *measured_keys(IN_SITU_MEASURES),
 )
 _IN_SITU = JsonForm(
     "InSituJson",
-    "Blocked forces as a bench would find them in the machine, without noise.",
+    "Blocked forces as a test in the machine would find them, without noise.",
     Key("indicators", list[str]),
     Key("deviation", float, "Largest over all lines, relative."),
     Key("condition", float, "Largest of the mobilities from the interface to the indicators."),
@@ -176,13 +178,18 @@ _MACHINE = JsonForm(
     "The valve in the machine of its case.",
     Key("receiver", str),
     Key("elements", str, "Empty where all mounts are joined rigidly."),
-    Key("energy_J", float, "Into the machine through all freedoms, of one click.", "energy"),
+    Key(
+        "energy_J",
+        float,
+        "Energy of one click into the machine through all degrees of freedom.",
+        "energy",
+    ),
     Key("element_loss_J", float, "Lost in the elements.", "element_loss"),
     Key("balance", float, "Sum of all powers over the largest of them, at the worst line."),
     Key(
         "motion_ratio",
         Real,
-        "Highest velocity of the mounts along z over that of the needle.",
+        "Highest velocity of the mounts along z over the highest velocity of the needle.",
         "motion",
     ),
     Key("freedoms", {str: _INTERFACE}, "By name.", by_name("freedoms")),
@@ -210,7 +217,7 @@ _DESIGN = JsonForm(
         "The valve as a source at its mounts; empty without noise.mounts.",
         lambda design: {} if design.at_mounts is None else {"source": design.at_mounts},
     ),
-    Key("machine", (_MACHINE, None), "Without noise.receiver null."),
+    Key("machine", (_MACHINE, None), "Null without noise.receiver."),
 )
 _STUDY = JsonForm(
     "NoiseJson",
@@ -221,7 +228,7 @@ _STUDY = JsonForm(
     Key(
         "designs",
         {str: _DESIGN},
-        "All of them by name.",
+        "All designs by name.",
         by_name("designs"),
     ),
     Key("warnings", list[str]),
@@ -301,8 +308,8 @@ def _told_of_machine(found: InMachine, whose: str) -> Iterator[TextTable | str]:
         )
     if found.in_situ is not None:
         yield text_table(
-            f"{whose}Virtual test by {', '.join(found.in_situ.indicators)}: off by "
-            f"{found.in_situ.deviation:.1g} at most, condition {found.in_situ.condition:.2g}",
+            f"{whose}Virtual test with {', '.join(found.in_situ.indicators)}: largest deviation "
+            f"{found.in_situ.deviation:.1g}, condition {found.in_situ.condition:.2g}",
             "freedom",
             IN_SITU_MEASURES,
             ((item.name, item) for item in found.in_situ.freedoms),
@@ -381,11 +388,11 @@ NOISE = StoredAnalysis(
         "design and its noise": DESIGN_MEASURES,
         "stop and its force": STOP_MEASURES,
         "body that vibrates": BODY_MEASURES,
-        "freedom of a mount": MOUNT_MEASURES,
-        "freedom between valve and machine": INTERFACE_MEASURES,
+        "degree of freedom of a mount": MOUNT_MEASURES,
+        "degree of freedom between valve and machine": INTERFACE_MEASURES,
         "ear in a machine": EAR_MEASURES,
         "path to an ear": PATH_MEASURES,
-        "freedom of a virtual test": IN_SITU_MEASURES,
+        "degree of freedom of a virtual test": IN_SITU_MEASURES,
     },
     measured=_measured,
 )

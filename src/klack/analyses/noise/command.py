@@ -20,8 +20,8 @@ _A = Annotated[
     Path,
     Parameter(
         name="A",
-        help="Folder that klack impact or stroke wrote; or a case (file or shipped name), which is "
-        "run first.",
+        help="Folder written by klack impact or stroke; or a case (file or shipped name), which "
+        "is run first.",
     ),
 ]
 _B = Annotated[

@@ -53,7 +53,7 @@ def noise_answer(study: NoiseStudy) -> str:
     where = f" on '{stop.stop}'" if first.kind == "stroke" else ""
     text = f"{begin} has a peak force of {quantity(stop.peak_force, 'N', 3)}{where}. "
     if not first.bodies:
-        return text + "There is no elastic held body, so nothing can be said about sound."
+        return text + "There is no elastic held body, so no statement about sound is possible."
     bodies = listed([f"the {body.name}" for body in first.bodies])
     text += (
         f"It brings {quantity(first.injected_energy, 'J', 3)} of structure-borne energy into "
@@ -84,8 +84,8 @@ def _compared(first: NoiseDesign, other: NoiseDesign) -> str:
     times = loudness / first.sound.loudness.maximum if first.sound.loudness.maximum else 0.0
     factor = f", {times:.2g} times as loud" if times else ""
     return (
-        f"That of '{other.name}' has {_sone(loudness)}{factor}; its A-weighted level differs by "
-        f"{typeset(EXPOSURE_LEVEL_A.apart(other, first))}."
+        f"The click of '{other.name}' has {_sone(loudness)}{factor}; its A-weighted level "
+        f"differs by {typeset(EXPOSURE_LEVEL_A.apart(other, first))}."
     )
 
 
@@ -170,20 +170,20 @@ def _source_sheet(study: NoiseStudy) -> tuple[Section, ...]:
             place = ", ".join(f"{1e3 * x:.4g}" for x in item.position)
             rows.append((f"{whose}{item.name}", place, *page_cells(MOUNT_MEASURES, item)))
         balance = (
-            "the contact force alone acts"
+            "only the contact force acts"
             if np.isnan(source.balance)
-            else f"all forces and m a leave {source.balance:.1g} of the largest force, without "
-            f"{source.repaid:.1g} that took back energy of the time steps; fluid and surroundings "
-            f"bring in {quantity(source.entering, 'N', 2)} at most"
+            else f"forces and m a balance within {source.balance:.1g} of the largest force, "
+            f"apart from {source.repaid:.1g} that corrected the energy of the time steps; fluid "
+            f"and surroundings contribute {quantity(source.entering, 'N', 2)} at most"
         )
         words.append(f"{whose}{quantity(source.mass, 'kg', 3)} of held bodies; {balance}.")
     return (
         Section(
             title="Source at its mounts",
             paragraphs=(
-                "Independent of the machine: free velocity, blocked force and mobility of the free "
-                "valve (files source.nc and source.uff). Forces act along the axis; a body of "
-                "revolution moves across it only where a machine pushes back.",
+                "Independent of the machine: free velocity, blocked force and mobility of the "
+                "free valve (files source.nc and source.uff). Forces act along the axis; a body "
+                "of revolution moves across the axis only where a machine pushes back.",
                 *words,
             ),
             tables=(
@@ -217,14 +217,14 @@ def _machine(study: NoiseStudy) -> tuple[Section, ...]:
         lost = f", {quantity(found.element_loss, 'J', 3)} are lost in elements"
         words.append(
             f"{whose}{design.settings.machine}. {quantity(found.energy, 'J', 3)} of one click go "
-            f"into it{lost if found.elements else ''}; at each line all powers make zero within "
-            f"{found.balance:.1g} of the largest."
+            f"into the machine{lost if found.elements else ''}; at each line all powers add up "
+            f"to zero within {found.balance:.1g} of the largest."
         )
         words.append(
-            f"{whose}that is the work of all forces (contacts, magnet, springs, with their "
+            f"{whose}this is the work of all forces (contacts, magnet, springs, with their "
             "reactions) at the mounts, where the valve moves as a whole. The "
-            f"{quantity(design.injected_energy, 'J', 3)} above are the work of the contacts alone "
-            "on the modes of bodies whose mounts rest, and stay in them: neither is part of the "
+            f"{quantity(design.injected_energy, 'J', 3)} above are the work of only the contacts "
+            "on the modes of bodies with fixed mounts, and stay in them: neither is part of the "
             "other, and either may be larger."
         )
         if isfinite(found.motion):
@@ -235,8 +235,9 @@ def _machine(study: NoiseStudy) -> tuple[Section, ...]:
         if found.in_situ is not None:
             test = found.in_situ
             words.append(
-                f"{whose}a virtual test by {listed(list(test.indicators))} finds the blocked force "
-                f"within {test.deviation:.1g} (condition {test.condition:.2g}, without noise)."
+                f"{whose}a virtual test with {listed(list(test.indicators))} finds the blocked "
+                f"force within {test.deviation:.1g} (condition {test.condition:.2g}, without "
+                "noise)."
             )
             for one in test.freedoms:
                 tests.append((f"{whose}{one.name}", *page_cells(IN_SITU_MEASURES, one)))
@@ -289,7 +290,7 @@ def _listen(study: NoiseStudy) -> Section:
         title="Listen",
         paragraphs=(
             f"All files share one scale: {level_statement(scale)}. To hear the level of the "
-            "estimate, set the volume so that a sine at full scale has the level said here; "
+            "estimate, set the volume to give a full-scale sine the level stated here; "
             "otherwise only the character and the differences are real.",
         ),
         sounds=tuple(players),
@@ -347,9 +348,9 @@ def _energy(study: NoiseStudy) -> Section:
     return Section(
         title="Structure-borne energy",
         paragraphs=(
-            "What the contact forces bring into the rigidly held bodies: most of it is lost in "
-            "their damping or still rings at the end of the record; the rest is stored while a "
-            f"stop stays pressed. The balance closes to {abs(worst):.0e} of it.".replace(
+            "Work of the contact forces on the rigidly held bodies: most of it is lost in their "
+            "damping or still rings at the end of the record; the rest is stored while a stop "
+            f"stays pressed. The balance closes to {abs(worst):.0e} of this work.".replace(
                 "e-", "e\N{MINUS SIGN}"
             ),
         ),
@@ -447,21 +448,21 @@ _EFFICIENCY = {
 }
 _ESTIMATED = (
     "An estimate per surface: density and speed of sound in air times the radiation efficiency "
-    "times the squared normal velocity, over time and area. Parts that move against each other are "
-    "added as if they did not cancel: too loud for bodies smaller than the wavelength, by 17 dB "
+    "times the squared normal velocity, over time and area. Parts that move against each other "
+    "are added without cancellation: too loud for bodies smaller than the wavelength, by 17 dB "
     "and more where a small valve shakes as a whole."
 )
 _BESIDE = (
-    "In a machine: of the surfaces of the valve itself, held rigidly. What the machine radiates is "
-    "the sound at its ears."
+    "In a machine: radiation of the surfaces of the valve itself, held rigidly. The radiation "
+    "of the machine is the sound at its ears."
 )
 _RADIATED = {
     "piston": _ESTIMATED,
     "unity": _ESTIMATED,
-    "elements": "Boundary elements on the outside of all held bodies: parts that move against each "
-    "other cancel as they do in air. The energy of a surface is what leaves through it, below zero "
-    "where it takes more from the air than it gives. The rest of the outside closes bores and "
-    "mounting faces, and other bodies that move along.",
+    "elements": "Boundary elements on the outside of all held bodies: parts that move against "
+    "each other cancel as they do in air. The energy of a surface is the energy that leaves "
+    "through it, below zero where the surface absorbs more than it radiates. The rest of the "
+    "outside closes bores and mounting faces, and includes other bodies that move along.",
 }
 
 
@@ -489,14 +490,15 @@ def _definitions(study: NoiseStudy) -> tuple[tuple[str, str], ...]:
         *glossary(shown),
         (
             "blocked force",
-            "Axial force of the body on a rigid support. A softer structure receives less.",
+            "Axial force of the body on a rigid support. A softer structure receives a "
+            "smaller force.",
         ),
     ]
     if any(design.machine is not None for design in study.designs):
         for measures in (INTERFACE_MEASURES, EAR_MEASURES, PATH_MEASURES):
             found += glossary(measures)
     pressure = (
-        "At an ear by the forces on the machine."
+        "Sound at an ear from the forces on the machine."
         if design.settings.ear
         else "All radiated power as a monopole in a free field, with minimum phase. Reflections, "
         "directivity and the travel time are neglected."
@@ -516,34 +518,36 @@ def _limits(study: NoiseStudy) -> tuple[tuple[str, str], ...]:
     short = ""
     if begins:
         short = (
-            f"Below {quantity(begins, 'Hz', 2)} the record, which does not end as it began, is "
-            "shorter than a period. "
+            f"Below {quantity(begins, 'Hz', 2)} the record, which does not return to its initial "
+            "state, is shorter than a period. "
         )
     click = (
         "Click",
-        "All of a click is heard at once here, where a real plate rings on: peak level, crest "
-        "factor, kurtosis and loudest moment are on the high side; exposure levels are not.",
+        "The whole click is emitted at once here, while a real plate rings on: peak level, "
+        "crest factor, kurtosis and loudest moment are on the high side; exposure levels are "
+        "not.",
     )
     limits = [
         (
             "Estimate",
-            "Levels in dB, not tenths of them: mount, plate and damping decide, and they are known "
-            "roughly. Differences between two designs on the same mount are better than levels.",
+            "Levels are meaningful in whole dB, not in tenths: mount, plate and damping decide, "
+            "and they are only roughly known. Differences between two designs on the same mount "
+            "are more accurate than levels.",
         ),
         *([click] if any(not design.settings.ear for design in study.designs) else []),
         (
             "Force",
-            "Of the rigidly held bodies; the mount does not act back on the impact. Without "
-            "noise.mounts magnetic and pressure forces on the housing are left out; sound through "
-            "the fluid always is.",
+            "Noise of the rigidly held bodies; the mount does not react on the impact. Without "
+            "noise.mounts magnetic and pressure forces on the housing are left out; sound "
+            "through the fluid always is.",
         ),
         (
             "Direction",
-            "Forces along the axis only. Bending of a tilted or eccentric impact is not there.",
+            "Only forces along the axis. Bending by a tilted or eccentric impact is not included.",
         ),
         (
             "Frequency",
-            f"{short}Above the highest kept mode a body follows through its static "
+            f"{short}Above the highest kept mode a body responds only with its static "
             "compliance. Sound files end at 20 kHz.",
         ),
     ]
@@ -551,17 +555,17 @@ def _limits(study: NoiseStudy) -> tuple[tuple[str, str], ...]:
         limits.append(
             (
                 "Impact alone",
-                "Nothing pushes the needle of an impact back, as springs and magnets of a valve "
-                "do: its impulse stays unbalanced, and the bands below about one over the time of "
-                "flight, some kilohertz in a valve, are too loud. klack stroke knows better.",
+                "In an impact no spring or magnet pushes the needle back: its impulse stays "
+                "unbalanced, and the bands below about one over the time of flight, a few "
+                "kilohertz in a valve, are too loud. klack stroke includes these forces.",
             )
         )
     if any(body.assumed for _, body in _bodies(study)):
         limits.append(
             (
                 "Damping",
-                f"Bodies without damping in the case sound with {100 * ASSUMED_DAMPING:g} % of "
-                "critical damping, an assumption: the level of a resonance follows it.",
+                f"For bodies without damping in the case {100 * ASSUMED_DAMPING:g} % of critical "
+                "damping is assumed: the level of a resonance depends on it.",
             )
         )
     return tuple(limits)

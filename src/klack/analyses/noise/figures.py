@@ -113,7 +113,7 @@ def force_chart(study: NoiseStudy) -> Chart:
         panels=tuple(panels),
         note=(
             "Contact and film together, above zero when the stop is pressed. Every impulse is "
-            "kept: fine steps near the impacts, record means between them."
+            "preserved: fine steps near the impacts, record means between them."
         ),
     )
 
@@ -189,14 +189,15 @@ def spectrum_chart(study: NoiseStudy) -> Chart:
     axis = AxisSpec(label="energy below", unit="%", range=(0.0, 103.0))
     panels.append(Panel(y=axis, curves=tuple(gathered), share=0.55))
     note = (
-        "Above: magnitude of the Fourier integral of the strongest impact on each stop; its left "
-        "end is the impulse. Third octaves: ∫ F² dt of the whole record per band, all stops "
-        "together. Bottom: share of it below each frequency."
+        "Above: magnitude of the Fourier integral of the strongest impact on each stop; its "
+        "left end is the impulse. Third octaves: ∫ F² dt of the whole record per band, all "
+        "stops together. Bottom: share of this integral below each frequency."
     )
     if left:
         note += (
-            " Thin dotted lines: what springs, magnet and fluid do not balance within the valve "
-            "(mass times acceleration of the needle); difference and share are those of it."
+            " Thin dotted lines: the part that springs, magnet and fluid do not balance within "
+            "the valve (mass times acceleration of the needle); difference and share refer to "
+            "this part."
         )
     if differences:
         note += f" Difference: minus '{reference.name}', with lines at ±3 dB."
@@ -274,8 +275,8 @@ def _trusted(study: NoiseStudy) -> tuple[Band, ...]:
 def _trusted_words(study: NoiseStudy) -> str:
     low, high = _limits(study)
     if not np.isfinite(high):
-        return "Rigid bodies: no wave shapes this force, and no limit is known."
-    begin = f"from one over the record, {quantity(low, 'Hz', 3)}, " if low else ""
+        return "Rigid bodies: this force contains no waves, and no limit is known."
+    begin = f"from the inverse of the record length, {quantity(low, 'Hz', 3)}, " if low else ""
     return f"Shaded: {begin}up to the highest kept mode, {quantity(high, 'Hz', 3)}."
 
 
@@ -360,7 +361,7 @@ def blocked_charts(study: NoiseStudy) -> tuple[Chart, ...]:
                 title=f"Force of the {name} on its rigid support",
                 x=AxisSpec(label="time", unit=unit),
                 panels=(panel,),
-                note="What the hold has to bear along the axis, if it is rigid (blocked force).",
+                note="Force that a rigid support carries along the axis (blocked force).",
             )
         )
         charts.append(
@@ -372,8 +373,9 @@ def blocked_charts(study: NoiseStudy) -> tuple[Chart, ...]:
                     "level", "dB re 1 pN²s", bands, 80.0, differences, _trusted(study)
                 ),
                 note=(
-                    "A record that ends while the body still rings is cut there: bands below one "
-                    f"over its length are those of the cut. {_trusted_words(study)}"
+                    "A record that ends while the body still rings is truncated there: bands "
+                    "below the inverse of its length result from the truncation. "
+                    f"{_trusted_words(study)}"
                 ),
             )
         )
@@ -426,14 +428,14 @@ def source_charts(study: NoiseStudy) -> tuple[Chart, ...]:
             "Free velocity of the mounts",
             AxisSpec(label="exposure", unit="dB re (1 nm/s)² s"),
             velocity,
-            "Third octaves of one click, divided by no duration. Rotations re (1 nrad/s)² s.",
+            "Third octaves of one click, not divided by a duration. Rotations re (1 nrad/s)² s.",
         ),
         chart(
             "mount-force",
             "Blocked force of the mounts",
             AxisSpec(label="exposure", unit="dB re (1 µN)² s"),
             force,
-            "Third octaves of one click on mounts that are held. Moments re (1 µN m)² s.",
+            "Third octaves of one click on fixed mounts. Moments re (1 µN m)² s.",
         ),
         chart(
             "drive-lines",
@@ -447,7 +449,7 @@ def source_charts(study: NoiseStudy) -> tuple[Chart, ...]:
             "Mobility of the free valve at its mounts",
             AxisSpec(label="velocity per force", unit="m/(N s), 1/(N m s)", log=True),
             mobility,
-            "Drive points, of rotations per moment. The files of the source have the matrix.",
+            "Drive points; rotations per moment. The files of the source contain the whole matrix.",
         ),
     )
 
@@ -499,14 +501,14 @@ def machine_charts(study: NoiseStudy) -> tuple[AnyChart, ...]:
             "machine-force",
             "Force on the machine",
             _level_panel("exposure", "dB re (1 µN)² s", force, 80.0),
-            "Third octaves of one click; thin dotted the blocked force, which an immovable machine "
-            "would take up. Moments re (1 µN m)² s.",
+            "Third octaves of one click; thin dotted: the blocked force, which an immovable "
+            "machine would receive. Moments re (1 µN m)² s.",
         ),
         chart(
             "machine-energy",
             "Energy into the machine",
             _level_panel("energy", "dB re 1 pJ", energy, 80.0),
-            "By freedom; gaps where a freedom gives energy back.",
+            "By degree of freedom; gaps where a degree of freedom returns energy.",
         ),
         *(
             chart(
@@ -543,7 +545,7 @@ def _path_bars(rows: Sequence[tuple[str, dict[str, float]]]) -> BarChart:
             )
             for k, path in enumerate(paths)
         ),
-        note="Each path with its phase; what raises less what lowers makes 100 %."
+        note="Each path with its phase; positive minus negative shares give 100 %."
         if lowered
         else "Each path with its phase; none lowers the sound by 1 % or more.",
     )
@@ -573,8 +575,8 @@ def radiation_chart(study: NoiseStudy) -> Chart | None:
         x=_FREQUENCY_AXIS,
         panels=_compared("energy", "dB re 1 pJ", levels, 80.0, differences, _trusted(study)),
         note=(
-            "Thick: as the case says. Thin dotted lines: radiation efficiency 1 in every band, "
-            f"which is no bound. {_trusted_words(study)}"
+            "Thick: as in the case. Thin dotted lines: radiation efficiency 1 in every band, "
+            f"which is not a bound. {_trusted_words(study)}"
         ),
     )
 
@@ -613,8 +615,8 @@ def own_sound_charts(study: NoiseStudy) -> tuple[Chart, ...]:
             panels=(
                 replace(_level_panel("level", "dB re (20 µPa)²s", curves, _SILENCE), share=1.0),
             ),
-            note="Sound exposure of one click in third octaves, all bodies with their phases, far "
-            "field in the free. The same all round the axis.",
+            note="Sound exposure of one click in third octaves, all bodies with their phases, "
+            "far field in free space; symmetric about the axis.",
         ),
         Chart(
             name="own-click",
@@ -625,7 +627,7 @@ def own_sound_charts(study: NoiseStudy) -> tuple[Chart, ...]:
                 Panel(y=AxisSpec(label="beside", unit="mPa"), curves=tuple(side), share=0.7),
             ),
             note=f"By boundary elements with phase, to {quantity(top, 'Hz', 2)}, without the "
-            "travel time; on the axis at 0 degrees from +z, beside at 90.",
+            "travel time; 0 degrees is on the axis towards +z, 90 degrees to the side.",
         ),
     )
 
@@ -636,7 +638,10 @@ def own_sound_charts(study: NoiseStudy) -> tuple[Chart, ...]:
 def heard_words(design: NoiseDesign) -> tuple[str, str]:
     """Where the sound of a design is heard, and what it comes from."""
     if design.settings.ear:
-        return f"at '{design.settings.ear}'", "Forces on the machine by its pressures per force."
+        return (
+            f"at '{design.settings.ear}'",
+            "From the forces on the machine and its pressures per force.",
+        )
     return (
         f"at {quantity(design.settings.distance, 'm', 3)}",
         "Estimate: monopole in a free field with minimum phase; without the travel time.",
@@ -677,7 +682,7 @@ def click_charts(study: NoiseStudy) -> tuple[Chart, ...]:
         ),
         note=(
             f"{how} Loudness after ISO 532-1 for sounds that vary in time; it decays more slowly "
-            "than the sound, as hearing does."
+            "than the sound, as in human hearing."
         ),
     )
     over_bands = Chart(

@@ -59,15 +59,15 @@ def first_part(result: NetworkResult, most: int = _MOST_STEPS) -> tuple[NetworkR
             got=f"a run of {format_si(whole, 's')} with records of {format_si(spacing, 's')} and "
             f"no impact in its first {length}",
             expected=f"impacts within {length}, {most:,} fine steps",
-            hint="shorten the wait before the first actuation, use a shorter record or a longer "
+            hint="shorten the time before the first actuation, use a shorter record or a longer "
             "step, or continue from a run that ends just before it (klack stroke --continue).",
         )
     note = (
         f"Only the first {format_si(end - float(result.time[0]), 's')} of the run of "
         f"{format_si(whole, 's')} are evaluated, with {len(events)} of its {len(result.events)} "
-        "impacts: forces, energies and sound are those of this part. For a later part run "
-        "the stroke up to there, continue with klack stroke --continue for some ms, and evaluate "
-        "the noise of that."
+        "impacts: forces, energies and sound refer to this part. For a later part run the "
+        "stroke up to it, continue with klack stroke --continue for a few ms, and evaluate the "
+        "noise of the continuation."
     )
     cut = replace(
         result,

@@ -40,7 +40,7 @@ _RUNG = 1e-4  # share of the energy in the last tenth of a model's record
 _LONGEST = 0.8  # [s]
 _CUT = (
     f"The sound at the ears ends {_LONGEST:g} s after it begins, while forces act or the machine "
-    "rings: peak, loudness and files are those of this part, exposures of all of it."
+    "rings: peak, loudness and files refer to this part, exposures to the whole sound."
 )
 _FELT = 0.01  # velocity of the mounts over that of the needle
 _ROUND_OFF = 1e-9  # of what swings to and fro
@@ -182,14 +182,14 @@ def in_machine(
     if found.moves:
         notes.append(
             f"The valve itself moves in its run, with up to {100 * moved:.2g} % of the speed of "
-            "its needle: its forces are those on this machine and hold on no other."
+            "its needle: its forces are valid only on this machine."
         )
     elif moved > _FELT:
         notes.append(
             f"On this machine the valve itself moves with up to {100 * moved:.2g} % of the speed "
-            "of its needle: the force of the impact, which is that of the rigidly held valve, is "
-            "off by about as much."
-            + " The variant dry-mounted of the stroke moves with it."
+            "of its needle: the impact force, computed for the rigidly held valve, is wrong by "
+            "about as much."
+            + " The variant dry-mounted of the stroke includes this motion."
             * machine.causal
         )
     record = InMachine(
@@ -226,8 +226,8 @@ def _coupled(found: Installed) -> tuple[SourceAtMounts, Junction, Coupled]:
         if known is not None and not low < found.top:
             raise InputError(
                 f"noise.receiver: {found.machine.words[0]}",
-                got=f"responses from {format_si(low, 'Hz')} on",
-                expected=f"some below {format_si(found.top, 'Hz')}",
+                got=f"responses from {format_si(low, 'Hz')} upwards",
+                expected=f"responses below {format_si(found.top, 'Hz')}",
                 hint="measure the machine in the band of the click.",
             )
         source = found.at(even_lines((low, high, apart), found.top), 0.0)

@@ -187,7 +187,7 @@ def mounted(structures: Sequence[Structure], noise: CaseNoise, case: str) -> tup
         raise InputError(
             f"result of case {case}: noise.mounts",
             got=f"no mount of {one_of(without)}" if found else "no bodies at mounts in the result",
-            expected="every held body at a mount, since all of them carry forces",
+            expected="every held body at a mount, because all of them carry forces",
             hint="list the surfaces that move together: "
             "mounts: {flange: {surface: [housing.rim, pole.rim]}}."
             if found
@@ -196,8 +196,8 @@ def mounted(structures: Sequence[Structure], noise: CaseNoise, case: str) -> tup
     if any(set(item.at_mounts[0].port_names) - set(item.port_names) for item in found):
         raise InputError(
             f"result of case {case}: noise.mounts",
-            got="bodies of a former version, without the places of reactions",
-            expected="bodies that hold them",
+            got="bodies of an earlier version, without the positions of reactions",
+            expected="bodies with these positions",
             hint="run the case again, then klack noise.",
         )
     joined = {found[0].name}
@@ -213,10 +213,10 @@ def mounted(structures: Sequence[Structure], noise: CaseNoise, case: str) -> tup
             f"case {case}: noise.mounts",
             got=f"{one_of(apart)} and {found[0].name}, which share no mount"
             if apart
-            else f"the mount '{missing[0]}', which the result does not hold",
+            else f"the mount '{missing[0]}', which is not in the result",
             expected="one vibrating body: held bodies that share a mount",
-            hint="list both surfaces in one mount, if they are joined stiffly there: "
-            "surface: [housing.rim, pole.rim]."
+            hint="list both surfaces in one mount, if they are stiffly joined there: surface: "
+            "[housing.rim, pole.rim]."
             if apart
             else "run the case again, then klack noise.",
         )
@@ -331,9 +331,9 @@ def _of_matrices(given: NoiseMatrices, points: tuple[InterfacePoint, ...]) -> tu
         if row in rows.values():
             raise InputError(
                 f"noise.receiver.matrices.rows.{name}",
-                got=f"the row {wanted!r}, which another freedom has",
-                expected="a row for each freedom",
-                hint="name the row of this motion, or leave it out and say what it does in "
+                got=f"the row {wanted!r}, which belongs to another degree of freedom",
+                expected="a separate row for each degree of freedom",
+                hint="name the row of this motion, or leave it out and state its assumption in "
                 "receiver.missing.",
             )
         freedom = Freedom(mount, DIRECTIONS.index(direction) + 1)

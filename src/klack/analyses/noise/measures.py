@@ -68,13 +68,12 @@ FORCE_LEVEL: Measure[NoiseDesign] = replace(
     symbol="L_F",
     definition="Level of ∫ F² dt over all bands, re 1 pN² s = (1 µN)² s: the level re 1 µN of a "
     "steady force with the same energy in one second.",
-    note="Springs, magnet and fluid push the needle from the housing that it hits; below about one "
-    "over the time of flight they balance the contact forces. The rest is mass times "
-    "acceleration of the needle. Sound and surface motion include this share of every band, "
-    "or with noise.mounts all forces; "
-    "injected energy, mobility and blocked force the contact forces alone. Third octaves are "
-    "those of IEC 61260-1 (base ten); the force is held at its first and last value outside the "
-    "record.",
+    note="Springs, magnet and fluid act between the needle and the housing that it hits; below "
+    "about one over the time of flight they balance the contact forces. The rest is mass times "
+    "acceleration of the needle. Sound and surface motion include this share of every band, or "
+    "with noise.mounts all forces; injected energy, mobility and blocked force include only the "
+    "contact forces. Third octaves follow IEC 61260-1 (base ten); outside the record the force "
+    "keeps its first and last value.",
     read=lambda design: (
         10.0 * log10(max(float(design.unbalanced_energy.sum()), 1e-300) / ENERGY_REFERENCE)
     ),
@@ -134,7 +133,7 @@ CLICK_MEASURES: tuple[Measure[SoundStatistics], ...] = described_in(
         symbol="L_AFmax",
         unit="dBA",
         definition="Highest level of one click with the frequency weighting A and the time "
-        "weighting F (125 ms), re 20 µPa: what a sound level meter shows.",
+        "weighting F (125 ms), re 20 µPa, as shown by a sound level meter.",
         read=lambda click: click.fast_level_A,
         deviation="difference",
     ),
@@ -247,10 +246,10 @@ DESIGN_MEASURES: tuple[Measure[NoiseDesign], ...] = described_in(
         name="energy through the mounts",
         symbol="W_s",
         unit="J",
-        definition="Energy that all forces together bring through the held surfaces into mount and "
-        "plate, or into the machine and its elements.",
-        note="There the valve moves as a whole. The injected energy is that of the contacts on "
-        "bodies whose held surfaces rest, and stays in them: neither is part of the other.",
+        definition="Energy that all forces together transmit through the held surfaces into "
+        "mount and plate, or into the machine and its elements.",
+        note="Here the valve moves as a whole. The injected energy is the work of the contacts "
+        "on bodies with fixed held surfaces, and stays in them: neither is part of the other.",
         digits=3,
         column=Column("uJ", 1e6, ".4g", "to the mount"),
         deviation="energy",
@@ -344,9 +343,9 @@ DESIGN_MEASURES: tuple[Measure[NoiseDesign], ...] = described_in(
         key="impulsive_prominence",
         name="impulsive prominence of the drive pattern",
         symbol="P",
-        definition="3 lg(OR/(dB/s)) + 2 lg(LD/dB) of the most prominent rise of the level with the "
-        "weightings A and F in steps of 20 ms, ISO/PAS 1996-3; above the steady noise of the case, "
-        "or above what is left of the click before.",
+        definition="3 lg(OR/(dB/s)) + 2 lg(LD/dB) of the most prominent rise of the level with "
+        "the weightings A and F in steps of 20 ms, ISO/PAS 1996-3; above the steady noise of "
+        "the case, or above the remainder of the previous click.",
         source=_SOUND,
         read=_heard(
             lambda sound: None if sound.prominence is None else sound.prominence.prominence
@@ -361,8 +360,9 @@ DESIGN_MEASURES: tuple[Measure[NoiseDesign], ...] = described_in(
         key="impulse_adjustment",
         name="adjustment for impulsive sound",
         symbol="K_I",
-        definition="1.8 (P - 5) dB of an impulsive prominence P above 5, else 0: added to the "
-        "equivalent level where a noise is rated; above 9 dB beyond the usual range of the method.",
+        definition="1.8 (P - 5) dB of an impulsive prominence P above 5, otherwise 0: added to "
+        "the equivalent level where a noise is rated; above 9 dB beyond the usual range of the "
+        "method.",
         source=_SOUND,
         read=_heard(
             lambda sound: None if sound.prominence is None else sound.prominence.adjustment
@@ -397,7 +397,8 @@ DESIGN_MEASURES: tuple[Measure[NoiseDesign], ...] = described_in(
         key="valid_from",
         symbol="f_1",
         unit="Hz",
-        definition="One over the length of the record; 0 where every force ends as it began.",
+        definition="One over the length of the record; 0 where every force ends at its initial "
+        "value.",
         source="theory/spectra",
         digits=3,
     ),
@@ -405,7 +406,8 @@ DESIGN_MEASURES: tuple[Measure[NoiseDesign], ...] = described_in(
         key="balanced_below",
         symbol="f_b",
         unit="Hz",
-        definition="Frequency below which half of the forces or more is balanced in the valve.",
+        definition="Frequency below which at least half of the forces is balanced within the "
+        "valve.",
         digits=3,
     ),
     Measure(
@@ -445,7 +447,7 @@ STOP_MEASURES: tuple[Measure[StopForce], ...] = described_in(
         name="impulse of the record",
         symbol="J",
         unit="N s",
-        definition="Integral of the force over the whole record, with what presses at rest.",
+        definition="Integral of the force over the whole record, including the force at rest.",
         source="theory/impact",
         page=True,
     ),
@@ -468,8 +470,8 @@ BODY_MEASURES: tuple[Measure[BodyNoise], ...] = described_in(
         title="vibration\nby time",
         symbol="E_v",
         unit="J",
-        definition="Energy lost in the modes or still ringing when the record ends, by the motion "
-        "over time.",
+        definition="Energy lost in the modes or still ringing when the record ends, from the "
+        "motion over time.",
         page=True,
     ),
     Measure(
@@ -507,7 +509,8 @@ BODY_MEASURES: tuple[Measure[BodyNoise], ...] = described_in(
         title="stored more at rest",
         symbol="E_s",
         unit="J",
-        definition="Energy that the modes store statically at the end, less that at the start.",
+        definition="Energy stored statically in the modes at the end, minus the energy at the "
+        "start.",
         digits=3,
         page=True,
     ),
@@ -529,7 +532,7 @@ MOUNT_MEASURES: tuple[Measure[MountFreedom], ...] = described_in(
         symbol="L_vf",
         definition="Exposure of one click, ∫ v² dt over the bands to 20 kHz, of mounts that are "
         "free, re (1 nm/s)² s; of rotations re (1 nrad/s)² s.",
-        note="ISO 9611 refers to 50 nm/s, which makes levels 34 dB lower.",
+        note="ISO 9611 refers to 50 nm/s, which gives levels 34 dB lower.",
         read=lambda freedom: _exposure_level(
             float(freedom.velocity_bands.energy.sum()), VELOCITY_REFERENCE
         ),
@@ -556,8 +559,8 @@ INTERFACE_MEASURES: tuple[Measure[InterfaceFreedom], ...] = described_in(
         key="force_on_machine_level",
         name="force on the machine",
         symbol="L_g",
-        definition="Exposure of one click, ∫ F² dt over the bands that are known, on the machine, "
-        "re (1 µN)² s; of moments re (1 µN m)² s.",
+        definition="Exposure of one click, ∫ F² dt over the known bands, on the machine, re (1 "
+        "µN)² s; of moments re (1 µN m)² s.",
         read=lambda freedom: _exposure_level(
             float(freedom.force_bands.energy.sum()), FORCE_REFERENCE
         ),
@@ -568,8 +571,8 @@ INTERFACE_MEASURES: tuple[Measure[InterfaceFreedom], ...] = described_in(
         key="blocked_force_beside_level",
         name="blocked force in the same bands",
         symbol="L_Fbl",
-        definition="Exposure of the blocked force of the same freedom in the same bands: what an "
-        "immovable machine would take up.",
+        definition="Exposure of the blocked force of the same degree of freedom in the same "
+        "bands, which an immovable machine would receive.",
         read=lambda freedom: _exposure_level(
             float(freedom.blocked_bands.energy.sum()), FORCE_REFERENCE
         ),
@@ -580,8 +583,8 @@ INTERFACE_MEASURES: tuple[Measure[InterfaceFreedom], ...] = described_in(
         name="energy into the machine",
         symbol="W_i",
         unit="J",
-        definition="∫ g v dt of one click through one freedom; below 0 where it gives energy back, "
-        "the sum of all is not.",
+        definition="∫ g v dt of one click through one degree of freedom; below 0 where it "
+        "returns energy, although the sum of all is not.",
         read=lambda freedom: freedom.energy,
         digits=3,
         column=Column("uJ", 1e6, ".4g"),
@@ -609,7 +612,7 @@ EAR_MEASURES: tuple[Measure[EarSound], ...] = described_in(
         name="sound exposure level at the ear, A-weighted",
         symbol="L_AE",
         unit="dBA",
-        definition="Level of ∫ p_A² dt of one click by its spectrum, in the band that is known, re "
+        definition="Level of ∫ p_A² dt of one click from its spectrum, in the known band, re "
         "(20 µPa)² s.",
         read=lambda ear: _exposure_level(ear.exposure_A, PRESSURE_REFERENCE),
         column=_column("SEL", "dBA"),
@@ -638,10 +641,10 @@ PATH_MEASURES: tuple[Measure[PathSound], ...] = described_in(
         _LEVEL,
         key="path_exposure_level_weighted",
         json_name="path_exposure_level_dBA",
-        name="level of the path alone",
+        name="level of the single path",
         symbol="L_AE,i",
         unit="dBA",
-        definition="A-weighted sound exposure level of what one freedom alone brings to the ear, "
+        definition="A-weighted sound exposure level from only one degree of freedom at the ear, "
         "re (20 µPa)² s.",
         read=lambda path: _exposure_level(path.exposure_A, PRESSURE_REFERENCE),
         column=_column("alone", "dBA"),
@@ -650,8 +653,8 @@ PATH_MEASURES: tuple[Measure[PathSound], ...] = described_in(
         key="path_share",
         name="share of the path",
         symbol="s_i",
-        definition="∫ Re(p* p_i) df over ∫ p* p df, A-weighted: parts with their phases make "
-        "100 %; below 0 where a path lowers the sound.",
+        definition="∫ Re(p* p_i) df over ∫ p* p df, A-weighted: parts with their phases add up "
+        "to 100 %; below 0 where a path lowers the sound.",
         read=lambda path: path.share,
         form="share",
         digits=1,
@@ -678,7 +681,7 @@ IN_SITU_MEASURES: tuple[Measure[InSituFreedom], ...] = described_in(
         key="blocked_force_of_source_level",
         name="blocked force of the source",
         symbol="L_Fbl",
-        definition="The same of the source in the freedoms that the machine takes up.",
+        definition="The same for the source, in the degrees of freedom that the machine carries.",
         read=lambda freedom: _exposure_level(float(freedom.exact.energy.sum()), FORCE_REFERENCE),
         column=_column("of the source"),
     ),

@@ -200,16 +200,16 @@ def _require_forces(variant: StrokeVariant) -> None:
     if not acting or any(body.in_fluid and body.body not in known for body in moving):
         raise InputError(
             "noise.mounts",
-            got="a result of a former version, without the places of its forces",
-            expected="a result that holds them",
+            got="a result of an earlier version, without the positions of its forces",
+            expected="a result with these positions",
             hint="run klack stroke again, then klack noise.",
         )
     driven = [body.body for body in moving if body.driven]
     if driven:
         raise InputError(
             "noise.mounts",
-            got=f"the given motion of {one_of(driven)}, whose drive acts from nowhere",
-            expected="bodies that forces move",
+            got=f"the prescribed motion of {one_of(driven)}, whose drive has no reaction",
+            expected="bodies moved by forces",
             hint="leave out 'mounts' for this case.",
         )
 
@@ -239,9 +239,9 @@ def _enter(
         raise InputError(
             "noise.passages",
             got=f"no direction of {one_of(without)}, whose fluid carries momentum into the valve",
-            expected="one for each line, inertance and way in or out",
+            expected="a direction for each line, inertance and connection in or out",
             hint=f"add, for example, noise.passages: {{{without[0]}: {{direction: across}}}}; or "
-            "closing, opening: from a to b along the axis.",
+            "closing, opening: the direction from a to b along the axis.",
         )
     for item in passages:
         own = given[item.component]
@@ -337,9 +337,9 @@ def _react(
     if homeless:
         raise InputError(
             "noise.reactions",
-            got=f"no place for the reaction of {one_of(homeless)}",
-            expected="a surface of a held body for each component that pushes moving parts alone",
+            got=f"no surface for the reaction of {one_of(homeless)}",
+            expected="a surface of a held body for each component that pushes only moving parts",
             hint=f"add, for example, noise.reactions: {{{homeless[0]}: BODY.SURFACE}}; 'outside' "
-            "for what acts on the valve from outside, such as gravity.",
+            "for components that act on the valve from outside, such as gravity.",
         )
     return outside

@@ -307,7 +307,7 @@ class InterfaceFreedom:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PathSound:
-    """What one freedom brings to an ear.
+    """Contribution of one degree of freedom to an ear.
 
     Parameters
     ----------

@@ -148,7 +148,7 @@ def _design_names(sources: Sequence[NoiseSource], names: Sequence[str]) -> tuple
             "noise: names",
             got=", ".join(names),
             expected=f"{len(sources)} different names, one for each design",
-            hint="a result with several variants or levels counts once for each of them.",
+            hint="a result with several variants or levels counts as one design for each of them.",
         )
     return tuple(names)
 
@@ -160,7 +160,7 @@ def _require_machines(sources: Sequence[NoiseSource]) -> None:
                 f"case {source.case}: noise",
                 got="a virtual test without a machine",
                 expected="noise.mounts and noise.receiver",
-                hint="describe what carries the valve, or leave out --virtual-test.",
+                hint="describe the machine that carries the valve, or leave out --virtual-test.",
             )
 
 
@@ -318,8 +318,8 @@ def _outside(elements: Mapping[str, SurfaceRadiation]) -> str:
     if found is None:
         return ""
     return (
-        f" ({found.elements} on the outside of all bodies, {100 * found.covered:.2g} % of it over "
-        "openings, mounting faces and what has no name)"
+        f" ({found.elements} on the outside of all bodies, {100 * found.covered:.2g} % of it "
+        "over openings, mounting faces and unnamed faces)"
     )
 
 
@@ -475,34 +475,34 @@ def _design_notes(
     for way in list(ways.values())[:1]:
         if way.holds_up_to < _HEARING:
             found.append(
-                f"The boundary elements hold up to {format_si(way.holds_up_to, 'Hz')}, where the "
-                "largest is a sixth of the wavelength; above, the surface is taken to radiate "
-                "plane waves, an estimate."
+                f"The boundary elements are valid up to {format_si(way.holds_up_to, 'Hz')}, "
+                "where the largest is a sixth of the wavelength; above, the surface is assumed "
+                "to radiate plane waves, an estimate."
             )
     if source.noise.receiver is not None and not source.noise.ears:
         found.append(
-            "The case names no ears: what the machine makes of the force is known up to its mounts."
+            "The case names no ears: the response of the machine is known only at its mounts."
         )
     if bodies and not source.given:
         found.append(
-            f"Case {source.case} has no section 'noise': rigid hold, no plate. A small body that "
-            "is held rigidly radiates next to nothing that can be heard."
+            f"Case {source.case} has no section 'noise': rigid hold, no plate. A small, rigidly "
+            "held body radiates almost no audible sound."
         )
     assumed = [body.name for body in bodies if body.assumed]
     if assumed:
         found.append(
-            f"The case gives no damping of {' and '.join(assumed)}; for mobility and radiation "
-            f"{100 * ASSUMED_DAMPING:g} % of critical damping is assumed."
+            f"The case specifies no damping of {' and '.join(assumed)}; for mobility and "
+            f"radiation {100 * ASSUMED_DAMPING:g} % of critical damping is assumed."
         )
     if np.isfinite(source.kept_up_to) and source.kept_up_to < _HEARING:
         found.append(
-            f"The highest modes are kept up to {format_si(source.kept_up_to, 'Hz')} only, which "
-            "can be heard: keep more modes."
+            f"Modes are kept only up to {format_si(source.kept_up_to, 'Hz')}, which is audible: "
+            "keep more modes."
         )
     if bodies and not np.isfinite(source.kept_up_to):
         found.append(
-            f"The force of '{source.run}' is that of rigid bodies: it has no waves, and no limit "
-            "of validity is known."
+            f"The force of '{source.run}' is that of rigid bodies: it contains no waves, and no "
+            "limit of validity is known."
         )
     if sound is not None and sound.loudness.note:
         found.append(f"The click is {sound.loudness.note}.")
@@ -518,9 +518,10 @@ def _radiation_notes(source: NoiseSource, around: Surroundings) -> Iterator[str]
         if share.size and share[worst] > _DAMPED_BY_SOUND:
             at = format_si(float(own.omega[worst]) / (2.0 * np.pi), "Hz")
             yield (
-                f"Sound takes {100 * share[worst]:.2g} % of what the damping of '{own.name}' takes "
-                f"from its mode at {at}, and is no part of that: the level of the mode is up to "
-                f"{10 * np.log10(1.0 + share[worst]):.1f} dB too high. Add the loss by sound, "
+                f"Sound radiation dissipates {100 * share[worst]:.2g} % of the energy that the "
+                f"damping of '{own.name}' takes from its mode at {at}, and is not part of the "
+                "damping: the level of the mode is up to "
+                f"{10 * np.log10(1.0 + share[worst]):.1f} dB too high. Add the radiation loss, "
                 f"{50 * loss[worst]:.2g} % of critical damping, to the damping of the body."
             )
 
@@ -539,7 +540,7 @@ def _settings_differ(designs: Sequence[NoiseDesign]) -> list[str]:
         "distance": "the distance",
         "mount": "the mount",
         "plate": "the plate",
-        "radiation": "how the surface radiates",
+        "radiation": "the model of radiation",
         "rate": "the rate of the drive pattern",
         "machine": "the machine",
         "ear": "the ear",

@@ -53,8 +53,8 @@ __all__ = [
 ]
 
 _OBLIQUE = (
-    "the body was hit obliquely: only the force along the axis makes this sound, the one across "
-    "it is left out. Try: an impact without motion.sideways_speed and motion.spin."
+    "the body was hit obliquely: only the force along the axis makes this sound; the force "
+    "across it is left out. Try: an impact without motion.sideways_speed and motion.spin."
 )
 
 _HEARD = 0.1  # of the fastest impact: slower ones have less than 1 % of its energy
@@ -380,8 +380,8 @@ def _notes(variant: StrokeVariant, last: ImpactEvent | None) -> tuple[str, ...]:
     if last is not None and last.approach_speed > _HEARD * fastest:
         found.append(
             f"The run ends in an impact on '{last.stop}' at {last.approach_speed:.2g} m/s, which "
-            f"is left out (the fastest has {fastest:.2g} m/s); run it longer to have the whole of "
-            "it."
+            f"is left out (the fastest has {fastest:.2g} m/s); increase run.duration to include "
+            "the whole impact."
         )
     if result.failure:
         found.append(f"The stroke is incomplete: {' '.join(result.failure.split())}")
@@ -389,7 +389,7 @@ def _notes(variant: StrokeVariant, last: ImpactEvent | None) -> tuple[str, ...]:
     if incomplete:
         found.append(
             f"The fine record of {one_of(incomplete)} is not complete: its latest impacts are "
-            "known as means over the records alone."
+            "known only as means over the records."
         )
     return tuple(found)
 
@@ -407,9 +407,9 @@ def _yield_notes(result: LevelResult) -> tuple[str, ...]:
     if share < SMALL_YIELD:
         return ()
     return (
-        f"The impact is the first on new faces: their yield takes {100 * share:.2g} % of the "
-        "energy, and later impacts are harder. Try: klack impact with run.run_in, and the noise of "
-        "the worn.yaml that it writes.",
+        f"The impact is the first on new faces: yielding dissipates {100 * share:.2g} % of the "
+        "energy, and later impacts are harder. Try: klack impact with run.run_in, and the noise "
+        "of the worn.yaml that it writes.",
     )
 
 
@@ -418,8 +418,9 @@ def _require_structures(study: ImpactStudy | StrokeStudy) -> None:
     if held and not study.structures:
         raise InputError(
             f"result of case {study.case}",
-            got=f"no modes and surfaces of {one_of(held)}, as an earlier version of klack wrote it",
-            expected="a result that holds them",
+            got=f"no modes and surfaces of {one_of(held)}, as written by an earlier version of "
+            "klack",
+            expected="a result with modes and surfaces",
             hint="run the case again, then klack noise.",
         )
 
@@ -439,12 +440,12 @@ def _require(what: str, name: str, held: Mapping[str, object], why: str = "") ->
         return
     hint = nearest(name, held, f"run the case with --{what} {name} first.")
     if what == "level" and name in VARIANTS:
-        hint = f"impacts have levels, variants are of strokes: --level {next(iter(held))}."
+        hint = f"impacts have levels, strokes have variants: --level {next(iter(held))}."
     elif what == "variant" and name in LEVELS:
-        hint = f"strokes have variants, levels are of impacts: --variant {next(iter(held))}."
+        hint = f"strokes have variants, impacts have levels: --variant {next(iter(held))}."
     raise InputError(
         what,
-        got=f"'{name}', which the result does not hold{why}",
+        got=f"'{name}', which is not in the result{why}",
         expected=f"one of: {one_of(held)}",
         hint=hint,
     )
@@ -484,6 +485,6 @@ def _section(data: Any, study: ImpactStudy | StrokeStudy) -> CaseNoise:
             f"result of case {study.case}: noise",
             got=problem.got,
             expected=problem.expected,
-            hint="files of the machine lie where they lay when the case ran; run klack noise on "
-            "the case itself.",
+            hint="files of the machine must be where they were when the case ran; run klack "
+            "noise on the case itself.",
         ) from None

@@ -215,7 +215,7 @@ def _note(designs: list[NoiseDesign], octaves: ThirdOctaves, bands: tuple[int, .
     )
     solid = any(body.surface.points.shape[1] == 3 for design in designs for body in design.bodies)
     seen = (
-        "Solids are seen from above or from below, where more of the motion is seen."
+        "Solids are shown from above or below, whichever shows more of the motion."
         if solid
         else "Half sections, mirrored; the lines are the radiating surfaces."
     )

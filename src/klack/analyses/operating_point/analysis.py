@@ -26,7 +26,7 @@ _MAIN = 6
 
 _SWEPT = JsonForm(
     "SweptJson",
-    "What a sweep changes.",
+    "Quantity changed by a sweep.",
     Key("unit", str, "SI; 1 for a pure number."),
     Key("values", list[float]),
 )
@@ -40,10 +40,10 @@ _QUANTITY = JsonForm(
 )
 _LEFT = JsonForm(
     "LeftJson",
-    "What is left of the balances at each point.",
-    Key("force_N", list[Real], "Largest on a free body.", "force_left"),
-    Key("volume_flow_m3_s", list[Real], "Largest into a volume.", "flow_left"),
-    Key("voltage_V", list[Real], "Largest at a coil.", "voltage_left"),
+    "Residuals of the balances at each point.",
+    Key("force_N", list[Real], "Largest force on a free body.", "force_left"),
+    Key("volume_flow_m3_s", list[Real], "Largest flow into a volume.", "flow_left"),
+    Key("voltage_V", list[Real], "Largest voltage at a coil.", "voltage_left"),
 )
 OPERATING_POINTS = JsonForm(
     "OperatingPointJson",
@@ -53,8 +53,8 @@ OPERATING_POINTS = JsonForm(
     OWN_COMPONENTS,
     Key("variant", str),
     Key("needle", str, "Point whose displacement is the lift."),
-    Key("started_from", Literal["start", "far"], "Place of the bodies.", "origin"),
-    Key("current_A", dict[str, float], "By coil, of the first point.", "drive"),
+    Key("started_from", Literal["start", "far"], "Positions of the bodies.", "origin"),
+    Key("current_A", dict[str, float], "Current by coil, of the first point.", "drive"),
     Key(
         "swept",
         {str: _SWEPT},
@@ -63,8 +63,8 @@ OPERATING_POINTS = JsonForm(
     ),
     Key("quantities", [_QUANTITY]),
     Key("residuals", _LEFT, of=lambda record: record),
-    Key("failures", list[str], "Why there is no point; else empty."),
-    Key("doubts", list[str], "What has to be known of each point."),
+    Key("failures", list[str], "Reason why there is no point; otherwise empty."),
+    Key("doubts", list[str], "Doubts about each point."),
     Key("cpu_time_s", Real, "Of all points, without bodies and laws.", "cpu_time"),
     Key("wall_time_s", Real, of="wall_time"),
     Key("warnings", list[str]),

@@ -22,7 +22,8 @@ class SteadyAsked:
         Parameter(
             name="--steady",
             negative="",
-            help="The operating point at the start instead, everything that drives it constant.",
+            help="Compute the operating point at the start instead, with everything that drives "
+            "the valve constant.",
         ),
     ] = False
     current: Annotated[
@@ -30,13 +31,15 @@ class SteadyAsked:
         Parameter(
             name="--current",
             negative="",
-            help='With --steady: of all coils, "3 A", or of one, "coil=3 A". [default: that of '
-            "the start of a run]",
+            help='With --steady: current of all coils, "3 A", or of one, "coil=3 A". [default: '
+            "as at the start of a run]",
         ),
     ] = None
     voltage: Annotated[
         _Texts,
-        Parameter(name="--voltage", negative="", help="With --steady: instead of a current."),
+        Parameter(
+            name="--voltage", negative="", help="With --steady: voltage, instead of a current."
+        ),
     ] = None
     lift: Annotated[
         str | None,
@@ -65,8 +68,8 @@ class SteadyAsked:
         str | None,
         Parameter(
             name="--over",
-            help='With --sweep: quantity on the x axis, "tank volume flow". [default: what is '
-            "swept first]",
+            help='With --sweep: quantity on the x axis, "tank volume flow". [default: the first '
+            "sweep]",
         ),
     ] = None
     show: Annotated[
@@ -74,7 +77,7 @@ class SteadyAsked:
         Parameter(
             name="--show",
             negative="",
-            help='With --sweep: quantity to draw, "coil armature force"; several times. [default: '
+            help='With --sweep: quantity to draw, "coil armature force"; repeatable. [default: '
             "the main ones]",
         ),
     ] = None
@@ -87,7 +90,7 @@ class SteadyAsked:
             if given:
                 raise InputError(
                     given[0],
-                    got="a value beside --steady",
+                    got="a value together with --steady",
                     expected="none: an operating point has no time",
                     hint=f"leave {given[0]} out, or --steady.",
                 )

@@ -38,9 +38,9 @@ def show_operating_points(
     if len(wanted) > 1:
         raise InputError(
             "--variant",
-            got=f"{len(wanted)} variants beside --steady",
+            got=f"{len(wanted)} variants together with --steady",
             expected="one",
-            hint="find the operating point of each in its own call.",
+            hint="compute the operating point of each variant with a separate command.",
         )
     base = Conditions(
         current=stated_drive(at_rest.current or (), "--current", CURRENT),

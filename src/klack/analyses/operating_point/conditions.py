@@ -127,13 +127,13 @@ def asked_sweeps(
         raise _refused(
             "--sweep",
             "current and voltage",
-            "one of them: at rest each follows from the other",
-            "sweep the current alone.",
+            "only one of them: at rest each follows from the other",
+            "sweep only the current.",
         )
     total = int(np.prod([len(sweep.values) for sweep in sweeps], dtype=float))
     if total > _MOST_POINTS:
         raise _refused(
-            "--sweep", f"{total} points", f"{_MOST_POINTS} at most", "take fewer values of each."
+            "--sweep", f"{total} points", f"{_MOST_POINTS} at most", "use fewer values of each."
         )
     return sweeps
 

@@ -186,9 +186,11 @@ def _drawn(
 
 def _note(record: OperatingPoints) -> str:
     missing = int((~record.found).sum())
-    told = "Every dot is an operating point, found on its own."
+    told = "Every dot is an operating point, found independently."
     if missing:
-        told += f" {missing} of {record.count} points were not found: the curve is broken there."
+        told += (
+            f" {missing} of {record.count} points were not found: the curve is interrupted there."
+        )
     return told
 
 
@@ -213,32 +215,34 @@ def operating_point_content(record: OperatingPoints) -> Content:
         definitions=(
             (
                 "operating point",
-                "Bodies, pressures, flows and currents at rest while everything that drives them "
-                "is constant.",
+                "Equilibrium of bodies, pressures, flows and currents under constant drive.",
             ),
             (
                 "left",
-                "What does not balance: force on a free body, flow into a volume, voltage at a "
-                "coil; the largest of all.",
+                "Largest imbalance of all: force on a free body, flow into a volume, voltage at "
+                "a coil.",
             ),
             (
                 "static stiffness",
-                "Force on a body over its displacement while pressures and flows find their new "
-                "balance; below zero the body moves away.",
+                "Force on a body over its displacement while pressures and flows reach their "
+                "new balance; below zero the body moves away.",
             ),
         ),
         limits=(
             (
                 "rest",
-                "An operating point says nothing of whether the valve reaches it, nor of "
+                "An operating point does not show whether the valve reaches it, nor "
                 "oscillations about it: a stroke shows both.",
             ),
             (
                 "several points",
-                "Points are looked for from where the bodies are drawn and from their far stops; "
-                "others may exist between them.",
+                "The search for points starts with the bodies as drawn and at their far stops; "
+                "others may exist in between.",
             ),
-            ("friction", "The point is that without dry friction, which may hold a body nearby."),
+            (
+                "friction",
+                "The point is the one without dry friction, which may hold a body nearby.",
+            ),
         ),
     )
 

@@ -63,7 +63,7 @@ class OperatingPoints(CaseRecord):
     drive [A]
         Current of each coil, of the first point.
     force_left (points,) [N]
-        Largest on a free body.
+        Largest force on a free body.
     flow_left (points,) [m^3/s]
         Largest of a volume.
     voltage_left (points,) [V]

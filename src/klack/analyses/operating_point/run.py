@@ -63,8 +63,8 @@ _SAME = 1e-3  # of the travel: two displacements are one
 _TRAVEL = 1e-5  # [m] of a body that no stop ends
 _FELT = 1e-2  # of the travel: friction that may hold a body away is worth a word
 _UNGUESSED = (
-    "the search from the pressures that the case states led to no point; this one is found from "
-    "ambient pressure in all volumes."
+    "the search from the pressures stated in the case did not converge; this point was found "
+    "from ambient pressure in all volumes."
 )
 _BEYOND = 1e-9  # of the travel: a lift that lies on its stop
 
@@ -276,7 +276,7 @@ def _require_reached(rows: Rows, roles: ValveRoles, lift: float) -> None:
             "lift",
             got=format_si(lift, "m"),
             expected=f"{ends}, between the stops of '{roles.needle}'",
-            hint="displacements count from where the needle is drawn.",
+            hint="displacements are measured from the drawn position of the needle.",
         )
 
 
@@ -291,10 +291,10 @@ def _other_note(rows: Rows, roles: ValveRoles, point: OperatingPoint, other: Ope
     if apart(port) <= _SAME:
         port = max(point.start.displacement, key=apart)
     here, there = (format_si(x.start.displacement[port], "m", 4) for x in (point, other))
-    stable = "" if other.stable else ", which does not hold"
+    stable = "" if other.stable else ", which is unstable"
     return (
-        f"more than one operating point: '{port}' at {here} here and at {there} from another start"
-        f"{stable}. Which one the valve is in depends on what was before (--from)."
+        f"more than one operating point: '{port}' at {here} here and at {there} from another "
+        f"start{stable}. The actual point depends on the history of the valve (--from)."
     )
 
 
@@ -302,12 +302,13 @@ def _loop_note(coil: str, start: str) -> str:
     if start == "remanent":
         return (
             f"'{coil}' has iron with hysteresis and starts at remanence: the point lies on the "
-            "falling branch of its loop. Coming from a smaller current, flux and force are smaller."
+            "falling branch of its loop. When approached from a smaller current, flux and force "
+            "are smaller."
         )
     return (
-        f"'{coil}' has iron with hysteresis: the point lies on its mean curve. Coming from a "
-        "larger current, flux and force are larger, from a smaller one smaller; a run with such a "
-        "drive tells by how much."
+        f"'{coil}' has iron with hysteresis: the point lies on its mean curve. When approached "
+        "from a larger current, flux and force are larger, from a smaller current smaller; a "
+        "run with such a drive shows by how much."
     )
 
 
@@ -317,8 +318,8 @@ def _own_notes(point: OperatingPoint, rows: Rows, held: set[str]) -> list[str]:
     if point.enclosed:
         names = " and ".join(f"'{name}'" for name in point.enclosed)
         notes.append(
-            f"no open way leads from {names} to a known pressure: what is stated as 'pressure' "
-            "there, or ambient pressure, is kept or shared."
+            f"no open path leads from {names} to a known pressure: the 'pressure' stated there, "
+            "or ambient pressure, is kept or shared."
         )
     for name, way in point.friction.items():
         if way > _FELT * travels.get(name, _TRAVEL) and name not in held:
@@ -327,7 +328,7 @@ def _own_notes(point: OperatingPoint, rows: Rows, held: set[str]) -> list[str]:
                 "this is the point without friction."
             )
     if not point.stable:
-        notes.append("the point does not hold: a small push drives a body away from it.")
+        notes.append("the point is unstable: a small push drives a body away from it.")
     return notes
 
 

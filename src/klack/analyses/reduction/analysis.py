@@ -37,7 +37,7 @@ BODY_MEASURES: tuple[Measure[ReducedBody], ...] = described_in(
         key="mass",
         symbol="m",
         unit="kg",
-        definition="Mass of the body; missing where a reduced model does not tell it.",
+        definition="Mass of the body; missing where a reduced model does not state it.",
     ),
     Measure(
         key="degrees_of_freedom",
@@ -50,7 +50,7 @@ BODY_MEASURES: tuple[Measure[ReducedBody], ...] = described_in(
     Measure(
         key="rigid_modes",
         symbol="n_r",
-        definition="Rigid motions that are kept.",
+        definition="Kept rigid motions.",
         read=lambda body: body.rigid_count,
         kind="whole",
     ),
@@ -58,7 +58,7 @@ BODY_MEASURES: tuple[Measure[ReducedBody], ...] = described_in(
         key="elastic_modes",
         name="modes",
         symbol="n_e",
-        definition="Elastic eigenmodes that are kept, without attachment modes.",
+        definition="Kept elastic eigenmodes, without attachment modes.",
         read=elastic_count,
         kind="whole",
         column=Column("", 1.0, "d"),
@@ -67,7 +67,7 @@ BODY_MEASURES: tuple[Measure[ReducedBody], ...] = described_in(
         key="highest_mode",
         symbol="f_max",
         unit="Hz",
-        definition="Highest frequency of a mode that is no attachment mode; 0 without any.",
+        definition="Highest frequency of the kept modes except attachment modes; 0 without any.",
         read=_highest,
         column=Column("kHz", 1e-3, ".4g", "up to"),
     ),
@@ -83,7 +83,7 @@ BODY_MEASURES: tuple[Measure[ReducedBody], ...] = described_in(
         key="modal_compliance",
         symbol="sum phi^2/omega^2",
         unit="m/N",
-        definition="Part of the static compliance that the kept modes have.",
+        definition="Static compliance carried by the kept modes.",
         read=lambda body: float(body.modal_compliance[0, 0]),
     ),
     Measure(
@@ -124,10 +124,10 @@ _TRANSFER = JsonForm(
 )
 _ONE_NODE = JsonForm(
     "OneNodeJson",
-    "A node of a body as its output, beside the contact port.",
+    "A node of a body as its output, in addition to the contact port.",
     Key("node", int, "In the mesh, from 0."),
     Key("place_m", list[float], "Of the node, in the drawing.", "place"),
-    Key("distance_m", float, "From the place that the case asks for.", "distance"),
+    Key("distance_m", float, "Distance from the position requested in the case.", "distance"),
     Key("correction", str, "Attachment modes of the recipe, in words."),
     Key(
         "compliance_over_port",
@@ -149,29 +149,34 @@ _ONE_NODE_IMPACT = JsonForm(
     Key(
         "energy_change",
         float,
-        "Of the energy of the impact, made by the one-node outputs.",
+        "Share of the impact energy created by the one-node outputs.",
         lambda item: item.nodes.energy - 1.0,
     ),
     Key("peak_force_N", float, of="nodes.peak_force"),
     Key("restitution", float, of="nodes.restitution"),
-    Key("peak_force_of_ports_N", float, "With the gap at the ports.", "ports.peak_force"),
+    Key("peak_force_of_ports_N", float, "Numbers with the gap at the ports.", "ports.peak_force"),
     Key("restitution_of_ports", float, of="ports.restitution"),
     Key("energy_change_of_ports", float, "Round-off.", lambda item: item.ports.energy - 1.0),
 )
 _BENDING = JsonForm(
     "BendingJson",
-    "Elastic modes of an axisymmetric body, the lowest of either kind.",
+    "Lowest bending and axial modes of an axisymmetric body.",
     Key(
         "bending_frequencies_Hz",
         list[float],
-        "Of Fourier order 1; each is two modes, in directions at right angles.",
+        "Frequencies of Fourier order 1; each stands for two modes, in perpendicular directions.",
         "bending",
     ),
-    Key("axial_frequencies_Hz", list[float], "Of order 0 without torsion, as many.", "axial"),
+    Key(
+        "axial_frequencies_Hz",
+        list[float],
+        "Frequencies of order 0 without torsion, the same number.",
+        "axial",
+    ),
     Key(
         "rigid_modes_of_order_1",
         int,
-        "2 of a free body, shift and rotation; 0 of a held one.",
+        "2 for a free body, shift and rotation; 0 for a held body.",
         "rigid",
     ),
 )
@@ -185,7 +190,7 @@ _STUDY = JsonForm(
     Key(
         "one_node",
         {str: _ONE_NODE},
-        "By body; of those with run.transfer.nodes.",
+        "By body, for bodies with run.transfer.nodes.",
         lambda study: _by_body(study.nodes),
     ),
     Key(
@@ -263,7 +268,7 @@ def _impacts_told(study: ReductionStudy) -> TextTable:
                 )
             )
     return TextTable(
-        title="Impact of the recipe with its gap read there",
+        title="Impact with the gap taken between these nodes",
         columns=("output", "peak force [N]", "restitution", "energy change [%]"),
         rows=rows,
     )
@@ -281,7 +286,7 @@ def _bending_told(study: ReductionStudy) -> TextTable:
         for i in range(max(len(frequencies) for _, frequencies in columns))
     ]
     return TextTable(
-        title="Bending modes (order 1) beside the axial ones, the lowest of each",
+        title="Lowest bending modes (order 1) and axial modes",
         columns=("mode", *(title for title, _ in columns)),
         rows=rows[:_BENDING_TOLD],
     )

@@ -59,7 +59,7 @@ _SETTLED, _NOTHING = 0.02, 2e-5  # change of an energy that is left, of itself a
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class OneNode:
-    """A node of a body as its output, beside the contact port.
+    """A node of a body as its output, in addition to the contact port.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ class OneNode:
     place (2,) or (3,) [m]
         In the drawing of the body.
     distance [m]
-        From the place that the case asks for.
+        Distance from the position requested in the case.
     correction
         ``"residual"``, or the shifts of attachment modes.
     compliance [-]
@@ -235,7 +235,7 @@ def _one_node(
     words = _correction_words(problem, body.name)
     curves = {"full order at the node": full.receptance.between("node", port.name)}
     choices: list[tuple[int, Correction, str]] = [
-        (TRANSFER_COUNTS[0], "none", f"{TRANSFER_COUNTS[0]} modes alone"),
+        (TRANSFER_COUNTS[0], "none", f"only {TRANSFER_COUNTS[0]} modes"),
         *((count, "attachment", corrected_label(count)) for count in TRANSFER_COUNTS),
     ]
     for count, correction, label in choices:
@@ -326,12 +326,12 @@ def node_chart(node: OneNode) -> Chart:
         title=f"Transfer function of the {node.body} from the contact force to one node",
         note=(
             f"Above: axial displacement of node {node.node} at {place_words(node)}, per harmonic "
-            "force over the contact area. With correction: attachment modes "
-            f"{_attached(node)}. At the port: mean displacement, weighted like that load. Below: "
-            "magnitude of the level difference from the full body at the node, averaged over a "
-            f"sliding third octave; the level line is at {item.tolerance:g} dB, a vertical "
-            "line marks where a curve first exceeds it. Structural damping with a loss factor of "
-            f"{item.loss_factor:g} in every curve. {sentence(item.reference_note)} "
-            f"The node is {format_si(node.distance, 'm', 3)} from the place in the case."
+            f"force over the contact area. With correction: attachment modes {_attached(node)}. "
+            "At the port: mean displacement, weighted like that load. Below: magnitude of the "
+            "level difference from the full body at the node, averaged over a sliding third "
+            f"octave; the level line is at {item.tolerance:g} dB, a vertical line marks where a "
+            "curve first exceeds it. Structural damping with a loss factor of "
+            f"{item.loss_factor:g} in every curve. {sentence(item.reference_note)} The node is "
+            f"{format_si(node.distance, 'm', 3)} from the position in the case."
         ),
     )

@@ -21,12 +21,12 @@ _PARAMETER = JsonForm(
 )
 _SLOPE = JsonForm(
     "SlopeJson",
-    "Derivative of a measure with a parameter.",
+    "Derivative of a measure with respect to a parameter.",
     Key("derivative", Real, "Unit of the measure per unit of the parameter.", itemgetter(0)),
     Key(
         "elasticity",
         Real,
-        "Relative change of the measure over the parameter's; not of a level.",
+        "Relative change of the measure over that of the parameter; not for a level.",
         itemgetter(1),
     ),
 )
@@ -59,21 +59,26 @@ _MEASURE = JsonForm(
     Key(
         "predicted",
         Real,
-        "Change with all parameters in the check, by the derivatives.",
+        "Change with all parameters in the check, predicted by the derivatives.",
         "measure.predicted",
     ),
     Key("secant", Real, "The same from two runs.", "measure.secant"),
     Key(
         "deviation",
         Real,
-        "Difference of both over the root of the summed squares of the parts.",
+        "Difference of the two over the root of the summed squares of the parts.",
         "measure.deviation",
     ),
-    Key("doubtful", bool, "Whether the two runs tell something else.", "measure.is_doubtful"),
+    Key(
+        "doubtful",
+        bool,
+        "Whether the two runs disagree with the derivatives.",
+        "measure.is_doubtful",
+    ),
 )
 _IMPACT = JsonForm(
     "ImpactSlopeJson",
-    "An impact, and how strongly its time answers.",
+    "An impact, and the sensitivity of its time.",
     Key("stop", str),
     Key("number", int),
     Key("time_s", float, of="time"),
@@ -93,7 +98,7 @@ _RECORD = JsonForm(
     Key(
         "method",
         Literal["tangents", "differences"],
-        "Exact, or by impacts with changed parameters.",
+        "Exact tangents, or differences of impacts with changed parameters.",
         lambda record: "differences" if record.by_differences else "tangents",
     ),
     Key("check_share", float, "Change of each parameter; 0 unchecked.", "share"),
@@ -102,7 +107,7 @@ _RECORD = JsonForm(
     Key(
         "run_cpu_time_s",
         Real,
-        "Of one stroke without derivatives.",
+        "Time of one stroke without derivatives.",
         lambda record: record.run_time or None,
     ),
     Key("warnings", list[str]),
@@ -144,8 +149,8 @@ def sensitivities_told(record: SensitivityRecord) -> Iterator[TextTable | str]:
         )
     if record.by_differences:
         yield (
-            "Derivatives by differences of impacts with each parameter changed by 1 % and 2 %: the "
-            "contact of an impact is solved anew for each speed and shape."
+            "Derivatives by differences of impacts with each parameter changed by 1 % and 2 %: "
+            "the contact of an impact is solved again for each speed and shape."
         )
     else:
         yield _impact_table(record)
@@ -158,7 +163,7 @@ def sensitivities_told(record: SensitivityRecord) -> Iterator[TextTable | str]:
 
 def _impact_table(record: SensitivityRecord) -> TextTable:
     return TextTable(
-        title="Impacts, and how strongly their times answer",
+        title="Impacts, and the sensitivity of their times",
         columns=("impact", "time", "root of summed squares", "deviation"),
         rows=[
             (

@@ -37,9 +37,11 @@ _Measures = Annotated[
     ),
 ]
 _Variant = Annotated[
-    str | None, Parameter(name="--variant", help="Of the stroke. [default: the first one]")
+    str | None, Parameter(name="--variant", help="Variant of the stroke. [default: the first one]")
 ]
-_Level = Annotated[str | None, Parameter(name="--level", help="Of an impact. [default: reduced]")]
+_Level = Annotated[
+    str | None, Parameter(name="--level", help="Level of an impact. [default: reduced]")
+]
 _Check = Annotated[
     bool, Parameter(name="--check", help="Compare with strokes with all parameters changed by 1 %.")
 ]

@@ -136,8 +136,9 @@ def _slopes(
         apart = abs(near - far)
         if apart > HOLDS * abs(slope) and apart * h > resolution:
             doubts.append(
-                f"The derivative of {name} with {item.name} is {near:.4g} by changes of "
-                f"{_CHANGE:.0%} and {far:.4g} by twice as much: it tells little."
+                f"The derivative of {name} with respect to {item.name} is {near:.4g} from "
+                f"changes of {_CHANGE:.0%} and {far:.4g} from changes twice as large: it is not "
+                "reliable."
             )
     predicted, scale = space.change_together(_CHANGE, slopes)
     secant = 0.5 * (values[-2] - values[-1]) if check else float("nan")

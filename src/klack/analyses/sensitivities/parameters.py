@@ -143,7 +143,7 @@ def slope_space(case: AnyCase, source: StudySource | None, names: Sequence[str] 
     if not chosen:
         raise InputError(
             _WHERE,
-            got="no parameter of the network that is a number",
+            got="no numerical parameter of the network",
             expected="keys of the case with a number and unit",
             hint="--parameter network.components.spring.preload, or a section 'study'.",
         )
@@ -181,7 +181,7 @@ def _key(case: AnyCase, name: str, known: Sequence[str]) -> VariedKey:
             _WHERE,
             got=f"'{name}'",
             expected=f"a parameter of the study, {one_of(known)}, or the path of a key",
-            hint=nearest(name, known, "write the path from the top of the case."),
+            hint=nearest(name, known, "write the path from the top level of the case."),
         )
     try:
         found = quantity_at(case, split_path(name))
@@ -199,7 +199,7 @@ def _is_fixed(space: Space, name: str) -> bool:
 
 def _reason(case: AnyCase, item: VariedKey, linked: Sequence[Linked]) -> tuple[str, str] | None:
     if item.size == 0.0:
-        return "a value of zero", "a range in a study tells how large a small change of it is."
+        return "a value of zero", "give a range in a study to define the size of a small change."
     follow = [other.name for other in linked if item.name in other.words.values()]
     for name in (item.name, *follow):
         place = split_path(name)
@@ -219,7 +219,7 @@ def _reason_at(case: AnyCase, place: Key) -> tuple[str, str] | None:
         return None
     if place[0] != "network" or STROKES.makes_bodies(case, place):
         return (
-            "a key that meshes, modes, contact laws or the noise follow from",
+            "a key on which meshes, modes, contact laws or the noise depend",
             "klack study with a few values of it computes the valve at each of them.",
         )
     return None

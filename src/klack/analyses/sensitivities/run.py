@@ -131,8 +131,8 @@ def _left_out(
     found = []
     if space.skipped:
         found.append(
-            f"No derivatives with {one_of(space.skipped)}: bodies, noise, words and lists are for "
-            "klack study."
+            f"No derivatives with {one_of(space.skipped)}: use klack study for bodies, noise, "
+            "words and lists."
         )
     if source is not None and not names:
         known = {item.name for item in chosen}
@@ -254,14 +254,15 @@ def _why(others: _Others) -> str:
             time, stop = others.same.variant.result.events[count].time, same[count]
             return (
                 f" Changed {words}, impact {count + 1} of all, on '{stop}' at "
-                f"{format_si(time, 's', 4)}, is on '{end[count]}': the impacts have another order."
+                f"{format_si(time, 's', 4)}, is on '{end[count]}': the order of the impacts "
+                "changes."
             )
         if len(end) != len(same):
-            return f" Changed {words}, there are {len(end)} impacts in place of {len(same)}."
+            return f" Changed {words}, there are {len(end)} impacts instead of {len(same)}."
     return (
-        " The impacts have the same order: either the measure bends or jumps within that change, "
-        "as the flow about no pressure drop and a peak between two bounces do, or the motion is "
-        "chaotic; smaller changes in a study tell which."
+        " The order of the impacts is the same: either the measure has a kink or jump within "
+        "that change, like the flow at zero pressure drop or a peak between two bounces, or the "
+        "motion is chaotic; smaller changes in a study show which."
     )
 
 
@@ -286,10 +287,10 @@ def _unbounded(runs: Sequence[TangentRun], space: SlopeSpace) -> tuple[str, ...]
         return ()
     time, name = min(found)
     return (
-        f"From {format_si(time, 's', 4)} on derivatives with {name} grow without bound: "
-        "either bounces are chaotic, or a contact at rest answers pressures one macro step late, "
-        "which its motion does not show and its derivatives do. What comes later has none. "
-        "Try: run.coarse: 16.",
+        f"After {format_si(time, 's', 4)} derivatives with respect to {name} grow without bound: "
+        "either bounces are chaotic, or a contact at rest responds to pressures one macro step "
+        "late, which affects its derivatives but not its motion. Later measures have no "
+        "derivatives. Try: run.coarse: 16.",
     )
 
 
@@ -303,7 +304,7 @@ def _doubts(
     if wrong:
         found.append(
             f"The derivatives of {one_of(wrong)} do not predict runs with all parameters changed "
-            f"by {_SHARE:.0%}: they tell nothing about changes of this size."
+            f"by {_SHARE:.0%}: they are not valid for changes of this size."
             + ("" if others is None else _why(others))
         )
     rough = [f"{item.name} ({item.deviation:.0%})" for item in measures if item.is_rough]
@@ -315,25 +316,25 @@ def _doubts(
     unsure = [item.name for item in measures if item.is_unconfirmed]
     if unsure:
         found.append(
-            f"The derivatives of {one_of(unsure)} are not confirmed: what all parameters change "
-            f"together by {_SHARE:.0%} is too little for the steps of a run to tell it to "
-            f"{MISSED:.0%}. Try: run.accuracy: fine, or a study with larger changes."
+            f"The derivatives of {one_of(unsure)} are not confirmed: the effect of changing all "
+            f"parameters by {_SHARE:.0%} is too small to be resolved to {MISSED:.0%} with the "
+            "steps of a run. Try: run.accuracy: fine, or a study with larger changes."
         )
     strayed = [item.name for item in measures if item.has_strayed]
     if strayed:
         found.append(
-            f"Chaos: two strokes that differ by round-off have other values of {one_of(strayed)}: "
-            "their derivatives mean nothing."
+            "Chaos: two strokes that differ by round-off have other values of "
+            f"{one_of(strayed)}: their derivatives are meaningless."
         )
     lost = next((item for item in impacts if item.is_doubtful), None)
     if lost is not None:
         at = format_si(lost.time, "s", 4)
-        told = "change as their derivatives tell"
+        told = "change as predicted by their derivatives"
         if lost.deviation is None:
             told = "seem to follow their derivatives, which grow from bounce to bounce"
         found.append(
-            f"From impact {lost.number} on '{lost.stop}' on, at {at}, the times of impacts do not "
-            f"{told}: bounces are chaotic, or a controller switches in "
-            "another phase. What comes later is doubtful, see the table of the impacts."
+            f"From impact {lost.number} on '{lost.stop}' at {at}, the times of impacts do not "
+            f"{told}: bounces are chaotic, or a controller switches in another phase. Later "
+            "numbers are doubtful, see the table of the impacts."
         )
     return tuple(found)

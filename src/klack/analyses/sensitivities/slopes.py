@@ -284,8 +284,8 @@ class SlopeRunner:
             except InputError as error:
                 raise InputError(
                     f"--parameter {item.name}",
-                    got=f"a value at the end of what is allowed ({error.got})",
-                    expected="one with room on both sides",
+                    got=f"a value at the end of its allowed range ({error.got})",
+                    expected="a value with room on both sides",
                     hint="klack study varies it to one side.",
                 ) from None
         return Direction(name=item.name, plus=ends[0], minus=ends[1], distance=2.0 * shift)

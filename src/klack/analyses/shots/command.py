@@ -40,7 +40,7 @@ _Variants = Annotated[
         name="--variant",
         consume_multiple=True,
         negative="",
-        help="Of whole strokes: wet, dry, or both (wet,dry) with the same draws. "
+        help="Variants of whole strokes: wet, dry, or both (wet,dry) with the same draws. "
         "[default: as in the case]",
     ),
 ]
@@ -140,5 +140,6 @@ def _refuse_variants(variants: list[str] | None) -> None:
             "--variant",
             got=f"'{variants[0]}' for drops of two bodies",
             expected="no variant: only whole strokes have variants",
-            hint="leave it out, or give the case of a valve with motion: three-dimensional.",
+            hint="leave the variant out, or give the case of a valve with motion: "
+            "three-dimensional.",
         )

@@ -94,8 +94,9 @@ def _rule(study: ShotsStudy) -> str:
         strongest = max(related, key=lambda label: abs(related[label]))
         grows = "rises" if related[strongest] > 0 else "falls"
         text += (
-            f" Of the drawn quantities, the rebound height correlates most with the {strongest}: "
-            f"it {grows} with it (rank correlation {signed(related[strongest], 2)})."
+            f" Of the drawn quantities, the {strongest} has the strongest correlation with the "
+            f"rebound height, which {grows} with it (rank correlation "
+            f"{signed(related[strongest], 2)})."
         )
     return text
 
@@ -259,8 +260,8 @@ def _shares(study: ShotsStudy) -> tuple[Measure[Shot], ...]:
 # --------------------------------------------------------------------------- words
 
 _CENTRED_RUBS = (
-    " Friction between the faces stays, with the mean coefficient: faces of a centred valve slip "
-    "on each other, too."
+    " Friction between the faces is kept, with the mean coefficient: the faces of a centred "
+    "valve also slip on each other."
 )
 
 
@@ -270,8 +271,9 @@ def _definitions(study: ShotsStudy) -> tuple[tuple[str, str], ...]:
         (
             "shot",
             "One drop of the moving body onto its seat, with its bounces, at the interface "
-            "level: both bodies as modes, a point-resolved contact, six rigid degrees of freedom "
-            "of the moving body. Only what is listed under 'Distributions' differs between shots.",
+            "level: both bodies as modes, a point-resolved contact, six rigid degrees of "
+            "freedom of the moving body. Shots differ only in the quantities listed under "
+            "'Distributions'.",
         ),
         (
             "centred impact",
@@ -310,7 +312,7 @@ def _limits(study: ShotsStudy) -> tuple[tuple[str, str], ...]:
         ),
         (
             "Chance",
-            "Another seed draws other shots: the highest of so many is itself a random number. The "
-            "answer holds for the distributions stated, not for others.",
+            "A different seed draws different shots: the highest of that many is itself a "
+            "random number. The answer holds for the distributions stated, not for others.",
         ),
     )

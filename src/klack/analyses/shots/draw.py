@@ -66,7 +66,7 @@ class ShotDraw:
     force [N]
         Closing force at first touch.
     friction [-]
-        Coulomb's coefficient in the guide.
+        Coefficient of Coulomb friction in the guide.
     contact_friction [-]
         That between the faces, while they slip.
     waviness [m]
@@ -192,7 +192,7 @@ def shots_of(case: Case) -> Shots:
         raise InputError(
             f"{case.path or 'case'}: shots",
             got="no section 'shots'",
-            expected="what varies from shot to shot",
+            expected="the quantities that vary from shot to shot",
             hint="add 'shots: {count: 50}' and a 'guide', or 'eccentricity' and 'tilt'.",
         )
     return case.shots
@@ -235,8 +235,8 @@ def drawn_position(
     raise InputError(
         f"{case.path or 'case'}: shots",
         got=f"eccentricity and tilt that left the guide in {_ATTEMPTS} draws",
-        expected="placements inside the radial clearance at all guiding heights",
-        hint="make them smaller, or leave both out: the guide then limits the placement.",
+        expected="placements within the radial clearance at all guiding heights",
+        hint="make them smaller, or leave both out: then the guide limits the placement.",
     )
 
 

@@ -199,7 +199,7 @@ def distribution_chart(study: ShotsStudy) -> Chart:
                     Curve(
                         x=np.concatenate([values[:1], values]),
                         y=below,
-                        label="shots that rebound at most so high",
+                        label="share of shots up to that height",
                         colour="sky",
                         drawn="steps",
                         width=2.4,
@@ -210,8 +210,8 @@ def distribution_chart(study: ShotsStudy) -> Chart:
             ),
         ),
         note=(
-            f"Above: how many of the {values.size} shots fall into each class. Below: share of "
-            "shots up to each value."
+            f"Above: number of the {values.size} shots in each class. Below: share of shots up "
+            "to each value."
         ),
     )
 
@@ -227,7 +227,7 @@ def peak_chart(study: ShotsStudy) -> Chart:
         panels=(
             Panel(y=AxisSpec(label=time.label, unit=time.unit), curves=_dots(study, force, time)),
         ),
-        note="Of the first impact of every shot. The contact time belongs to its first contact.",
+        note="First impact of every shot. The contact time belongs to its first contact.",
     )
 
 
@@ -251,7 +251,7 @@ def height_traces_chart(study: ShotsStudy) -> Chart:
             ),
         ),
         note=(
-            "Of the centre of mass, above its height at first touch; an eccentric body "
+            "Height of the centre of mass above its height at first touch; an eccentric body "
             f"goes deeper, because it tilts in its seat.{_thinned_note(study)}"
         ),
     )

@@ -69,8 +69,8 @@ DRAWN: tuple[Measure[Shot], ...] = described_in(
         key="eccentricity",
         symbol="e_0",
         unit="m",
-        definition="Distance of the axis of the moving body from that of the seat at the height of"
-        " first touch, at the start of the drop.",
+        definition="Distance between the axes of moving body and seat at the height of first "
+        "touch, at the start of the drop.",
     ),
     Measure(
         key="direction",
@@ -101,14 +101,14 @@ DRAWN: tuple[Measure[Shot], ...] = described_in(
         key="friction",
         name="friction in the guide",
         symbol="mu",
-        definition="Coulomb's coefficient in the guide.",
+        definition="Coefficient of Coulomb friction in the guide.",
         form="fixed",
     ),
     Measure(
         key="contact_friction",
         name="friction between the faces",
         symbol="mu_f",
-        definition="Coulomb's coefficient between the faces in contact, while they slip.",
+        definition="Coefficient of Coulomb friction between the faces in contact, while they slip.",
         form="fixed",
     ),
     Measure(
@@ -126,8 +126,8 @@ FIRST_IMPACT: tuple[Measure[Shot], ...] = described_in(
     Measure(
         key="restitution",
         symbol="e",
-        definition="Velocity of the centre of mass along the axis after the first impact over that"
-        " before it.",
+        definition="Velocity of the centre of mass along the axis after the first impact over "
+        "its velocity before.",
         form="fixed",
         note="It is a result, never an input. A closing force also works during "
         "the contact: a strong one raises the restitution of an eccentric impact, even "
@@ -137,8 +137,8 @@ FIRST_IMPACT: tuple[Measure[Shot], ...] = described_in(
         key="rebound_height",
         symbol="h",
         unit="m",
-        definition="Highest position of the centre of mass between the first impact and the "
-        "second, above that at first touch.",
+        definition="Highest position of the centre of mass between the first and the second "
+        "impact, above its position at first touch.",
     ),
     Measure(
         key="peak_force",
@@ -169,15 +169,15 @@ ROCKING = Measure[Shot](
     "over the energy of approach.",
     form="share",
     digits=2,
-    note="The loss of rebound by an eccentric or tilted impact.",
+    note="This is the rebound lost by an eccentric or tilted impact.",
 )
 
 FRICTION_LOSS = Measure[Shot](
     key="friction_loss",
     name="lost in friction between the faces",
     symbol="E_f/E_0",
-    definition="Energy that friction between the faces takes in the first impact, over the energy "
-    "of approach.",
+    definition="Energy dissipated by friction between the faces in the first impact, over the "
+    "energy of approach.",
     form="share",
     digits=2,
 )
@@ -187,7 +187,8 @@ PLASTIC_LOSS = Measure[Shot](
     key="plastic_loss",
     name="lost in yield of the faces",
     symbol="E_p/E_0",
-    definition="Energy that faces which yield take in the whole shot, over the energy of approach.",
+    definition="Energy dissipated by yielding faces in the whole shot, over the energy of "
+    "approach.",
     form="share",
     digits=2,
 )
@@ -206,7 +207,7 @@ SHOT_MEASURES: tuple[Measure[Shot], ...] = described_in(
     Measure(
         key="sub_contacts",
         symbol="n_c",
-        definition="Contacts of which the first impact consists.",
+        definition="Number of contacts in the first impact.",
         kind="whole",
     ),
     ROCKING,
@@ -216,14 +217,14 @@ SHOT_MEASURES: tuple[Measure[Shot], ...] = described_in(
         key="deepest_set",
         symbol="w_max",
         unit="m",
-        definition="Deepest set of a contact point after the shot; every shot meets the faces as "
-        "those before have left them.",
+        definition="Deepest set of a contact point after the shot; every shot meets the faces "
+        "as left by the previous shots.",
     ),
     Measure(
         key="second_impact",
         symbol="t_2",
         unit="s",
-        definition="Time from the first touch to that of the second impact.",
+        definition="Time from the first touch of the first impact to that of the second.",
     ),
     Measure(key="impacts", symbol="n", definition="Impacts until the shot ended.", kind="whole"),
     Measure(
@@ -272,7 +273,7 @@ RULE_MEASURES: tuple[Measure[RuleVerdict], ...] = described_in(
     Measure(
         key="rank",
         symbol="n_h",
-        definition="Shots that rebound at least as high as the centred one.",
+        definition="Number of shots that rebound at least as high as the centred one.",
         kind="whole",
         json_name="shots_at_least_as_high_as_centric",
     ),

@@ -256,7 +256,7 @@ def judge_rule(shots: ShotColumns, centric: ShotColumns, highest: int) -> RuleVe
     )
     verdict = (
         f"Taking the highest rebound of {shots.count} for the centred one is "
-        f"{'right' if holds else 'wrong'} for this valve: the restitution is off by "
+        f"{'right' if holds else 'wrong'} for this valve: the restitution is wrong by "
         f"{100.0 * restitution:+.2f} % and the rebound height by {100.0 * height:+.1f} %."
     )
     return RuleVerdict(
@@ -296,10 +296,11 @@ def _pressures(
 def _worn(shots: ShotColumns) -> Iterator[str]:
     if np.any(shots.plastic_loss):
         yield (
-            "the faces yield: every shot meets them as those before have left them, the centred "
-            f"one after the last. They take {100 * float(shots.plastic_loss[0]):.2g} % of the "
-            f"energy of the first shot and {100 * float(shots.plastic_loss[-1]):.2g} % of that of "
-            f"the last; the set is up to {format_si(float(shots.deepest_set[-1]), 'm', 3)} deep."
+            "the faces yield: every shot meets them as left by the previous shots, the centred "
+            f"shot after the last. They dissipate {100 * float(shots.plastic_loss[0]):.2g} % of "
+            f"the energy of the first shot and {100 * float(shots.plastic_loss[-1]):.2g} % of "
+            "the energy of the last; the permanent set is up to "
+            f"{format_si(float(shots.deepest_set[-1]), 'm', 3)} deep."
         )
 
 
@@ -314,7 +315,7 @@ def _distributions(case: Case) -> dict[str, str]:
         words["friction between the faces"] = shots.contact_friction.text("")
     if shots.waviness is not None:
         low, high = shots.waviness.harmonics
-        words["waviness"] = f"{shots.waviness.rms.text('m')}; {low} to {high} waves round the ring"
+        words["waviness"] = f"{shots.waviness.rms.text('m')}; {low} to {high} waves around the ring"
     return words
 
 
@@ -332,7 +333,7 @@ def _faces_in_words(case: Case) -> str:
     share = "" if faces.kinetic == 0.0 else f" ({faces.static / faces.kinetic:.3g} times)"
     text += f"; {faces.static:.4g}{share} while they stick"
     if faces.speed > 0.0:
-        text += f", fading over {format_si(faces.speed, 'm/s')}"
+        text += f", decaying over {format_si(faces.speed, 'm/s')}"
     return text
 
 
@@ -389,6 +390,7 @@ def shot_doubts(dropped: DroppedShots) -> tuple[str, ...]:
     residual = float(np.max(np.abs(dropped.shots.energy_residual)))
     if residual > _LARGE_RESIDUAL:
         notes.append(
-            f"The energy balance of one shot is off by {residual:.1e}. Try: a shorter shots.step."
+            f"The energy balance of one shot has a residual of {residual:.1e}. Try: a "
+            "shorter shots.step."
         )
     return tuple(notes)

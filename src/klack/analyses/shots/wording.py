@@ -45,7 +45,7 @@ def shots_answer(study: ShotsStudy) -> str:
         f"{float(shots.restitution[best]):.4f}; the centred impact has "
         f"{quantity(float(study.centric.rebound_height[0]), 'm', 3)} and "
         f"{float(study.centric.restitution[0]):.4f}. Taking the highest rebound of {shots.count} "
-        f"for the centred one is {verdict}: the restitution is off by "
+        f"for the centred one is {verdict}: the restitution is wrong by "
         f"{signed_share(rule.relative_restitution_bias)}, the rebound height by "
         f"{signed_share(rule.relative_rebound_height_bias, 1)}. The shots spread over: "
         f"{', '.join(spread)}. Eccentricities reach "
@@ -108,6 +108,6 @@ def drawn_section(
         title="Distributions",
         tables=(
             Table(columns=("what varies", "drawn from"), rows=tuple(study.distributions.items())),
-            Table(columns=(f"what all {runs} share", ""), rows=tuple(shared)),
+            Table(columns=(f"shared by all {runs}", ""), rows=tuple(shared)),
         ),
     )

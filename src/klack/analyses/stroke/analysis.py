@@ -85,7 +85,7 @@ TIME_COLUMNS = (
 AXIS_COLUMNS = ("axis at seat x, y [um]", "tilt x, y [mrad]")
 """Place of the axis at a touch."""
 
-CHANGES = "what changes when all time steps are doubled"
+CHANGES = "change when all time steps are doubled"
 
 _TOLD = 20
 _NO_FORCE = 1e-12  # [N]
@@ -109,7 +109,7 @@ def _events(of: _Variant) -> list[_Event]:
 
 _AXIS = JsonForm(
     "AxisJson",
-    "Where the axis of the needle is, in three dimensions.",
+    "Position of the needle axis, in three dimensions.",
     Key("x_m", float, "At the height of the seat.", "x"),
     Key("y_m", float, of="y"),
     Key("tilt_x_rad", float, "Slope of the axis along x, upwards.", "tilt_x"),
@@ -118,11 +118,11 @@ _AXIS = JsonForm(
 _CHANGE = JsonForm(
     "ChangeJson",
     "Change of an impact when all time steps are doubled; null where it cannot be compared.",
-    Key("promised", bool, "Whether klack promises its accuracy: first to third on a stop."),
+    Key("promised", bool, "Whether its accuracy is promised: first to third impact on a stop."),
     Key(
         "reason",
         str | None,
-        "Why a number is missing.",
+        "Reason why a number is missing.",
         lambda change: change.reason or None,
     ),
     *measured_keys(CHANGE_MEASURES),
@@ -134,8 +134,8 @@ _EVENT = JsonForm(
     Key(
         "besides",
         str | None,
-        "Other stops that act meanwhile, or the rotation of a body: restitution and energy_loss_J "
-        "are null.",
+        "Other stops that act at the same time, or the rotation of a body: restitution and "
+        "energy_loss_J are then null.",
         lambda of: of.event.besides or None,
     ),
     Key("axis", (_AXIS, None), "At first touch; null for a motion along the axis."),
@@ -145,7 +145,7 @@ _EVENT = JsonForm(
 _PAIR = JsonForm("PairJson", "Impacts on one stop, or of one body.", *measured_keys(PAIR_MEASURES))
 _PASSAGE = JsonForm(
     "PassageJson",
-    "One passage between two stops; null for what the run does not reach.",
+    "One passage between two stops; null for points not reached in the run.",
     Key("at_10_percent_s", Real, "Of the lift.", "at_10"),
     Key("at_50_percent_s", Real, of="at_50"),
     Key("at_90_percent_s", Real, of="at_90"),
@@ -155,7 +155,7 @@ _PASSAGE = JsonForm(
 _TIMES = JsonForm(
     "TimesJson",
     "Opening and closing of one body.",
-    Key("starts", str, "closed or open: opening or closing comes first."),
+    Key("starts", str, "closed or open: whether opening or closing comes first."),
     Key("lift_m", Real, of="lift"),
     Key("lift_between_stops", bool, "False: largest minus smallest lift.", "between_stops"),
     Key("opening", _PASSAGE),
@@ -169,41 +169,50 @@ _START = JsonForm(
     Key(
         "pressure_stated",
         dict[str, bool],
-        "Whether the case states it; else it is found.",
+        "Whether the case states it; otherwise it is computed.",
         "stated",
     ),
     Key("mass_flow_kg_s", dict[str, float], "By restriction.", "flow"),
-    Key("residual_force_N", dict[str, float], "What is left, by body.", "residual"),
+    Key("residual_force_N", dict[str, float], "Residual force, by body.", "residual"),
     Key("notes", list[str], "Quantities without a steady state."),
 )
 _FACES = JsonForm(
     "FacesJson",
     "Faces of an end stop that yield, at the end.",
-    Key("set_m", float, "By which they part later than when new.", "set"),
-    Key("largest_force_N", float, "So far: up to it they are elastic from now on.", "force"),
+    Key("set_m", float, "Permanent set, by which they separate later than new faces.", "set"),
+    Key(
+        "largest_force_N",
+        float,
+        "Largest force so far, up to which they are elastic afterwards.",
+        "force",
+    ),
 )
 _DELIVERY = JsonForm(
     "DeliveryJson",
-    "What a restriction passes in the whole run (command 0) or from one command of its driver to "
-    "the next; positive from its port a to its port b.",
+    "Mass through a restriction in the whole run (command 0) or from one command of its driver "
+    "to the next; positive from its port a to its port b.",
     Key("component", str),
     Key("command", int, of="pulse"),
-    Key("leads_out", bool, "To the surroundings, or to a given pressure.", "leads_out"),
-    Key("flows_on", bool, "At the end, which cuts the mass.", "flows_on"),
+    Key(
+        "leads_out", bool, "Whether it leads to ambient, or to a prescribed pressure.", "leads_out"
+    ),
+    Key(
+        "flows_on", bool, "Whether it still flows at the end, which truncates the mass.", "flows_on"
+    ),
     *measured_keys(DELIVERY_MEASURES),
 )
 _STAIR = JsonForm(
     "StairJson",
-    "One edge of the stairs that waves in a line leave in the velocity after an impact.",
+    "One edge of the stairs in the velocity after an impact, caused by waves in a line.",
     Key("line", str),
     Key("body", str),
     Key("stop", str),
-    Key("impact", int, "On that stop, from 1."),
-    Key("echo", int, "Since the impact, from 1.", "number"),
+    Key("impact", int, "Number of the impact on that stop, from 1."),
+    Key("echo", int, "Number of the echo since the impact, from 1.", "number"),
     Key(
         "hidden_by",
         str | None,
-        "vibration, sensor, or null where the step is seen.",
+        "vibration, sensor, or null where the step is visible.",
         lambda stair: stair.hidden_by or None,
     ),
     *measured_keys(STAIR_MEASURES),
@@ -226,13 +235,13 @@ _VARIANT = JsonForm(
     Key(
         "failure",
         str | None,
-        "Why the run ended early.",
+        "Reason why the run ended early.",
         lambda of: of.variant.result.failure or None,
     ),
     Key(
         "fine_record_ends_s",
         dict[str, Real],
-        "Stops whose force in fine steps ends there.",
+        "Stops whose record of the force in fine steps ends early, with its end.",
         lambda of: cut_records(of.variant.result),
     ),
     Key("events", [_EVENT], "Impacts in the order of time.", _events),
@@ -254,7 +263,7 @@ _VARIANT = JsonForm(
     Key(
         "bodies",
         {str: _TIMES},
-        "Of every other body between stops, by name.",
+        "Opening and closing of every other body between stops, by name.",
         lambda of: {times.body: times for times in of.variant.times[1:]},
     ),
     Key(
@@ -277,7 +286,7 @@ STUDY = JsonForm(
     Key(
         "variants",
         {str: _VARIANT},
-        "All of them by name.",
+        "All variants by name.",
         lambda study: {name: _Variant(study, x) for name, x in study.variants.items()},
     ),
     Key(

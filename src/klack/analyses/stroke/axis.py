@@ -148,8 +148,8 @@ def axis_path_chart(study: StrokeStudy) -> Chart | None:
         panels=tuple(panels),
         note=(
             "Axis of the undeformed needle at the highest and the lowest height of its guide. "
-            "Outside of the circle the bore presses on the shaft, or the shaft is bent. Dots: "
-            f"where the axis is at the first {_MARKED} impacts."
+            "Outside the circle the bore presses on the shaft, or the shaft is bent. Dots: "
+            f"position of the axis at the first {_MARKED} impacts."
         ),
     )
 
@@ -182,15 +182,15 @@ def axis_over_time_chart(study: StrokeStudy) -> Chart | None:
         panels.append(_panel(variant, sides, "side force", "N", 1.0, touches, 1e-6))
     return Chart(
         name="axis-time",
-        title="Needle off its axis",
+        title="Needle off-axis",
         x=AxisSpec(label="time", unit="ms", range=(float(time[0]), float(time[-1]))),
         panels=tuple(panels),
         note=(
-            "Position of the axis at the height of the seat, slope of the axis, forces of "
-            "the guide, and of magnet and seat across the axis if the case has them, at the ends "
-            "of the records. Thin upright lines: impacts. After the first "
-            "few impacts the path depends on the least detail: another step, or another "
-            "micrometre at the start, gives another one of the same kind."
+            "Position of the axis at the height of the seat, slope of the axis, forces of the "
+            "guide, and of magnet and seat across the axis if the case has them, at the ends of "
+            "the records. Thin upright lines: impacts. After the first few impacts the path "
+            "depends on the smallest detail: a different step, or one micrometre at the start, "
+            "gives a different path of the same kind."
         ),
     )
 

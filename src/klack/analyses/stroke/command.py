@@ -64,8 +64,8 @@ _Controllers = Annotated[
     Parameter(
         name="--controller",
         negative="",
-        help="NAME=FILE.fmu: an FMU as the controller of the component NAME; its inputs are called "
-        "like the sensors. Its binary runs with your rights; several are allowed.",
+        help="NAME=FILE.fmu: an FMU as the controller of the component NAME; its inputs have "
+        "the names of the sensors. Its binary runs with your rights; repeatable.",
     ),
 ]
 

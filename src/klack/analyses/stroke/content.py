@@ -190,7 +190,7 @@ def _ring_sections(study: StrokeStudy) -> list[Section]:
         if variant.result.spatial_impacts is None:
             text = (
                 "This result was computed by a version of klack that did not record the contact "
-                "forces round the ring and the films; run the case again to see them."
+                "forces around the ring and the films; run the case again to see them."
             )
             sections.append(
                 Section(title=f"Line load round the ring, {variant.name}", paragraphs=(text,))
@@ -331,7 +331,7 @@ def _fluid_table(fluid: FluidSummary) -> Table:
         ("temperature", f"{fluid.temperature - 273.15:.4g} °C"),
         ("pressure, absolute", f"{1e-5 * fluid.pressure:.4g} bar"),
         ("density", f"{fluid.density:.4g} kg/m³"),
-        ("bulk modulus, with its gas", f"{1e-9 * fluid.bulk_modulus:.4g} GPa"),
+        ("bulk modulus, including gas", f"{1e-9 * fluid.bulk_modulus:.4g} GPa"),
         ("speed of sound", f"{fluid.sound_speed:.4g} m/s"),
         ("dynamic viscosity", f"{1e3 * fluid.viscosity:.4g} mPa s"),
         ("vapour pressure, absolute", f"{1e-5 * fluid.vapour_pressure:.4g} bar"),
@@ -362,7 +362,7 @@ def _further_tables(study: StrokeStudy) -> tuple[Table, ...]:
     for stop in shown_stops(study):
         rows += _of_first(study, stop, ("touch_speed", "contact_time"))
     rows += [
-        (f"set left on {stop}", *(_set_left(variant, stop) for variant in variants))
+        (f"permanent set on {stop}", *(_set_left(variant, stop) for variant in variants))
         for stop in dict.fromkeys(stop for variant in variants for stop in variant.result.faces)
     ]
     rows += _of_variants(study, ("energy_residual", "degrees_of_freedom", "step", "wall_time"))
@@ -532,7 +532,7 @@ _SOUND = NextStep(
 NEXT_STEPS = (
     _SOUND,
     NextStep(
-        purpose="How much the steps in time matter: the same with finer ones.",
+        purpose="Effect of the time steps: the same with finer steps.",
         command="klack stroke CASE --accuracy fine --out finer",
     ),
     NextStep(purpose="The valve as a drawing of its network.", command="klack show CASE"),
@@ -552,19 +552,19 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
     ),
     (
         "opening time, closing time",
-        "From time zero to the first touch of the opening stop and of the seat, in the "
-        "first stroke that passes 90 % of the lift (else in the longest). A stroke begins and ends "
-        "at 10 % of the lift from where the needle was at rest; a valve that starts open closes "
-        "first. 'Not reached' is given where the run ends earlier or a film cushions the body "
-        "before contact.",
+        "From time zero to the first touch of the opening stop and of the seat, in the first "
+        "stroke that passes 90 % of the lift (otherwise in the longest). A stroke begins and "
+        "ends at 10 % of the lift from the rest position of the needle; a valve that starts "
+        "open closes first. 'Not reached' is given where the run ends earlier or a film "
+        "cushions the body before contact.",
     ),
     (
         "impact",
-        "Contacts closer together than the longest period of the needle are one impact. Its speed "
-        "is the closing speed of the centres of mass at first touch, or the highest one since "
-        "its film force set in; its peak force, impulse and restitution count contact and film "
-        "together. A touch slower than 2 % of the fastest impact on a stop does not count as its "
-        "first impact.",
+        "Contacts closer together than the longest period of the needle count as one impact. "
+        "Its speed is the closing speed of the centres of mass at first touch, or the highest "
+        "one since its film force set in; its peak force, impulse and restitution include "
+        "contact and film. A touch slower than 2 % of the fastest impact on a stop does not "
+        "count as its first impact.",
     ),
     *glossary(EVENT_MEASURES),
     *glossary(
@@ -586,10 +586,10 @@ def _along_the_axis(study: StrokeStudy) -> str:
     across = [f"'{name}'" for name in acts_across(study.reference)]
     if not across:
         return (
-            "fluid, magnet and springs act along the axis, wherever the needle is (the keys "
-            "off_axis and tilts of solenoid and seat add forces across it)"
+            "fluid, magnet and springs act along the axis, regardless of the position of the "
+            "needle (the keys off_axis and tilts of solenoid and seat add forces across it)"
         )
-    return f"of fluid, magnets and springs only {' and '.join(across)} act across the axis as well"
+    return f"of fluid, magnets and springs only {' and '.join(across)} also act across the axis"
 
 
 def _limits(study: StrokeStudy) -> tuple[tuple[str, str], ...]:
@@ -606,7 +606,7 @@ def _limits(study: StrokeStudy) -> tuple[tuple[str, str], ...]:
         ),
         (
             "Contact",
-            f"Point by point on smooth faces, off-axis as well; {_along_the_axis(study)}. Small "
+            f"Point by point on smooth faces, also off-axis; {_along_the_axis(study)}. Small "
             "rotations; the bore of the guide does not move."
             if space
             else "One force along the axis with one pressure pattern per stop. Tilt and eccentric "
@@ -637,7 +637,7 @@ def _limits(study: StrokeStudy) -> tuple[tuple[str, str], ...]:
         limits.append(
             (
                 "Records",
-                f"The fine record ends early, of {', '.join(incomplete)}, because it was full. "
+                f"The fine record ends early, for {', '.join(incomplete)}, because it was full. "
                 "Impacts and channels are complete.",
             )
         )

@@ -20,8 +20,9 @@ def controller_files(given: Sequence[str]) -> dict[str, Path]:
         if not (name and sign and file) or name in files:
             raise InputError(
                 "--controller",
-                got=f"'{text}'" + (", the second one of that component" if name in files else ""),
-                expected="NAME=FILE.fmu, once for a controlled component of the case",
+                got=f"'{text}'"
+                + (", the second controller of that component" if name in files else ""),
+                expected="NAME=FILE.fmu, once for each controlled component of the case",
                 hint="for example: --controller driver=controller.fmu",
             )
         files[name] = Path(file)

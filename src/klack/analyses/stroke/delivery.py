@@ -257,8 +257,8 @@ def unfinished(found: Iterable[Delivery]) -> Iterator[str]:
     for item in found:
         if item.flows_on:
             yield (
-                f"'{item.name}' still passes mass at {format_si(item.end, 's')}, where its count "
-                "ends. Try: a longer run.duration, or commands further apart."
+                f"'{item.name}' still passes mass at {format_si(item.end, 's')}, where the "
+                "integration ends. Try: a longer run.duration, or commands further apart."
             )
 
 

@@ -134,7 +134,7 @@ def variants_chart(
         title=title,
         x=_axis_over(*variants),
         panels=tuple(panel for panel in panels if panel.curves),
-        note=f"{note} Forces on the stops: the largest one of every record.",
+        note=f"{note} Forces on the stops: the largest value of every record.",
     )
 
 
@@ -163,7 +163,7 @@ def delivery_chart(study: StrokeStudy) -> Chart | None:
         x=_axis_over(wet),
         panels=tuple(panel for panel in panels if panel.curves),
         note=(
-            f"Variant '{wet.name}'; restrictions that lead to the surroundings or to a given "
+            f"Variant '{wet.name}'; restrictions that lead to ambient or to a prescribed "
             f"pressure, at most {_MOST_PARTS}, positive from port a to port b. Flows are means "
             "over a record."
         ),
@@ -283,10 +283,10 @@ def first_impact_chart(
         x=AxisSpec(label="time since first touch", unit="µs", range=window),
         panels=tuple(panel for panel in panels if panel.curves),
         note=(
-            "First touch of every variant is placed at zero. Contact force, film force and gap in "
-            "fine steps; the squeeze film pushes before the contact and pulls after it. The "
-            "gap of the two bodies is negative by the indentation of the local law. Velocity: "
-            f"centre of mass of the {study.needle}."
+            "First touch of every variant is placed at zero. Contact force, film force and gap "
+            "in fine steps; the squeeze film pushes before the contact and pulls after it. "
+            "During contact the gap of the two bodies is minus the indentation of the local "
+            f"law. Velocity: centre of mass of the {study.needle}."
         ),
     )
 
@@ -412,8 +412,8 @@ def echo_chart(study: StrokeStudy, stop: str, line: LineSummary) -> Chart | None
         ),
         note=(
             f"Variant '{variant.name}'. Upright lines every 2L/a = "
-            f"{quantity(line.echo_time, 's', 3)} (L = {quantity(line.length, 'm', 3)}, "
-            f"a = {line.sound_speed:.4g} m/s) from first touch: there the pressure wave of "
+            f"{quantity(line.echo_time, 's', 3)} (L = {quantity(line.length, 'm', 3)}, a = "
+            f"{line.sound_speed:.4g} m/s) from first touch: at these times the pressure wave of "
             "the impact returns from the line and changes the force on the needle in steps, "
             "visible in the rebound velocity. Chambers between needle and line smooth them; "
             "jumps in the shaded intervals are impacts."
@@ -486,8 +486,9 @@ def stop_law_chart(stop: StopSummary, *, in_space: bool = False) -> Chart | None
             )
         )
         note += (
-            " Closing, the faces slip along the upper curve of the law; opening, they hold first, "
-            "and slip back along the lower one. The loop between is lost."
+            " On closing, the faces slip along the upper curve of the law; on opening, they "
+            "stick first and slip back along the lower curve. The loop between is the lost "
+            "energy."
         )
     known = stop.share[np.isfinite(stop.share)]
     if known.size:
@@ -545,9 +546,9 @@ def mechanical_energy_bars(study: StrokeStudy) -> BarChart | None:
         title="Energy of needle, stops and fluid",
         flows=flows,
         note=(
-            "Without the circuit: the work of the magnet is what its supply brought in, less "
-            "ohmic, eddy and hysteresis losses and the change of the field's energy. Entries of "
-            "one kind are added up; the table holds each."
+            "Without the circuit: the work of the magnet is its supply minus ohmic, eddy and "
+            "hysteresis losses and the change of the field energy. Entries of one kind are "
+            "added up; the table lists each."
         ),
     )
 
@@ -607,7 +608,7 @@ def _bars(
         x=AxisSpec(label="energy", unit=unit),
         rows=tuple(rows),
         parts=tuple(parts),
-        note=f"{note} Parts below {100 * _SMALL:g} % are in the table only.",
+        note=f"{note} Parts below {100 * _SMALL:g} % appear only in the table.",
     )
 
 
@@ -653,6 +654,6 @@ def loop_chart(study: StrokeStudy) -> Chart | None:
                 y=AxisSpec(label="flux", unit="µWb"), curves=tuple(curves), marks=zero, share=_SHARE
             ),
         ),
-        note=f"Reference variant '{variant.name}'; {heat}. The flux is that of the working gap, so "
-        "the loop also holds eddy currents and the motion of the armature.",
+        note=f"Reference variant '{variant.name}'; {heat}. The flux is that of the working gap, "
+        "so the loop also contains eddy currents and the motion of the armature.",
     )

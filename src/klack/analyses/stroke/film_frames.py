@@ -71,11 +71,11 @@ def _chart(
         note=(
             f"Mean pressure of each of {film.land.sectors} sectors of the film of '{event.stop}' "
             f"in impact {number} of '{variant.name}', at {quantity(event.time, 's', 4)}; seen "
-            "from above, +x to the right, the ring wider than it is. Colours are linear up to "
-            "1 bar and logarithmic beyond. Grey: at the largest tension, the film cavitates. With "
-            "each moment stand the time since first touch and the force of the film. "
+            "from above, +x to the right, the ring wider than it is. Colours are linear up to 1 "
+            "bar and logarithmic beyond. Grey: at the largest tension, where the film "
+            "cavitates. Each frame states the time since first touch and the force of the film. "
             f"{len(at)} of {len(film.time)} recorded time steps, closer where the pressure "
-            f"changes fast; paper has ten of them.{more}"
+            f"changes fast; ten of them in print.{more}"
         ),
     )
 

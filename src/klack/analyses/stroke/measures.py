@@ -64,7 +64,7 @@ def step_parts(variant: StrokeVariant) -> tuple[tuple[str, str], ...]:
         parts = [("all", fine[1])]
     if variant.halvings:
         times = {1: "once", 2: "twice"}.get(variant.halvings, f"{variant.halvings} times")
-        parts.append(("halved, since impacts depended on them", times))
+        parts.append(("halved because impacts depended on them", times))
     return tuple(parts)
 
 
@@ -83,8 +83,8 @@ TOUCH_SPEED: Measure[ImpactEvent] = Measure(
     title="speed at touch",
     symbol="v_t",
     unit="m/s",
-    definition="Closing speed of the centres of mass when the faces meet, behind the film that "
-    "brakes them: wear and yield depend on it.",
+    definition="Closing speed of the centres of mass when the faces meet, after braking by the "
+    "film: wear and yield depend on it.",
     form="fixed",
     column=Column("m/s", 1.0, ".4f", "at touch"),
     page=True,
@@ -125,7 +125,7 @@ EVENT_MEASURES: tuple[Measure[ImpactEvent], ...] = described_in(
         key="peak_time",
         symbol="t_max",
         unit="s",
-        definition="When the peak force acts, from the start of the run.",
+        definition="Time of the peak force, from the start of the run.",
         digits=5,
     ),
     Measure(
@@ -156,11 +156,12 @@ EVENT_MEASURES: tuple[Measure[ImpactEvent], ...] = described_in(
         key="restitution",
         symbol="e",
         definition="Opening speed over approach speed of the centres of mass; missing without "
-        "separation, where another stop changes that speed meanwhile by over 1 % of what this "
-        "impact does, and where rotation takes or gives over a tenth of the energy of approach.",
-        note="It is a result of waves, fluid and films, never an input of the flexible "
-        "variants; a body still vibrating from an earlier impact may "
-        "rebound faster than it arrived.",
+        "separation, where another stop meanwhile changes that speed by more than 1 % of the "
+        "change by this impact, and where rotation exchanges more than a tenth of the energy of "
+        "approach.",
+        note="It results from waves, fluid and films, and is never an input of the flexible "
+        "variants; a body still vibrating from an earlier impact may rebound faster than it "
+        "arrived.",
         form="fixed",
         digits=3,
         column=Column("", 1.0, ".4f"),
@@ -171,8 +172,8 @@ EVENT_MEASURES: tuple[Measure[ImpactEvent], ...] = described_in(
         key="energy_loss",
         symbol="W",
         unit="J",
-        definition="Kinetic energy of the centre of mass before the impact minus that after it, of "
-        "the relative motion where both bodies move; missing as the restitution.",
+        definition="Kinetic energy of the centre of mass before the impact minus the energy "
+        "after it, of the relative motion where both bodies move; missing like the restitution.",
         digits=3,
         column=Column("uJ", 1000000.0, ".4g"),
         page=True,
@@ -196,8 +197,8 @@ def _at_shares(way: Literal["opening", "closing"]) -> tuple[Measure[StrokeVarian
             key=f"{way}_time_at_{share}_percent",
             symbol=f"t_{way[0]},{share}",
             unit="s",
-            definition=f"From the start of the run until {share} % of what the body travels itself "
-            f"are passed on the way of {way}.",
+            definition=f"Time from the start of the run until the body has passed {share} % of "
+            f"its own travel while {way}.",
             read=attrgetter(f"needle_times.{way}.at_{share}"),
             absent=NOT_REACHED,
         )
@@ -211,10 +212,10 @@ VARIANT_MEASURES: tuple[Measure[StrokeVariant], ...] = described_in(
         key="opening_time",
         symbol="t_o",
         unit="s",
-        definition="From time zero (that of the first run, if this one continues it) to the first "
-        "touch of the opening stop in the first whole stroke, else in the longest: the stop that "
-        "ends the lift, perhaps one of a body that carries the needle. No value where it is not "
-        "touched; never negative.",
+        definition="From time zero (that of the first run, if this one continues it) to the "
+        "first touch of the opening stop in the first whole stroke, otherwise in the longest: "
+        "the stop that ends the lift, possibly that of a body that carries the needle. No value "
+        "if it is not touched; never negative.",
         read=lambda variant: variant.needle_times.opening.touch,
         column=Column("ms", 1000.0, ".4f", "opens"),
         page=True,
@@ -225,9 +226,9 @@ VARIANT_MEASURES: tuple[Measure[StrokeVariant], ...] = described_in(
         key="closing_time",
         symbol="t_c",
         unit="s",
-        definition="From time zero, as the opening time, to the first touch of the seat after the "
-        "largest lift of that stroke; of a valve that starts open, of its first closing. No value "
-        "where the needle stays closed or the run ends before; never negative.",
+        definition="From time zero, as the opening time, to the first touch of the seat after "
+        "the largest lift of that stroke; of a valve that starts open, of its first closing. No "
+        "value if the needle stays closed or the run ends earlier; never negative.",
         read=lambda variant: variant.needle_times.closing.touch,
         column=Column("ms", 1000.0, ".4f", "closes"),
         page=True,
@@ -253,9 +254,9 @@ VARIANT_MEASURES: tuple[Measure[StrokeVariant], ...] = described_in(
         key="delivered_mass",
         symbol="m",
         unit="kg",
-        definition="Mass that leaves the valve through all restrictions that lead to the "
-        "surroundings or to a given pressure, each that passes more out than in, from one given "
-        "pressure to another too; missing without such a restriction.",
+        definition="Mass that leaves the valve through all restrictions with net outflow to "
+        "ambient or to a prescribed pressure, including those from one prescribed pressure to "
+        "another; missing without such a restriction.",
         page=True,
     ),
     Measure(
@@ -309,7 +310,7 @@ VARIANT_MEASURES: tuple[Measure[StrokeVariant], ...] = described_in(
     Measure(
         key="coarse_steps",
         symbol="n_c",
-        definition="Macro steps: elements and fluid answer once in each.",
+        definition="Macro steps: elements and fluid are evaluated once in each.",
         read=lambda variant: variant.result.coarse_steps,
         kind="whole",
     ),
@@ -358,8 +359,8 @@ DELIVERY_MEASURES: tuple[Measure[Delivery], ...] = described_in(
         key="mass",
         symbol="m",
         unit="kg",
-        definition="Mass that flows from port a to port b, less what flows back: in the whole run, "
-        "or from the start of one command of the driver to the start of the next.",
+        definition="Net mass from port a to port b: in the whole run, or from the start of one "
+        "command of the driver to the start of the next.",
         column=Column("mg", 1e6, ".5g"),
         remark=lambda found: " (flows on)" if found.flows_on else "",
         page=True,
@@ -368,8 +369,8 @@ DELIVERY_MEASURES: tuple[Measure[Delivery], ...] = described_in(
         key="volume",
         symbol="V",
         unit="m^3",
-        definition="That mass over the density at the pressure of the surroundings, of a liquid at "
-        "its temperature, of a gas at that of the surroundings.",
+        definition="That mass over the density at ambient pressure; for a liquid at its own "
+        "temperature, for a gas at the ambient temperature.",
         column=Column("mm^3", 1e9, ".5g"),
         page=True,
     ),
@@ -377,8 +378,7 @@ DELIVERY_MEASURES: tuple[Measure[Delivery], ...] = described_in(
         key="back_mass",
         symbol="m_b",
         unit="kg",
-        definition="Mass that flows against the direction of the whole, within what records "
-        "resolve.",
+        definition="Mass that flows against the net direction, as far as the records resolve it.",
         column=Column("mg", 1e6, ".3g", "back"),
         page=True,
         title="flows back",
@@ -393,8 +393,9 @@ DELIVERY_MEASURES: tuple[Measure[Delivery], ...] = described_in(
         key="steady_flow",
         symbol="q",
         unit="kg/s",
-        definition="Median of the mass flow while it is above half of its largest value; missing "
-        "where it is off by more than 5 % for half of that time, as in a ballistic pulse.",
+        definition="Median of the mass flow while it is above half of its largest value; "
+        "missing if the flow differs from it by more than 5 % for half of that time, as in a "
+        "ballistic pulse.",
         column=Column("g/s", 1e3, ".4g"),
         page=True,
     ),
@@ -402,7 +403,7 @@ DELIVERY_MEASURES: tuple[Measure[Delivery], ...] = described_in(
         key="initial_flow",
         symbol="q_0",
         unit="kg/s",
-        definition="Mass flow in the first record: of a closed seat, its leakage.",
+        definition="Mass flow in the first record: the leakage of a closed seat.",
     ),
     Measure(
         key="final_flow",
@@ -414,9 +415,9 @@ DELIVERY_MEASURES: tuple[Measure[Delivery], ...] = described_in(
         key="first_flow",
         symbol="t_f",
         unit="s",
-        definition="When the mass flow has risen by 1 % of its largest rise above the first one; "
-        "missing where it does not rise, and where it is above half of its largest value from the "
-        "start.",
+        definition="Time at which the mass flow has risen by 1 % of its largest rise above the "
+        "initial flow; missing if it does not rise, or if it is above half its largest value "
+        "from the start.",
         digits=5,
         column=Column("ms", 1e3, ".4f"),
         page=True,
@@ -425,8 +426,9 @@ DELIVERY_MEASURES: tuple[Measure[Delivery], ...] = described_in(
         key="flow_delay",
         symbol="t_d",
         unit="s",
-        definition="From the start of the command of the nearest driver, in the whole run of the "
-        "first one (of one before the run if it flows earlier), to the first flow.",
+        definition="From the start of the command of the nearest driver to the first flow; for "
+        "the whole run from its first command (or one before the run, if the flow begins "
+        "earlier).",
         column=Column("us", 1e6, ".5g", "delay"),
         page=True,
     ),
@@ -434,8 +436,8 @@ DELIVERY_MEASURES: tuple[Measure[Delivery], ...] = described_in(
         key="last_flow",
         symbol="t_l",
         unit="s",
-        definition="When it has fallen to that level for good, or within 1 % to its last value if "
-        "it flowed from the start; missing where it flows on at the end.",
+        definition="Time at which it has fallen to that level for good, or to within 1 % of its "
+        "last value if it flowed from the start; missing if it still flows at the end.",
         digits=5,
         column=Column("ms", 1e3, ".4f"),
         page=True,
@@ -444,7 +446,7 @@ DELIVERY_MEASURES: tuple[Measure[Delivery], ...] = described_in(
         key="opening_pressure",
         symbol="dp_o",
         unit="Pa",
-        definition="Pressure before less behind the restriction at the first flow.",
+        definition="Pressure upstream minus downstream of the restriction at the first flow.",
         page=True,
     ),
     Measure(
@@ -458,7 +460,7 @@ DELIVERY_MEASURES: tuple[Measure[Delivery], ...] = described_in(
         key="hysteresis",
         symbol="dp_h",
         unit="Pa",
-        definition="Opening pressure less closing pressure.",
+        definition="Opening pressure minus closing pressure.",
     ),
 )
 """Of what one restriction passes; flows from its port a to its port b are positive."""

@@ -69,9 +69,9 @@ def rest_note(variant: str, result: NetworkResult, roles: ValveRoles) -> str:
     if left is not None and not np.all(left.values > 0.0):
         return (
             f"'{variant}': '{roles.needle}' opened at '{own}', and the body below stayed on "
-            f"'{seat}', with {force.min():.3g} N or more. '{seat}' counts as the seat. If that "
-            f"body is to stay, as an insert, write 'run: {{seat: {own}}}'; if it is to "
-            "open, check the forces on it."
+            f"'{seat}', with {force.min():.3g} N or more. '{seat}' is taken as the seat. If that "
+            f"body is meant to stay, as an insert, write 'run: {{seat: {own}}}'; if it is meant "
+            "to open, check the forces on it."
         )
     return (
         f"'{variant}': the needle never left its seat. It was pressed on '{seat}' with "

@@ -55,7 +55,7 @@ def standing_network(valve: Valve, network: Network) -> Network:
             got="'dry-mounted' "
             + ("in three dimensions" if valve.spatial else "without a machine below the valve"),
             expected="noise.mounts and noise.receiver, and a motion along the axis",
-            hint="describe what carries the valve, or run the variant 'dry'.",
+            hint="describe the machine that carries the valve, or run the variant 'dry'.",
         )
     structures = mounted(valve.structures, noise, valve.case.path.name if valve.case.path else "")
     parts = [part for item in structures for part in item.at_mounts]
@@ -132,8 +132,8 @@ def moving_note(variant: str, result: NetworkResult) -> str:
         return ""
     return (
         f"'{variant}': the valve itself moves by up to {format_si(max(ways), 'm', 3)}. Lift and "
-        "motion of other points of moving bodies count from its seat, which moves with it; "
-        "speeds of centres of mass from the ground."
+        "motion of other points of moving bodies are relative to the seat, which moves with the "
+        "valve; speeds of centres of mass are relative to the ground."
     )
 
 
@@ -161,18 +161,18 @@ def _connections(
     if homeless:
         raise InputError(
             "noise.reactions",
-            got=f"no place for the reaction of {one_of(dict.fromkeys(homeless))}",
-            expected="a surface of a held body for each component with an end on the ground, "
+            got=f"no surface for the reaction of {one_of(dict.fromkeys(homeless))}",
+            expected="a surface of a held body for each component with an end on the ground, or "
             "'outside' for each that acts from outside",
             hint=f"add, for example, noise.reactions: {{{homeless[0]}: BODY.SURFACE}}.",
         )
     if ends:
         raise InputError(
             f"noise.reactions.{ends[0]}",
-            got=f"a surface for '{ends[0]}', which has no second end that could push it",
+            got=f"a surface for '{ends[0]}', which has no second end to push on it",
             expected="'outside' in a run on the machine, which leaves this reaction out",
-            hint="take a component with two ends, such as a solenoid or a spring; or run the "
-            "variant dry, whose noise has the reaction.",
+            hint="use a component with two ends, such as a solenoid or a spring; or run the "
+            "variant dry, whose noise includes the reaction.",
         )
     return found
 

@@ -34,7 +34,7 @@ PAIR_MEASURES: tuple[Measure[ImpactsOf], ...] = described_in(
     Measure(
         key="first_touch",
         unit="s",
-        definition="The first of them, from the start of the run.",
+        definition="First touch of the first of them, from the start of the run.",
         read=lambda of: min((event.time for event in of.events), default=None),
         digits=5,
         column=Column("ms", 1e3, ".4f"),
@@ -43,7 +43,7 @@ PAIR_MEASURES: tuple[Measure[ImpactsOf], ...] = described_in(
     Measure(
         key="fastest_touch",
         unit="m/s",
-        definition="The highest speed at touch of them.",
+        definition="Highest of their speeds at touch.",
         read=lambda of: max((event.touch_speed for event in of.events), default=None),
         form="fixed",
         column=Column("m/s", 1.0, ".4f"),
@@ -52,7 +52,7 @@ PAIR_MEASURES: tuple[Measure[ImpactsOf], ...] = described_in(
     Measure(
         key="largest_force",
         unit="N",
-        definition="The largest peak force of them.",
+        definition="Largest of their peak forces.",
         read=lambda of: max((event.peak_force for event in of.events), default=None),
         column=Column("N", 1.0, ".4g"),
         page=True,
@@ -60,7 +60,7 @@ PAIR_MEASURES: tuple[Measure[ImpactsOf], ...] = described_in(
     Measure(
         key="sum_of_impulses",
         unit="N s",
-        definition="Of all of them.",
+        definition="Sum over all of them.",
         read=lambda of: sum(event.impulse for event in of.events),
         column=Column("mN s", 1e3, ".4g"),
         page=True,
@@ -68,9 +68,8 @@ PAIR_MEASURES: tuple[Measure[ImpactsOf], ...] = described_in(
     Measure(
         key="lost_in_contacts",
         unit="J",
-        definition="Energy that the contacts turn into heat in the whole run, with friction of "
-        "their faces, of the energy balance: it counts where an impact alone has no energy loss, "
-        "too.",
+        definition="Energy that the contacts dissipate in the whole run, including friction of "
+        "their faces, from the energy balance: also where a single impact has no energy loss.",
         read=lambda of: of.lost,
         digits=3,
         column=Column("uJ", 1e6, ".4g"),

@@ -107,7 +107,7 @@ class StopSummary:
     size_ratio, points_across, doubts, needed_yield
         See :class:`klack.analyses.impact.record.ContactSummary`.
     friction [-]
-        Coulomb's coefficient between the faces.
+        Coefficient of Coulomb friction between the faces.
     returning (k,) [N]
         Force at ``indentation`` while faces with friction slip back; empty for a law without loss.
     """

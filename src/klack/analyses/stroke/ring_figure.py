@@ -60,8 +60,8 @@ def _note(
     total = len(variant.result.events)
     parts = [
         "Contact force per length of the ring through the contact points, over time and angle; "
-        "0° lies at +x, 90° at +y; white is no contact. Each field has its own scale. The sum "
-        "round the ring is the contact force along the axis.",
+        "0° lies at +x, 90° at +y; white is no contact. Each field has its own scale. The "
+        "integral around the ring is the contact force along the axis.",
     ]
     if count < total:
         parts.append(
@@ -71,7 +71,7 @@ def _note(
     spots = [number for number, _, record in shown if not record.is_ring]
     if spots:
         parts.append(
-            f"In impact {', '.join(map(str, spots))} the force does not lie on a ring: its load is "
-            "referred to the circle of its mean distance from the axis."
+            f"In impact {', '.join(map(str, spots))} the force does not act on a ring: its load "
+            "is given per length of the circle at its mean distance from the axis."
         )
     return " ".join(parts)

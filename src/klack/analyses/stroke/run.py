@@ -154,10 +154,10 @@ def _record_notes(case: ValveCase, variants: Mapping[str, StrokeVariant]) -> Ite
         spacing = float(variant.result.time[1] - variant.result.time[0])
         if abs(spacing - asked) > _NEAR * asked:
             yield (
-                f"'{name}': records are {format_si(spacing, 's')} apart, where run.record is "
-                f"{format_si(asked, 's')}: they hold whole steps of the network. Impacts do not "
-                "depend on it. Try: a whole multiple of what they are, or run.coarse: 1, which "
-                "takes many times as long."
+                f"'{name}': records are {format_si(spacing, 's')} apart instead of run.record: "
+                f"{format_si(asked, 's')}, because they contain whole steps of the network. "
+                "Impacts do not depend on it. Try: a whole multiple of their spacing, or "
+                "run.coarse: 1, which takes many times as long."
             )
 
 
@@ -278,7 +278,7 @@ def _begin(case: ValveCase, after: StrokeStudy | None, name: Variant) -> Network
     if name not in after.variants:
         raise InputError(
             "variant",
-            got=f"'{name}', which the result to continue from does not have",
+            got=f"'{name}', which is not in the result to continue from",
             expected=f"one of: {', '.join(after.variants)}",
             hint="run that variant from the start first.",
         )
@@ -343,7 +343,7 @@ def one_variant(
     setup_time = perf_counter() - begin - run.result.wall_time
     steps: CheckedSteps | None = None
     if checked and after is not None:
-        reason = "the run continues another one, whose state belongs to its steps"
+        reason = "the run continues another run, whose state belongs to its steps"
         steps = not_checked(run.result.events, reason)
     elif checked and run.failure is None:
 

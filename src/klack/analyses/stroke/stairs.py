@@ -225,7 +225,7 @@ STAIR_MEASURES: tuple[Measure[Stair], ...] = described_in(
         key="expected_time",
         symbol="t_k",
         unit="s",
-        definition="So many echo times 2L/a after the middle of the impact.",
+        definition="Number of echo times 2L/a after the middle of the impact.",
         digits=5,
         column=Column("ms", 1e3, ".4f", "k 2L/a"),
         page=True,
@@ -234,7 +234,7 @@ STAIR_MEASURES: tuple[Measure[Stair], ...] = described_in(
         key="pressure_step",
         symbol="dp",
         unit="Pa",
-        definition="Mean pressure of the stair behind the edge less that of the stair before.",
+        definition="Mean pressure of the stair after the edge minus that of the stair before.",
         column=Column("bar", 1e-5, "+.3f", "dp"),
         page=True,
     ),
@@ -250,8 +250,8 @@ STAIR_MEASURES: tuple[Measure[Stair], ...] = described_in(
         key="seen_force",
         symbol="m dv/dt",
         unit="N",
-        definition="Mass of the body times the change of the slope of its velocity, read from the "
-        "velocity alone; all forces that change are in it.",
+        definition="Mass of the body times the change of the slope of its velocity, determined "
+        "only from the velocity; it includes all forces that change.",
         column=Column("N", 1.0, "+.3f", "by velocity"),
         page=True,
         title="force from the velocity",
@@ -268,8 +268,8 @@ STAIR_MEASURES: tuple[Measure[Stair], ...] = described_in(
         key="lift",
         symbol="dy",
         unit="m",
-        definition="By how much the lift leaves its former parabola within half a stair: a lift "
-        "sensor whose noise is larger does not show it.",
+        definition="Deviation of the lift from its previous parabola within half a stair: "
+        "invisible to a lift sensor with larger noise.",
         digits=3,
         column=Column("um", 1e6, ".3g", "lift"),
         page=True,
@@ -279,7 +279,7 @@ STAIR_MEASURES: tuple[Measure[Stair], ...] = described_in(
         key="scatter",
         symbol="s_v",
         unit="m/s",
-        definition="Standard deviation of the velocity about the straight lines of both stairs.",
+        definition="Standard deviation of the velocity about the straight lines of the two stairs.",
         digits=2,
         column=Column("m/s", 1.0, ".1e"),
         remark=lambda stair: f" ({stair.hidden_by})" if stair.hidden_by else "",

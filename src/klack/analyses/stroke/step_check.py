@@ -41,8 +41,8 @@ _PROMISED = 3  # impacts on each stop
 _TOLD = 3  # impacts in a sentence
 _PARTS = 4  # of a run that may end early after each but the last two: a look takes 0.3 ms
 _SLOW = "slower than 2 % of the fastest impact on this stop"
-_AFTER = "after all that was asked for"
-_OPEN = "not over when the run ends"
+_AFTER = "after all requested impacts"
+_OPEN = "not finished when the run ends"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,7 +58,7 @@ class ImpactChange:
     approach_speed, peak_force, impulse [-]
         Relative.
     reason
-        Why a number is missing.
+        Reason why a number is missing.
     """
 
     number: int
@@ -95,7 +95,7 @@ CHANGE_MEASURES: tuple[Measure[ImpactChange], ...] = described_in(
         key="time_change",
         name="change of first touch",
         unit="s",
-        definition="How much later the first touch is with all steps twice as long.",
+        definition="Delay of the first touch with all steps twice as long.",
         read=attrgetter("time"),
         column=Column("us", 1e6, "+.4f", "touch"),
         digits=2,
@@ -230,7 +230,7 @@ def _pairs(run: Sequence[ImpactEvent], other: Sequence[ImpactEvent]) -> Iterator
             reason = _unlike(run, other, k)
         if reason:
             yield ImpactChange(number=k + 1, reason=reason)
-            reason = "an impact before it has no counterpart"
+            reason = "an earlier impact has no counterpart"
         else:
             yield _change(event, other[k], k + 1)
 
@@ -303,8 +303,8 @@ def told(
     peak, time = PROMISED[accuracy]
     more = f"; and {len(found) - _TOLD} more" if len(found) > _TOLD else ""
     return (
-        f"with all time steps twice as long {'; '.join(found[:_TOLD])}{more}. The steps are short "
-        f"enough for accuracy: {accuracy} where that changes less than {100 * SHARE * peak:g} % "
+        f"with all time steps twice as long {'; '.join(found[:_TOLD])}{more}. Steps are short "
+        f"enough for accuracy: {accuracy} if these changes are below {100 * SHARE * peak:g} % "
         f"and {1e6 * SHARE * time:g} us. Try: a shorter run.step; or run.coarse: 1, which takes "
         "many times as long."
     )

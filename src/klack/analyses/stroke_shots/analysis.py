@@ -104,7 +104,7 @@ _STROKE = JsonForm(
     "One stroke of many.",
     *measured_keys(STROKE_MEASURES, "row"),
     Key("stops", {str: _STOP}, "By end stop."),
-    Key("failure", str | None, "Why it ended early."),
+    Key("failure", str | None, "Reason why it ended early."),
 )
 _HIGHEST = JsonForm(
     "HighestReboundJson",
@@ -116,7 +116,7 @@ _RATIO = JsonForm(
     "RatioJson",
     "Standard deviation wet over dry.",
     Key("ratio", Real),
-    Key("low", Real, "Begin of its 95 % interval."),
+    Key("low", Real, "Lower end of its 95 % interval."),
     Key("high", Real),
     Key("pairs", int, "Strokes with a value in both."),
 )
@@ -163,7 +163,7 @@ _SHOTS = JsonForm(
     schema_key("klack-stroke-shots/1"),
     *CASE,
     Key("seed", int),
-    Key("carry", bool, "Whether each stroke starts where the one before has ended."),
+    Key("carry", bool, "Whether each stroke starts where the previous one ended."),
     Key("variants", {str: _VARIANT}),
     Key("wet_over_dry", {str: _RATIO}, "By measure; empty without both variants.", _ratios),
     Key("answers", list[str], of=lambda study: list(stroke_answers(study))),

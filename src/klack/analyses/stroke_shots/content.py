@@ -159,8 +159,8 @@ def histograms(study: StrokeShotsStudy) -> Picture | None:
         figure.legend(handles, list(study.variants), loc="outside upper left", ncols=2)
         return Picture(
             svg(figure),
-            f"How many of {study.count} strokes fall into each class. Dashed: the stroke that "
-            "starts centred.",
+            f"Number of the {study.count} strokes in each class. Dashed: the stroke that starts "
+            "centred.",
         )
 
 
@@ -206,8 +206,8 @@ def touch_map(study: StrokeShotsStudy) -> Picture | None:
         return Picture(
             svg(figure),
             "Every dot is the axis of the needle at the height of the stop when a stroke first "
-            "touches it; the line leads to where the axis is 3 mm above. Circle: what the guide "
-            "allows to the axis of a rigid needle.",
+            "touches it; the line leads to its position 3 mm above. Circle: limit of the guide "
+            "for the axis of a rigid needle.",
         )
 
 
@@ -331,10 +331,10 @@ def _related(study: StrokeShotsStudy, stop: str) -> Section:
     if all(cell == "–" for table in tables for row in table.rows for cell in row[1:]):
         return Section(title="")
     return Section(
-        title="What the scatter goes with",
+        title="Correlations of the scatter",
         paragraphs=(
             "Rank correlation over the strokes: +1 and \N{MINUS SIGN}1 for one that always "
-            "rises or falls with the other, about 0 without any connection, a dash where fewer "
+            "rises or falls with the other, about 0 without any relation, a dash where fewer "
             "than five strokes have both values or one of them is constant. Measures of the "
             f"whole stroke are compared with the position at the first touch of '{stop}'.",
         ),
@@ -353,7 +353,7 @@ def _correlations(name: str, shots: VariantShots) -> Table:
 
 def _drawn(study: StrokeShotsStudy) -> Section:
     facts = (
-        ("start", "where the stroke before has left the needle" if study.carry else "drawn anew"),
+        ("start", "where the previous stroke left the needle" if study.carry else "drawn anew"),
         ("guide", study.guide),
         ("mass of the needle", quantity(study.mass, "kg")),
         ("length of a stroke", quantity(study.duration, "s", 3)),
@@ -451,7 +451,7 @@ _DEFINITIONS = (
     ),
     (
         "95 % interval of a ratio of standard deviations",
-        "From 2000 samples drawn with repetition from the strokes.",
+        "From 2000 bootstrap samples of the strokes.",
     ),
 )
 
@@ -472,8 +472,8 @@ def _limits(study: StrokeShotsStudy) -> tuple[tuple[str, str], ...]:
         ),
         (
             "Chance",
-            "Off-axis strokes are chaotic: after three impacts on the seat, differences of "
-            "round-off decide. Distributions do not depend on it, single late bounces do.",
+            "Off-axis strokes are chaotic: after three impacts on the seat they depend on "
+            "round-off. Distributions do not depend on it, single late bounces do.",
         ),
         *(() if not study.carry else (_IN_A_ROW,)),
     )

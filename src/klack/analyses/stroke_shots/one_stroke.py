@@ -75,7 +75,7 @@ class StrokeStart:
         The same as translation of the centre of mass and rotation vector, with the turn about the
         axis that friction in guides leaves; then those of the bodies that move beside the needle.
     friction [-]
-        Coulomb's coefficient in the guide.
+        Coefficient of Coulomb friction in the guide.
     contact_friction [-]
         That between the faces of all stops; nan: each has that of the case.
     """
@@ -183,14 +183,14 @@ def shots_of_valve(case: ValveCase) -> StrokeShots:
         f"{where}: motion",
         got="'axial' in klack shots",
         expected="motion: three-dimensional, or the case of an impact: along the axis all "
-        "strokes are alike",
+        "strokes are equal",
         hint="set 'motion: three-dimensional', add 'guide' and 'shots: {count: 50}'.",
     )
     if case.shots is None:
         raise InputError(
             f"{where}: shots",
             got="no section 'shots'",
-            expected="how many strokes, and what varies from stroke to stroke",
+            expected="the number of strokes, and the quantities that vary from stroke to stroke",
             hint="add 'shots: {count: 50}' and a 'guide', and remove 'placement'.",
         )
     return case.shots

@@ -81,8 +81,8 @@ STARTED: tuple[Measure[Row], ...] = described_in(
         key="eccentricity",
         symbol="e_0",
         unit="m",
-        definition="Distance of the axis of the needle from that of the valve at the height of the "
-        "seat, at the start.",
+        definition="Distance between the axes of needle and valve at the height of the seat, at "
+        "the start.",
     ),
     Measure(
         key="direction",
@@ -103,7 +103,7 @@ STARTED: tuple[Measure[Row], ...] = described_in(
         key="friction",
         name="friction in the guide",
         symbol="mu",
-        definition="Coulomb's coefficient in the guide.",
+        definition="Coefficient of Coulomb friction in the guide.",
         form="fixed",
         digits=3,
     ),
@@ -111,7 +111,8 @@ STARTED: tuple[Measure[Row], ...] = described_in(
         key="contact_friction",
         name="friction between the faces",
         symbol="mu_c",
-        definition="Coulomb's coefficient between the faces of all stops, where it is drawn.",
+        definition="Coefficient of Coulomb friction between the faces of all stops, where it is "
+        "drawn.",
         form="fixed",
         digits=3,
     ),
@@ -125,15 +126,15 @@ RESULTS: tuple[Measure[Row], ...] = described_in(
         symbol="t_o",
         unit="s",
         definition="From time zero to the first touch of the opening stop in the first whole "
-        "stroke, else in the longest; none where it is not touched.",
+        "stroke, otherwise in the longest; none if it is not touched.",
         digits=5,
     ),
     Measure(
         key="closing_time",
         symbol="t_c",
         unit="s",
-        definition="From time zero to the first touch of the seat after the largest lift of that "
-        "stroke; none where the needle stays closed or the run ends before.",
+        definition="From time zero to the first touch of the seat after the largest lift of "
+        "that stroke; none if the needle stays closed or the run ends earlier.",
         digits=5,
     ),
     Measure(
@@ -141,7 +142,7 @@ RESULTS: tuple[Measure[Row], ...] = described_in(
         name="lost in impacts",
         symbol="W",
         unit="J",
-        definition="Kinetic energy of the centre of mass that all impacts take: into rotation, "
+        definition="Kinetic energy of the centre of mass lost in all impacts to rotation, "
         "lateral motion and vibration.",
     ),
     Measure(
@@ -149,15 +150,15 @@ RESULTS: tuple[Measure[Row], ...] = described_in(
         name="lost in the guide",
         symbol="W_g",
         unit="J",
-        definition="Energy that friction in the guide takes in the whole stroke.",
+        definition="Energy dissipated by friction in the guide in the whole stroke.",
     ),
     Measure(
         key="faces_loss",
         name="lost between the faces",
         symbol="W_f",
         unit="J",
-        definition="Energy that friction between the faces of all stops takes in the whole stroke; "
-        "missing without friction there.",
+        definition="Energy dissipated by friction between the faces of all stops in the whole "
+        "stroke; missing without friction there.",
     ),
     Measure(
         key="injected_energy",
@@ -165,8 +166,7 @@ RESULTS: tuple[Measure[Row], ...] = described_in(
         symbol="W_in",
         unit="J",
         definition="Work of the stops on the modes of the held bodies, along the axis; negative "
-        "where no impact follows when a pressed face is let go, which gives its elastic energy "
-        "back.",
+        "if a pressed face is released, which returns its elastic energy, and no impact follows.",
     ),
     Measure(
         key="delivered_mass",
@@ -208,8 +208,8 @@ AT_TOUCH: tuple[Measure[Row], ...] = described_in(
         name="eccentricity at touch",
         symbol="e_1",
         unit="m",
-        definition="Distance of the axis of the needle from that of the valve at the height of the "
-        "stop, at first touch.",
+        definition="Distance between the axes of needle and valve at the height of the stop, at "
+        "first touch.",
         digits=3,
     ),
     Measure(
@@ -233,7 +233,7 @@ AT_TOUCH: tuple[Measure[Row], ...] = described_in(
         name="direction of tilt at touch",
         symbol="phi_t1",
         unit="rad",
-        definition="Direction in which the upper end is tilted then, from x to y.",
+        definition="Direction in which the upper end is tilted at that time, from x to y.",
         digits=3,
     ),
 )
@@ -275,15 +275,15 @@ COMPARED: tuple[Measure[Row], ...] = described_in(
         key="rebound_height",
         symbol="h",
         unit="m",
-        definition="Farthest turn of the centre of mass from the stop after the impact and before "
-        "another stop is touched, from its place at first touch; 0 where it comes to rest, missing "
-        "where the stroke ends before a turn.",
+        definition="Largest distance of the centre of mass from its position at first touch, "
+        "after the impact and before another stop is touched; 0 if it comes to rest, missing if "
+        "the stroke ends before it turns back.",
     ),
     Measure(
         key="energy_loss",
         symbol="W_1",
         unit="J",
-        definition="Kinetic energy of the centre of mass that the impact takes.",
+        definition="Kinetic energy of the centre of mass lost in the impact.",
     ),
 )
 """Of the first impact on a stop, with a distribution."""
@@ -296,7 +296,7 @@ FIRST_TOUCH_MEASURES: tuple[Measure[Row], ...] = described_in(
         key="impacts",
         name="impacts on the stop",
         symbol="n",
-        definition="Impacts on this stop in the whole stroke, the first one among them.",
+        definition="Impacts on this stop in the whole stroke, including the first.",
         kind="whole",
     ),
 )
@@ -324,7 +324,7 @@ HIGHEST_MEASURES: tuple[Measure[HighestRebound], ...] = described_in(
     Measure(
         key="place",
         symbol="n_h",
-        definition="Its place among the strokes in the order of that eccentricity; 1 is the most "
+        definition="Its rank among the strokes in the order of that eccentricity; 1 is the most "
         "centred one.",
         kind="whole",
     ),

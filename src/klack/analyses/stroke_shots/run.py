@@ -170,7 +170,7 @@ def stroke_setup(valve: Valve, roles: ValveRoles) -> StrokeSetup:
             "network.components",
             got=f"a component that other processes cannot import ({error})",
             expected="classes of a module",
-            hint="move the class of your own to a module that --component names.",
+            hint="move your own class to a module that --component names.",
         ) from error
     return sent
 
@@ -293,7 +293,7 @@ def _require_some(found: Mapping[str, VariantShots]) -> None:
             first, text = next(iter(shots.failures.items()))
             raise ConvergenceError(
                 f"stroke {first} ({name}), and all others: {text}\n"
-                "Try: klack stroke with the same case, which tells more."
+                "Try: klack stroke with the same case, which reports more details."
             )
 
 
@@ -314,7 +314,9 @@ def _distributions(case: ValveCase) -> dict[str, str]:
     if case.placement is not None:
         words = {"eccentricity and tilt": "the placement of the case, for the first stroke"}
     if shots.carry:
-        words["later strokes"] = "start where the one before has left the needle across its axis"
+        words["later strokes"] = (
+            "start at the position across the axis where the previous stroke left the needle"
+        )
     words |= friction_in_words(shots, case.guide)
     given = {name: stop.friction for name, stop in case.stops.items() if stop.friction > 0.0}
     if shots.contact_friction is not None:
@@ -346,7 +348,7 @@ def missing_notes(found: Mapping[str, VariantShots]) -> Iterator[str]:
             if not np.all(touched):
                 yield (
                     f"'{name}': {count - int(np.sum(touched))} of {count} strokes do not hit "
-                    f"'{stop}'. Try: a longer run.duration, if they should."
+                    f"'{stop}'. Try: a longer run.duration, if they are meant to."
                 )
             if not np.any(touched):
                 continue
@@ -356,10 +358,11 @@ def missing_notes(found: Mapping[str, VariantShots]) -> Iterator[str]:
                 first = int(np.flatnonzero(slow)[0])
                 yield (
                     f"'{name}': the first impact on '{stop}' is a mere touch in "
-                    f"{int(np.sum(slow))} of {count} strokes, {format_si(speed[first], 'm/s', 3)} "
-                    f"in stroke {first} against a median of "
-                    f"{format_si(float(np.median(speed[touched])), 'm/s', 3)}: statistics mix "
-                    "both. Look at the lift; another duration of the drive may avoid the touch."
+                    f"{int(np.sum(slow))} of {count} strokes, "
+                    f"{format_si(speed[first], 'm/s', 3)} in stroke {first} against a median of "
+                    f"{format_si(float(np.median(speed[touched])), 'm/s', 3)}: the statistics "
+                    "mix both. Check the lift; another duration of the drive may avoid the "
+                    "touch."
                 )
             unturned = touched & ~np.isfinite(columns.rebound_height)
             if np.any(unturned):

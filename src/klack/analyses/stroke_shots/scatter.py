@@ -221,8 +221,9 @@ def _ratio(wet: Scattered, dry: Scattered, *, carry: bool) -> str:
     if np.isfinite(found.low):
         within = f" (95 % interval {100.0 * found.low:.3g} to {100.0 * found.high:.3g} %)"
     return (
-        f"The scatter of the {wet.measure.name}{at} wet is {100.0 * found.ratio:.3g} % of dry"
-        f"{within}, over {found.pairs} strokes {'of each row' if carry else 'with the same draws'}."
+        f"The wet scatter of the {wet.measure.name}{at} is {100.0 * found.ratio:.3g} % of the "
+        f"dry scatter{within}, over {found.pairs} strokes "
+        f"{'of each row' if carry else 'with the same draws'}."
     )
 
 
@@ -243,7 +244,7 @@ def _highest(found: HighestRebound, told: Told) -> str:
     if np.isfinite(found.relative_height_bias):
         text += (
             f" The stroke that starts centred has {told(found.centred_height, 'm', 4)}: the "
-            f"highest is {100.0 * found.relative_height_bias:+.2f} % off, its restitution "
+            f"highest differs by {100.0 * found.relative_height_bias:+.2f} %, its restitution by "
             f"{found.restitution_bias:+.4f}."
         )
     return text

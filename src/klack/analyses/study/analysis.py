@@ -48,10 +48,10 @@ def _in_words(item: StudyColumn | SurrogateEffect, values: np.ndarray) -> Any:
 
 _COLUMN = JsonForm(
     "StudyColumnJson",
-    "A parameter, what follows from parameters, or a measure, at every point.",
+    "A parameter, a quantity that depends on parameters, or a measure, at every point.",
     Key("unit", str, "SI; 1 for a pure number, empty for words."),
-    Key("spread", str, "How it varies, or its expression."),
-    Key("today", Real, "In the case without changes."),
+    Key("spread", str, "Its variation or its expression."),
+    Key("today", Real, "Value in the case without changes."),
     Key(
         "values", list[Real | str], "One for each point.", lambda item: _in_words(item, item.values)
     ),
@@ -77,7 +77,7 @@ _EFFECT = JsonForm(
 )
 _SURROGATE_EFFECT = JsonForm(
     "SurrogateEffectJson",
-    "Mean of a surrogate over all parameters but one.",
+    "Mean of a surrogate over all parameters except one.",
     Key(
         "at",
         list[Real | str],
@@ -92,17 +92,17 @@ _SURROGATE = JsonForm(
     Key("kind", str),
     Key("made_of", str),
     Key("points", int, "Different points that it was fitted to."),
-    Key("failed", int, "Points without a value, left out."),
+    Key("failed", int, "Number of points without a value, left out."),
     Key("repeated", int, "Points that repeat another one, left out."),
     Key("predictivity", Real, "Q2, each point predicted from the others."),
     Key("error", Real, "Root mean square of the leave-one-out residuals."),
     Key("largest_error", Real, "The largest of them, without sign.", "largest"),
     Key("residuals", list[Real], "Value minus prediction from the other points."),
-    Key("reason", str, "Why nothing follows from it; empty if it does."),
+    Key("reason", str, "Reason why nothing is derived from it; otherwise empty."),
     Key(
         "shares",
         {str: _INDEX},
-        "Sobol's indices, and how far the error can move them.",
+        "Sobol indices, and their possible shift by the error.",
         lambda item: {} if item.reason else _by_parameter(item),
     ),
     Key(
@@ -114,7 +114,7 @@ _SURROGATE = JsonForm(
 )
 _MISSED = JsonForm(
     "MissedBoundJson",
-    "How often drawn points miss a bound.",
+    "Share of drawn points that miss a bound.",
     Key("bound", str),
     Key("missed", int),
     Key("points", int, "With a value."),
@@ -126,7 +126,7 @@ _MISSED = JsonForm(
 )
 _OPTIMUM = JsonForm(
     "OptimumJson",
-    "What a search has found.",
+    "Result of a search.",
     Key("algorithm", str),
     Key(
         "objectives",
@@ -135,15 +135,15 @@ _OPTIMUM = JsonForm(
         lambda found: dict(zip(found.objectives, found.ways, strict=True)),
     ),
     Key("bounds", list[str]),
-    Key("kept", list[bool], "Whether each point keeps all bounds."),
-    Key("front", list[int], "Points that no other one beats."),
+    Key("kept", list[bool], "Whether each point meets all bounds."),
+    Key("front", list[int], "Points that are not dominated by others."),
     Key(
         "best",
         int | None,
-        "Point of the front nearest to the ideal one.",
+        "Point of the front nearest to the ideal point.",
         lambda found: found.best if found.best >= 0 else None,
     ),
-    Key("feasible", bool, "Whether any point keeps all bounds."),
+    Key("feasible", bool, "Whether any point meets all bounds."),
 )
 
 
@@ -163,8 +163,8 @@ _STUDY = JsonForm(
     "``klack study``.",
     schema_key("klack-study/1"),
     *CASE,
-    Key("variant", str, "Of the stroke; of an impact its level, 'shots', or both."),
-    Key("model", str, "Of impact and shots: modes, law and meshes."),
+    Key("variant", str, "Variant of the stroke; for an impact its level, 'shots', or both."),
+    Key("model", str, "For impact and shots: modes, law and meshes."),
     Key("design", str),
     Key("points", int, of="count"),
     Key("failed", int, of=lambda record: int(record.failed.sum())),
@@ -187,24 +187,24 @@ _STUDY = JsonForm(
         "By measure.",
         by_name("surrogates", "measure"),
     ),
-    Key("missed_bounds", [_MISSED], "Of drawn points, for each bound.", "missed"),
+    Key("missed_bounds", [_MISSED], "For drawn points, for each bound.", "missed"),
     Key("optimum", (_OPTIMUM, None), "Of klack optimise."),
     Key("failures", list[str], "Empty where a point was computed."),
     Key("notes", list[str], "Doubts about the numbers of each point."),
-    Key("halvings", list[Real], "How often all steps of each stroke were halved."),
+    Key("halvings", list[Real], "Number of times that all steps of each stroke were halved."),
     Key(
         "step_changes",
         list[Real],
-        "Largest change of the impacts that the measures of a stroke depend on, "
-        "with all steps twice as long, over what the accuracy promises: certified up to 0.5; "
-        "null where nothing was checked, or an impact has no counterpart.",
+        "Largest change of the impacts that the measures of a stroke depend on, with all steps "
+        "twice as long, over the promised accuracy: certified up to 0.5; null where nothing was "
+        "checked, or an impact has no counterpart.",
     ),
     Key("wall_time_s", Real, of="wall_time"),
     Key("point_time_s", Real, of="point_time"),
     Key("computed", int, "Points computed now."),
-    Key("kept", int, "Points that an earlier run had left."),
-    Key("threads", int, "Points that were computed at a time."),
-    Key("workers", str, "What computed them: threads, processes, ..."),
+    Key("kept", int, "Points taken from an earlier run."),
+    Key("threads", int, "Points computed at the same time."),
+    Key("workers", str, "Workers of the computation: threads, processes, ..."),
 )
 
 
@@ -228,7 +228,7 @@ def study_told(record: StudyRecord) -> Iterator[TextTable | str]:
         yield from _optimum_told(record, record.optimum)
     if record.missed:
         yield TextTable(
-            title="How often a drawn valve misses a bound",
+            title="Probability that a drawn valve misses a bound",
             columns=MISSED_COLUMNS,
             rows=[missed_cells(item) for item in record.missed],
         )
@@ -260,8 +260,8 @@ def study_told(record: StudyRecord) -> Iterator[TextTable | str]:
     for fitted in record.surrogates:
         if not fitted.reason:
             yield TextTable(
-                title=f"Shares of the variance of {fitted.measure} by its surrogate (with what its "
-                "error can change)",
+                title=f"Shares of the variance of {fitted.measure} from its surrogate (with the "
+                "possible effect of its error)",
                 columns=("parameter", *SHARE_COLUMNS),
                 rows=[[name, *index_cells(fitted, k)] for k, name in enumerate(fitted.parameters)],
             )

@@ -142,7 +142,7 @@ class PointKind(ABC, Generic[CaseT, Built]):
                 key.place[: len(section)] == section,
                 f"points: {key.name}",
                 got=f"a {what} as a part of a point",
-                expected=f"one {what} for all points",
+                expected=f"a single {what} for all points",
                 hint=hint,
             )
 

@@ -34,8 +34,8 @@ __all__ = ["optimise", "study"]
 _Made = Annotated[
     int | None,
     Parameter(
-        help="Instead of the design of the study: so many valves made after the case, with the "
-        "scatter of its section 'robust'.",
+        help="Instead of the design of the study: this number of manufactured valves, the case "
+        "with the scatter of its section 'robust'.",
     ),
 ]
 _Workers = Annotated[
@@ -43,15 +43,15 @@ _Workers = Annotated[
     Parameter(
         name="--workers",
         help="Number of processes; it does not affect the results. [default: threads; all cores "
-        "for many impacts, and where measures of the noise, or several geometries, are asked for]",
+        "for many impacts, measures of the noise, or several geometries]",
     ),
 ]
 _Dask = Annotated[
     str | None,
     Parameter(
         name="--dask",
-        help="Compute on a cluster: address of a scheduler of dask (tcp://host:8786), or a file "
-        "with it.",
+        help="Compute on a cluster: address of a Dask scheduler (tcp://host:8786), or its "
+        "scheduler file.",
     ),
 ]
 

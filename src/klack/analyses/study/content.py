@@ -83,7 +83,7 @@ def study_content(record: StudyRecord) -> Content:
             charts=(parallel_chart(record, labels),) if varying else (),
         ),
         Section(
-            title="What each measure follows",
+            title="What each measure depends on",
             charts=()
             if record.optimum is not None
             else tuple(
@@ -179,7 +179,7 @@ def _best_answer(record: StudyRecord, labels: dict[str, str]) -> str:
     chosen = f", the compromise of {count(found.front.size)} on the front" if several else ""
     start = f"Of {count(record.count)} points, point {found.best}{chosen}"
     if not found.feasible:
-        start = f"No point keeps all bounds. Nearest to them of {count(record.count)} points is"
+        start = f"No point meets all bounds. Of {count(record.count)} points the closest to them is"
         start += f" point {found.best}"
     return f"{start}: {', '.join(parts)}. In brackets: against today's case."
 
@@ -247,7 +247,7 @@ def _listen(record: StudyRecord, found: Optimum, labels: dict[str, str]) -> Sect
         title="Listen",
         paragraphs=(
             f"One click of each, all at one scale: {level_statement(scale)}. Points of the front "
-            "stand in the order of its first objective.",
+            "are in the order of the first objective.",
         ),
         sounds=tuple(players),
     )
@@ -296,7 +296,7 @@ def _related_table(
 def _missed_section(record: StudyRecord) -> Section:
     rows = tuple(missed_cells(item) for item in record.missed)
     return Section(
-        title="How often a drawn valve misses a bound",
+        title="Probability that a drawn valve misses a bound",
         tables=(Table(columns=MISSED_COLUMNS, rows=rows),) if rows else (),
     )
 
@@ -331,7 +331,7 @@ def _sensitivity_section(record: StudyRecord, labels: dict[str, str]) -> Section
         )
     told += [
         f"{labels[item.measure]}: {count(item.discarded)} base points were left out, because one "
-        "of their points has no value: the shares cover the rest."
+        "of their points has no value: the shares refer to the rest."
         for item in record.sensitivities
         if item.discarded
     ]
@@ -362,16 +362,16 @@ def _surrogate_sections(record: StudyRecord, labels: dict[str, str]) -> tuple[Se
     told = [
         "Each point is predicted from the others. Q2 is 1 for a perfect prediction and 0 for one "
         "that is no better than the mean of all points; errors are in the unit of the measure.",
-        "No computed point is replaced: tables, bounds and fronts are of computed points alone.",
+        "No computed point is replaced: tables, bounds and fronts contain only computed points.",
         *(
-            f"Nothing is derived from that of {labels[item.measure]}: {item.reason}."
+            f"Nothing is derived from the surrogate of {labels[item.measure]}: {item.reason}."
             for item in record.surrogates
             if item.reason
         ),
     ]
     found = [
         Section(
-            title="Surrogates: what they predict",
+            title="Surrogates: accuracy of their predictions",
             paragraphs=tuple(told),
             tables=(
                 Table(
@@ -451,49 +451,51 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
     (
         "rank correlation",
         "Spearman's coefficient: +1 if one always rises with the other, -1 if it always falls, "
-        "near 0 if neither; a curve with a minimum inside of the range has a small one too.",
+        "near 0 if neither; a curve with a minimum within the range also has a small "
+        "coefficient.",
     ),
     (
         "effect of a parameter",
-        "Change of a measure when one parameter moves by half of its range, over that half: the "
-        "change over the whole range of a straight line (Morris 1991). Size is the mean without "
-        "signs (Campolongo et al. 2007). A scatter as large as the size means curves and "
+        "Change of a measure when one parameter moves by half its range, extrapolated to the "
+        "whole range by a straight line (Morris 1991). Size is the mean without signs "
+        "(Campolongo et al. 2007). A scatter as large as the size indicates curvature and "
         "interactions.",
     ),
     (
         "probability of a missed bound",
-        "Share of the drawn points that miss it; interval of Clopper and Pearson (1934) for "
-        "independent draws. Where none missed it, the one-sided bound of 95 %. Points without a "
-        "value widen the interval: all of them may miss it, or none.",
+        "Share of the drawn points that miss a bound; interval of Clopper and Pearson (1934) "
+        "for independent draws. If none misses it, the one-sided bound of 95 %. Points without "
+        "a value widen the interval: all of them may miss it, or none.",
     ),
     (
         "front",
-        "Points that no other computed point beats in every objective at once; points that miss a "
-        "bound are dominated by all that keep them (Deb's rule).",
+        "Points that no other computed point improves in every objective at once; points that "
+        "miss a bound are dominated by all points that meet the bounds (Deb's rule).",
     ),
     (
         "recommended point",
-        "Of the front, the point nearest to the best value of every objective, by the ranges of "
-        "the front (Yu 1973). Another weight of the objectives is another point of the front.",
+        "The point of the front nearest to the best value of every objective, scaled by the "
+        "ranges of the front (Yu 1973). Another weighting of the objectives gives another point "
+        "of the front.",
     ),
     (
         "shares of the variance",
-        "Sobol's indices (I. M. Sobol 1993; A. Saltelli et al. 2010): the share of the variance of "
-        "a measure over the ranges given that a parameter causes alone, and that which vanishes "
-        "once it is known while all others are free. The difference is what it does together with "
-        "others. Intervals hold 95 %, by drawing base points again.",
+        "Sobol's indices (I. M. Sobol 1993; A. Saltelli et al. 2010): the share of the variance "
+        "of a measure over the given ranges that a parameter causes by itself, and the share "
+        "that remains if all other parameters are fixed. The difference is its effect in "
+        "interaction with others. Intervals cover 95 %, from resampling of the base points.",
     ),
     (
         "surrogate",
         "A function of the parameters, fitted to the computed points of one measure: polynomial "
         "chaos (Blatman and Sudret 2011) or Gaussian process (Rasmussen and Williams 2006). Its "
-        "leave-one-out error belongs to each point, predicted by a fit to all others. Below Q2 = "
-        "0.9, or with too few points, nothing is derived from it. Intervals of its shares are the "
-        "largest change that an error of this root mean square can make.",
+        "leave-one-out error is the error at each point, predicted by a fit to all others. "
+        "Below Q2 = 0.9, or with too few points, nothing is derived from it. Intervals of its "
+        "shares are the largest change that an error of this root mean square can cause.",
     ),
     (
         "main effect",
-        "Mean of the surrogate over the distributions of all parameters but one.",
+        "Mean of the surrogate over the distributions of all parameters except one.",
     ),
 )
 
@@ -504,13 +506,13 @@ _OF_STROKES = (
 )
 _OF_IMPACTS = (
     "One level",
-    "All points are computed at one level, with the mesh that their case gives. A level in doubt, "
-    "a coarse mesh and an error estimated above 2 % are remarks of the points concerned.",
+    "All points are computed at one level, with the mesh of their case. A level in doubt, a "
+    "coarse mesh and an error estimated above 2 % are noted at the points concerned.",
 )
 _LIMITS: tuple[tuple[str, str], ...] = (
     (
         "Points",
-        "Between the points nothing was computed: a minimum of the table is the best of these "
-        "points, not of the range. A surrogate estimates there, with its error.",
+        "Nothing was computed between the points: a minimum of the table is the best of these "
+        "points, not of the range. A surrogate gives an estimate there, with its error.",
     ),
 )

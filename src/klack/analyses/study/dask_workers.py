@@ -136,7 +136,7 @@ class DaskTasks:
         if isinstance(error, ImportError | AttributeError):
             raise InputError(
                 "dask",
-                got=f"a worker that cannot load what it is sent ({error})",
+                got=f"a worker that cannot load the data sent to it ({error})",
                 expected=f"klack {klack.__version__} in the environment of every worker",
                 hint="start the workers in the same environment as this command.",
             )
@@ -148,7 +148,7 @@ class DaskTasks:
             if self._given_up[place] < _ROUNDS:
                 self.submit((place,))
                 continue
-            self._tally(place, died_row(self._asked, str(error or "the task was taken back")))
+            self._tally(place, died_row(self._asked, str(error or "the task was withdrawn")))
 
     def _send_case(self) -> "Future":
         """A task of its own: the scheduler repeats it where its worker is lost."""
@@ -266,7 +266,7 @@ class DaskWorkers(PointWorkers):
         before, self._now = self._now, len(threads)
         self.count = max(self.count, self._now)
         if not threads and (before or not self._checked):
-            remark(progress, "no worker of dask: waiting for one")
+            remark(progress, "no Dask worker: waiting for one")
         new = [address for address in threads if address not in self._checked]
         if not new:
             return
@@ -281,8 +281,8 @@ class DaskWorkers(PointWorkers):
             self._told = True
             remark(
                 progress,
-                "workers of dask with several threads compute one point at a time; start them "
-                "with --nthreads 1",
+                "Dask workers with several threads compute one point at a time; start them with "
+                "--nthreads 1",
             )
 
     def _require_scheduler(self) -> None:
@@ -291,8 +291,8 @@ class DaskWorkers(PointWorkers):
 
     def _lost(self, why: object) -> ConvergenceError:
         return ConvergenceError(
-            f"the scheduler of dask is lost ({str(why) or type(why).__name__}).\nTry: start it "
-            "anew; all points that came until now are kept, and the same command resumes."
+            f"the connection to the Dask scheduler is lost ({str(why) or type(why).__name__}).\n"
+            "Try: restart it; all points received so far are kept, and the same command resumes."
         )
 
 
@@ -348,7 +348,7 @@ def _client(scheduler: "str | Client") -> "tuple[Client, bool]":
         raise InputError(
             f"dask {text}",
             got=f"no answer ({str(error).strip() or type(error).__name__})",
-            expected="the address of a running scheduler of dask, or a file with it",
-            hint="start one: dask scheduler --scheduler-file scheduler.json.",
+            expected="the address of a running Dask scheduler, or its scheduler file",
+            hint="start a scheduler: dask scheduler --scheduler-file scheduler.json.",
         ) from None
     return client, True

@@ -106,7 +106,7 @@ def point_key(
     And whether its steps were checked.
     """
     marks = {name: _with_content(tree.path.parent, value) for name, value in written.items()}
-    way = variant if checks else f"{variant}, steps as they are"
+    way = variant if checks else f"{variant}, steps unchecked"
     return json.dumps([way, dict(sorted(marks.items()))], separators=(",", ":"))
 
 
@@ -248,7 +248,7 @@ def require_some(source: StudySource, rows: Sequence[PointRow]) -> None:
             source.where(("parameters",)),
             got=f"{len(rows)} points, none of which can be computed; {times} times: {reason}",
             expected="ranges in which the valve works",
-            hint="narrow the ranges, or compute the case with one of these values by itself.",
+            hint="narrow the ranges, or compute the case with only one of these values.",
         )
 
 
@@ -337,8 +337,8 @@ def measure_columns(
 
 def _today_notes(today: PointRow) -> tuple[str, ...]:
     if today.failure:
-        return (f"The case as it is cannot be computed: {today.failure.partition(chr(10))[0]}",)
-    return tuple(f"The case as it is: {note}" for note in today.notes)
+        return (f"Today's case cannot be computed: {today.failure.partition(chr(10))[0]}",)
+    return tuple(f"Today's case: {note}" for note in today.notes)
 
 
 def _of_rows(rows: Sequence[PointRow]) -> tuple[str, ...]:
@@ -359,7 +359,7 @@ def _of_rows(rows: Sequence[PointRow]) -> tuple[str, ...]:
         other = ", with other numbers" if len(notes) > 1 else ""
         found.append(f"{notes.total()} of {len(rows)} points{other}: {note}")
     if len(kinds) > _TOLD:
-        found.append(f"{len(kinds) - _TOLD} other notes; the table of points has them all.")
+        found.append(f"{len(kinds) - _TOLD} other notes; the table of points lists all of them.")
     return tuple(found)
 
 
@@ -367,7 +367,7 @@ def _to_have(measure: str) -> str:
     """What may give a measure a value."""
     if measure.startswith("noise."):
         return "bodies with named surfaces; levels at mounts need noise.mounts as well"
-    return "a longer run.duration if it comes later"
+    return "a longer run.duration, if it occurs later"
 
 
 def row_warnings(

@@ -56,8 +56,8 @@ def parallel_chart(record: StudyRecord, labels: Mapping[str, str]) -> ParallelCh
     measures = [k for k in measures if shown[k].name in wanted[:1]] or measures
     some = slice(None, _MOST_LINES)
     note = (
-        "Every line is a point. On screen: drag along an axis to keep the lines that pass there; a "
-        "click on the name of an axis colours the lines by it."
+        "Every line is a point. On screen: drag along an axis to keep the lines that pass "
+        "through that interval; click the name of an axis to colour the lines by it."
     )
     if record.count > _MOST_LINES:
         note += f" The first {_MOST_LINES} of {record.count} points."
@@ -188,19 +188,22 @@ def effect_bars(measure: StudyColumn, item: Screening, labels: Mapping[str, str]
         x=AxisSpec(label=f"change of {labels[item.measure]} over the whole range", unit=unit),
         rows=tuple(labels[item.parameters[k]] for k in order),
         parts=(BarPart(label="size of the effect", values=tuple(sizes.tolist()), colour="blue"),),
-        note="Mean size of the elementary effects; the table has standard errors and scatter.",
+        note="Mean size of the elementary effects; the table lists standard errors and scatter.",
     )
 
 
 def sensitivity_bars(item: Sensitivity, labels: Mapping[str, str]) -> BarChart:
     """Variance shares of a measure from base points, the largest first."""
-    note = f"From {item.rows} base points; the table has the intervals."
+    note = f"From {item.rows} base points; the table lists the intervals."
     return _share_bars(item, f"sensitivity-{item.measure}", note, labels)
 
 
 def surrogate_bars(item: StudySurrogate, labels: Mapping[str, str]) -> BarChart:
     """Variance shares of a surrogate, the largest first."""
-    note = f"By a surrogate of {item.points} points; the table has what its error can change."
+    note = (
+        f"From a surrogate of {item.points} points; the table lists the possible effect of its "
+        "error."
+    )
     return _share_bars(item, f"surrogate-{item.measure}", note, labels)
 
 
@@ -265,8 +268,8 @@ def _main_effect(
         title=f"{labels[measure.name]} over {labels[parameter.name]}: main effect",
         x=x,
         panels=(Panel(y=y, curves=curves),),
-        note="Dots: computed points, which scatter by what the other parameters do. Line: mean of "
-        "the surrogate over the other parameters.",
+        note="Dots: computed points, which scatter because of the other parameters. Line: mean "
+        "of the surrogate over the other parameters.",
     )
 
 

@@ -115,8 +115,8 @@ def require_surrogates(source: StudySource, points: StudyPoints) -> None:
         source.where(("surrogate",)),
         got=f"a surrogate of the design {design}",
         expected=f"a design that fills the ranges: {one_of(_DESIGNS)}",
-        hint="use kind: sobol; on few levels, or around few points, a surrogate cannot tell "
-        "how wrong it is elsewhere.",
+        hint="use kind: sobol; on few levels, or around few points, the error of a surrogate "
+        "elsewhere is unknown.",
     )
     refuse_if(
         len(points.values) > _MOST[kind],
@@ -151,15 +151,15 @@ def _require_even(source: StudySource, points: StudyPoints) -> None:
             2 * len(set(values)) < len(values),
             where,
             got=f"{item.name}: {len(set(values))} different values in {len(values)} points",
-            expected="a different one in most points",
-            hint="use kind: sobol; a surrogate cannot tell how wrong it is between few levels.",
+            expected="a different value in most points",
+            hint="use kind: sobol; between few levels the error of a surrogate is unknown.",
         )
         shares.append([axis.spread.share(float(value)) for value in values])
     found = unevenness(np.array(shares).T) if shares else 0.0
     refuse_if(
         found > _UNEVEN,
         where,
-        got=f"points with {found:.3g} times the squared discrepancy of random ones",
+        got=f"points with {found:.3g} times the squared discrepancy of random points",
         expected=f"points that fill the ranges: at most {_UNEVEN:g} times",
         hint="use kind: sobol, or give the ranges or distributions that the points have.",
     )
@@ -251,7 +251,7 @@ def surrogate_warnings(surrogates: Sequence[StudySurrogate]) -> tuple[str, ...]:
     ]
     found += [
         f"The surrogate of '{item.measure}' is fitted without {item.failed} points that have no "
-        "value: where they lie, it extrapolates."
+        "value: near these it extrapolates."
         for item in surrogates
         if item.failed and not item.reason
     ]

@@ -144,7 +144,7 @@ def _bound(where: str, written: Written, unit: str, today: float) -> float:
         where,
         got=f"'{written}', but today's case has no value of this measure",
         expected="a bound with its unit",
-        hint="write a number, or make the case compute it.",
+        hint="write a number, or let the case compute this measure.",
     )
     if by_today["sign"] is None:
         return today

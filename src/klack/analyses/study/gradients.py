@@ -51,7 +51,7 @@ def require_gradients(source: StudySource, asked: AskedPoints, space: Space) -> 
     if without:
         raise refused(f"{one_of(without)}, without derivatives")
     if source.study.robust is not None:
-        raise refused("a robust search: statistics of made valves have no derivatives here")
+        raise refused("a robust search: statistics of manufactured valves have no derivatives here")
     listed = [item.name for item in space.varied if isinstance(item.spread, Listed)]
     if listed:
         raise refused(f"{one_of(listed)}, a list of values")
@@ -114,7 +114,7 @@ class Gradients:
         if missing:
             self.notes.append(
                 f"The polish by derivatives ended where {one_of(missing)} has none: an impact "
-                "comes and goes there."
+                "appears or disappears there."
             )
             raise NoValue
         per_share = self._values_per_share(point)

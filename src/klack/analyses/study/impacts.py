@@ -94,8 +94,8 @@ class _Impacts(PointKind[Case, _Built]):
             study.variant is not None,
             "variant",
             got=f"'{study.variant}' in the study of an impact",
-            expected="a level; variants are of strokes",
-            hint="write level: reduced, or leave it out.",
+            expected="a level; only strokes have variants",
+            hint="write level: reduced, or leave the variant out.",
         )
         return study.level
 
@@ -271,6 +271,6 @@ def _other_answer(study: ImpactStudy, level: str) -> str:
     if study.reference == level:
         return ""
     return (
-        f"the numbers of this point are from level '{level}', the answer of a single impact "
-        f"would be from level '{study.reference}'. Try: level: {study.reference} in the study."
+        f"the numbers of this point come from level '{level}', but the answer of a single impact "
+        f"would come from level '{study.reference}'. Try: level: {study.reference} in the study."
     )

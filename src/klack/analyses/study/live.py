@@ -116,9 +116,7 @@ class ProgressPage:
             return
         if not self._written:
             self._written = True
-            remark(
-                self._progress, f"the best so far as a picture: {self._page}, renewed each minute"
-            )
+            remark(self._progress, f"the best points so far: {self._page}, updated every minute")
 
     def remove(self) -> None:
         """Once the result and its report stand."""

@@ -99,9 +99,9 @@ def made_space(case: AnyCase, source: StudySource, space: Space) -> Space:
     if given is None:
         raise InputError(
             source.where(()),
-            got="no scatter of made valves",
+            got="no scatter of manufactured valves",
             expected="robust: {scatter: {network.components.spring.preload: 0.3 N}}",
-            hint="give standard deviations of what scatters from valve to valve.",
+            hint="give the standard deviations of quantities that scatter from valve to valve.",
         )
     values = _scattered(case, source, space, given)
     names = {item.name for item in values}
@@ -118,8 +118,9 @@ def made_space(case: AnyCase, source: StudySource, space: Space) -> Space:
             name not in known and name not in own,
             source.where(("robust", "scatter")),
             got=f"'{name}', a word whose value in the case is not known",
-            expected="words that a key of the case follows from by themselves",
-            hint=f"scatter the keys that follow from '{name}', or link one: a.key: {name}.",
+            expected="words that directly determine a key of the case",
+            hint=f"give the scatter of the keys that depend on '{name}', or link one: a.key: "
+            f"{name}.",
         )
     return Space(
         parameters=tuple(
@@ -163,9 +164,9 @@ def _one(
     refuse_if(
         name in linked,
         source.where(at, on_key=True),
-        got="a key that follows from parameters",
-        expected="a parameter, or a key that stands by itself",
-        hint="give the scatter of what it follows from.",
+        got="a key that depends on parameters",
+        expected="a parameter, or an independent key",
+        hint="give the scatter of these parameters.",
     )
     own = parameters.get(name)
     if own is not None:
@@ -175,7 +176,7 @@ def _one(
                 source.where(at, on_key=True),
                 got="a list of values" if listed else "words",
                 expected="a parameter with a range, or a key with a quantity",
-                hint="what is chosen from a list does not scatter; leave it out.",
+                hint="a choice from a list does not scatter; leave it out.",
             )
         kind, today = own.kind, None if own.today is None else float(own.today)
     elif "." not in name:
@@ -197,7 +198,7 @@ def _one(
         source.where(at),
         got=format_si(deviation, kind.unit),
         expected="more than 0",
-        hint="leave out what does not scatter.",
+        hint="leave out quantities that do not scatter.",
     )
     return _Scattered(name=name, kind=kind, deviation=deviation, today=today)
 
@@ -255,7 +256,10 @@ class MadeValves:
         notes = {f"Made valves: {note}": None for row in valves for note in row.notes}
         if failures:
             reason = failures.most_common(1)[0][0]
-            text = f"{failures.total()} of {len(valves)} made valves have no measures: {reason}"
+            text = (
+                f"{failures.total()} of {len(valves)} manufactured valves have no measures: "
+                f"{reason}"
+            )
             notes[text] = None
         return PointRow(
             tuple(value if np.isfinite(value) else None for value in values), notes=tuple(notes)

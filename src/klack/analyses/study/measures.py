@@ -236,8 +236,8 @@ def shot_measure(name: str) -> ChosenMeasure | None:
     if of in _RESULTS and not key:
         raise InputError(
             "measures",
-            got=f"'{name}', which every shot has",
-            expected=f"a statistic behind it: {one_of(_STATISTICS)}",
+            got=f"'{name}', which has a value for every shot",
+            expected=f"a statistic after it: {one_of(_STATISTICS)}",
             hint=f"write {name}.mean, or {SHOTS}.{_CENTRIC}.{of} of the centred shot.",
         )
     return None
@@ -254,8 +254,8 @@ def shot_notes(names: Iterable[str], found: DroppedShots) -> tuple[str, ...]:
     count = found.shots.count
     return (
         *(
-            f"{missing} of {count} shots ended before their {_RESULTS[key].name} was known: "
-            "there are no statistics of the others alone. Try: a longer shots.duration."
+            f"{missing} of {count} shots ended before their {_RESULTS[key].name} was known, and "
+            "statistics of only the others would be biased. Try: a longer shots.duration."
             for key in columns
             if (missing := int(np.sum(~np.isfinite(getattr(found.shots, key)))))
         ),
@@ -266,8 +266,8 @@ def shot_notes(names: Iterable[str], found: DroppedShots) -> tuple[str, ...]:
             if not np.isfinite(found.centric.row(0)[key])
         ),
         *(
-            f"{count} shots are too few for their {item.name}, which takes {item.fewest}. "
-            "Try: a larger shots.count."
+            f"{count} shots are too few for their {item.name}, which needs {item.fewest}. Try: a "
+            "larger shots.count."
             for item in statistics
             if count < item.fewest
         ),
@@ -335,7 +335,7 @@ def impact_measures(case: Case, names: Iterable[str]) -> tuple[ChosenMeasure, ..
             "measures",
             got=f"'{item.name}', of three bodies in a row",
             expected=f"one of: {one_of(_OF_LEVELS)}",
-            hint="klack noise takes three bodies in a stroke (klack stroke).",
+            hint="klack noise accepts three bodies only in a stroke (klack stroke).",
         )
     return chosen
 
@@ -372,7 +372,7 @@ def _impact_measure(case: Case, name: str) -> ChosenMeasure | None:
     if noise is None and own in _OF_LEVELS:
         raise InputError(
             "measures",
-            got=f"'{name}', as measures of a stroke are called",
+            got=f"'{name}', the name of a measure of a stroke",
             expected="a measure of an impact, which has one contact",
             hint=f"write {own}.",
         )

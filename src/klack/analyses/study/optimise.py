@@ -157,7 +157,7 @@ def run_optimisation(
 
 
 _NOT_FEASIBLE = (
-    "No point keeps all bounds; the points shown miss them least. Try: wider ranges, or other "
+    "No point meets all bounds; the points shown miss them least. Try: wider ranges, or other "
     "bounds."
 )
 _DRAWS = ("shots.seed", "shots.count")
@@ -170,9 +170,10 @@ def _require_same_draws(source: StudySource) -> None:
         refuse_if(
             name in source.study.parameters,
             source.where(("parameters", name)),
-            got=f"'{name}' as a parameter of a search, which would find the luckiest draw",
+            got=f"'{name}' as a parameter of a search, which would only find the most favourable "
+            "draw",
             expected="the same shots for all points",
-            hint="remove it here; klack study compares seeds.",
+            hint="remove the seed here; klack study compares seeds.",
         )
 
 
@@ -411,7 +412,7 @@ def _optimum(
     if given.polish:
         words += f", polished in {given.polish} steps at most"
     if made is not None:
-        words += f", {len(made.scatter.cube)} valves made after each design"
+        words += f", {len(made.scatter.cube)} manufactured valves per design"
     units = {item.name: item.unit for item in columns}
 
     def name(measure: str, high: bool) -> str:
@@ -449,7 +450,7 @@ def _lucky_draws(asked: AskedPoints, source: StudySource) -> tuple[str, ...]:
     if not any(item.of == "shots" and item.name in sought for item in asked.chosen):
         return ()
     return (
-        "All points were compared by the same draws of shots, so that the best one suits these "
-        "draws. Try: klack export --to case --point, and klack shots --seed with other seeds for "
-        "that case and for today's.",
+        "All points were compared with the same draws of shots, to which the best point is "
+        "adapted. Try: klack export --to case --point, and klack shots --seed with other seeds "
+        "for that case and for today's.",
     )

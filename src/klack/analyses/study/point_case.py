@@ -27,7 +27,7 @@ def case_of_point(
             "--point",
             got="no point" if point is None else str(point),
             expected=f"0 to {record.count - 1}",
-            hint="the report of the study numbers its points.",
+            hint="the report of the study lists the numbers of the points.",
         )
     name = f"{record.case}_point_{point}.yaml"
     tree = tree_of(record.case_text, folder / name)

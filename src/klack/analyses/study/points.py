@@ -170,7 +170,7 @@ def _listed(item: StudyParameter, today: object) -> Listed:
     if item.fixed is None and item.values is None:
         raise CaseProblem(
             (),
-            got="a range of a key that is no quantity",
+            got="a range of a key that is not a quantity",
             expected="{values: [...]}",
             hint="list its values.",
         )
@@ -190,9 +190,9 @@ def _own_word(source: StudySource, name: str, item: StudyParameter) -> Parameter
         raise CaseProblem(
             (),
             got=f"'{name}'",
-            expected="the path of a key (network.components.spring.preload), or a word of letters, "
-            "digits and _ for the expressions of 'linked'",
-            hint="write the path of the key from the top of the case.",
+            expected="the path of a key (network.components.spring.preload), or a name of "
+            "letters, digits and _ for the expressions in 'linked'",
+            hint="write the path of the key from the top level of the case.",
         )
     kind = _kind_of(item)
     return Parameter(name=name, kind=kind, spread=_spread(source, name, item, kind), today=None)
@@ -245,7 +245,7 @@ def _spread(source: StudySource, name: str, item: StudyParameter, of: Quantity |
             source.where((*at, "normal", "sd")),
             got=format_si(deviation, kind.unit),
             expected="more than 0",
-            hint="a value that does not vary is 'fixed'.",
+            hint="for a value that does not vary use 'fixed'.",
         )
         return Normal(mean, deviation)
     if item.lowest is not None:
@@ -274,7 +274,7 @@ Values = Mapping[str, float | str]
 
 _MOST_POINTS = 1_000_000
 _UNBALANCED = (
-    "The number of Sobol points is no power of two: means over them converge more slowly. "
+    "The number of Sobol points is not a power of two: means over them converge more slowly. "
     "Try: 64, 128, 256, ... points."
 )
 
@@ -416,7 +416,7 @@ def linked_of(
         refuse_if(
             name in source.study.parameters,
             source.where(("linked", name)),
-            got="a key that is a parameter as well",
+            got="a key that is also a parameter",
             expected="a parameter, or an expression",
             hint="remove one of them.",
         )
@@ -444,8 +444,7 @@ def linked_of(
                 source.where(("linked", name)),
                 got=f"'{expression.text}', which is {dimension}",
                 expected=f"{kinds[name].name} [{kinds[name].unit}]",
-                hint="add a parameter with a unit, {fixed: 0.2 mm}, for a constant that is no "
-                "number.",
+                hint="for a constant with a unit, add a parameter such as {fixed: 0.2 mm}.",
             )
         found.append(
             Linked(
@@ -504,7 +503,7 @@ def _cube(source: StudySource, varied: Sequence[Parameter]) -> tuple[NDArray[np.
         return cube, "trajectories of Morris"
     if design.kind == "latin-hypercube":
         return latin_hypercube(design.points, count, design.seed), "Latin hypercube"
-    name = "valves made after the case, Sobol points" if design.kind == "made" else "Sobol points"
+    name = "manufactured valves, Sobol points" if design.kind == "made" else "Sobol points"
     return sobol_sequence(design.points, count, design.seed), name
 
 
@@ -540,7 +539,7 @@ def _rows_of_file(
     if sorted(head) != sorted(names):
         raise InputError(
             f"{file}:1",
-            got=f"a head of: {one_of(head)}",
+            got=f"a header of: {one_of(head)}",
             expected=f"one column for each parameter that varies: {one_of(names)}",
             hint="write the names as in the study.",
         )
@@ -552,14 +551,18 @@ def _rows_of_file(
             raise InputError(
                 f"{file}:{number}",
                 got=f"{len(cells)} values",
-                expected=f"{len(head)}, one for each name in the head",
-                hint="use a comma between values and a point in numbers.",
+                expected=f"{len(head)}, one for each name in the header",
+                hint="use a comma between values and a decimal point in numbers.",
             )
         texts = dict(zip(head, (cell.strip() for cell in cells), strict=True))
         at = f"{file}:{number}"
         rows.append([_cell(f"{at}: {item.name}", texts[item.name], item) for item in varied])
     refuse_if(
-        not rows, str(file), got="no row of values", expected="at least one", hint="add the points."
+        not rows,
+        str(file),
+        got="no rows of values",
+        expected="at least one",
+        hint="add the points.",
     )
     return rows, f"from {file.name}"
 

@@ -79,8 +79,8 @@ class SentCase:
             raise InputError(
                 "workers",
                 got=f"a case that cannot be sent to another process ({error})",
-                expected="components whose class stands at the top of a module",
-                hint="put the class into a module of its own, or compute on threads.",
+                expected="components whose class is defined at the top level of a module",
+                hint="put the class into a separate module, or compute on threads.",
             ) from None
         return cls(content, str(Path.cwd()), point_log_form(case, tree)[1], versions_here())
 
@@ -125,9 +125,9 @@ class SentCase:
         refuse_if(
             point_log_form(case, tree)[1] != self.mark,
             str(tree.path),
-            got="files or components of the case with another content",
+            got="files or components of the case with different contents",
             expected="the same bytes as where the study was started",
-            hint="share the folder of the case, or copy it to every machine once more.",
+            hint="share the folder of the case, or copy it to every machine again.",
         )
         return case, tree
 
@@ -140,7 +140,7 @@ class SentCase:
                 got=f"{name} {here.get(name, 'not installed')}",
                 expected=f"{name} {wanted}, as where the study was started: points are kept "
                 "by their version",
-                hint="install the same versions on every machine, and start its workers anew.",
+                hint="install the same versions on every machine, and restart its workers.",
             )
 
 
@@ -281,7 +281,7 @@ class ProcessWorkers(PointWorkers):
             "workers",
             processes * PROCESS_SIZE,
             what=f"{processes} processes",
-            hint="use fewer of them, or threads, which share what they need.",
+            hint="use fewer workers, or threads, which share their data.",
         )
         self.count = processes
         self._pool = WorkerPool(processes, SentCase.of(case, tree))
@@ -315,9 +315,9 @@ class ProcessWorkers(PointWorkers):
                 raise
             except WorkerDied as died:
                 raise ConvergenceError(
-                    f"{died}, again and again before it could begin.\n"
-                    "Try: fewer workers if the memory is full; in a script, the call under "
-                    "if __name__ == '__main__'."
+                    f"{died}, repeatedly before it could begin.\n"
+                    "Try: fewer workers if the memory is full; in a script, the call under if "
+                    "__name__ == '__main__'."
                 ) from None
 
     def close(self) -> None:

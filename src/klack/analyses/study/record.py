@@ -125,7 +125,7 @@ class Screening:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SurrogateEffect:
-    """Mean of a surrogate over all parameters but one.
+    """Mean of a surrogate over all parameters except one.
 
     ``mean`` is in the unit of the measure; ``at`` [SI] are values of the parameter, or places in
     ``words``.
@@ -220,7 +220,7 @@ class PointSound:
 
 @dataclass(frozen=True, kw_only=True)
 class MissedBound:
-    """How often drawn points miss a bound.
+    """Share of drawn points that miss a bound.
 
     Parameters
     ----------

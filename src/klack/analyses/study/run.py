@@ -153,6 +153,6 @@ def _bounds_by_today(source: StudySource) -> tuple[str, ...]:
     if source.study.design.kind != "made" or not found:
         return ()
     return (
-        f"'Today' of a bound is the case that the valves are made after ({'; '.join(found)}). "
-        "Try: a bound with its unit.",
+        "'Today' of a bound refers to the case from which the valves are manufactured "
+        f"({'; '.join(found)}). Try: a bound with its unit.",
     )

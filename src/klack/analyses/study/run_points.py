@@ -66,15 +66,15 @@ def require_way(case: AnyCase, variant: str | None, level: str | None) -> None:
         raise InputError(
             "variant",
             got=f"'{variant}', for an impact of two bodies",
-            expected="a level; variants are of strokes",
-            hint='write level="interface", or leave it out.',
+            expected="a level; only strokes have variants",
+            hint='write level="interface", or leave the variant out.',
         )
     if level is not None and isinstance(case, ValveCase):
         raise InputError(
             "level",
             got=f"'{level}', for a stroke of a whole valve",
-            expected="a variant; levels are of impacts",
-            hint='write variant="dry", or leave it out.',
+            expected="a variant; only impacts have levels",
+            hint='write variant="dry", or leave the level out.',
         )
 
 

@@ -108,7 +108,7 @@ class _Strokes(PointKind[ValveCase, _Built]):
             study.level is not None,
             "level",
             got=f"'{study.level}' in the study of a whole valve",
-            expected="a variant; levels are of impacts",
+            expected="a variant; only impacts have levels",
             hint="write variant: wet.",
         )
         return study.variant

@@ -54,16 +54,19 @@ class Where:
         for name, value in (("threads", self.threads), ("workers", self.workers)):
             if value is not None and (isinstance(value, bool) or value < 1):
                 raise InputError(
-                    name, got=str(value), expected="1 or more", hint="leave it out: all cores."
+                    name,
+                    got=str(value),
+                    expected="1 or more",
+                    hint="leave the number out to use all cores.",
                 )
         given = {"threads": self.threads, "workers": self.workers, "dask": self.dask}
         names = [name for name, value in given.items() if value is not None]
         refuse_if(
             len(names) > 1,
             " and ".join(names),
-            got="several places for the points",
+            got="several places to compute the points",
             expected="one of: threads, workers (processes of this machine), dask (a cluster)",
-            hint="leave out all but one.",
+            hint="keep only one of them.",
         )
         if self.dask is not None:
             from klack.analyses.study.dask_workers import require_dask

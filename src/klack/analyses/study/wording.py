@@ -176,7 +176,7 @@ def _index(value: float) -> str:
 
 def rate_text(record: StudyRecord) -> str:
     """How many points were computed, and how fast."""
-    parts = [f"{record.computed} points computed now"]
+    parts = [f"{record.computed} points computed"]
     if record.computed and record.point_time > 0.0:
         crew = f"{record.threads} {record.workers}" if record.threads > 1 else "one core"
         parts[0] += f" in {format_si(record.point_time, 's', 3)} on {crew}"
@@ -194,7 +194,7 @@ def steps_texts(record: StudyRecord) -> Iterator[str]:
     known = ~np.isnan(record.step_changes)
     if not known.any():
         if len(known) > record.failed.sum():
-            yield "Time steps as they are: what measures depend on them by was not checked."
+            yield "Time steps unchecked: their effect on the measures is unknown."
         return
     halved = int(np.sum(record.halvings[known] > 0))
     doubtful = np.flatnonzero(known & (record.step_changes > SHARE))

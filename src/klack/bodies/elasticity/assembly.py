@@ -170,7 +170,7 @@ def _check_radius(mesh: Mesh) -> None:
             f"assemble: axisymmetric mesh, node {lowest}",
             got=f"radius {r:.6g} mm at z = {z:.6g} mm",
             expected="radii of zero or more (axis at r = 0)",
-            hint="mesh only one half of the meridian section.",
+            hint="mesh only half of the meridian section.",
         )
 
 
@@ -191,8 +191,8 @@ def _check_jacobians(mesh: Mesh, block: ElementBlock, jacobians: NDArray[np.floa
         f"{bad.size} of {len(low)} elements are like this",
         expected=f"a ratio above {SMALLEST_JACOBIAN_RATIO:g}",
         hint=(
-            "the nodes of the element run in the wrong order; reorient the elements."
+            "the node order of the element is wrong; reorient the elements."
             if reversed_order
-            else "move its mid-edge nodes towards the straight edge, or mesh finer there."
+            else "move its mid-edge nodes towards the straight edge, or refine the mesh there."
         ),
     )

@@ -309,8 +309,8 @@ def rigid_frequencies(body: VibratingBody) -> NDArray[np.float64]:
             f"eigenmodes of body '{body.name}'",
             got=f"a rigid motion with a frequency of {frequency.max():.3g} Hz",
             expected=f"below {_RIGID_LIMIT:g} Hz for a free body",
-            hint="the stiffness matrix includes supports; name them as "
-            "fixed_nodes, or remove them from the matrix.",
+            hint="the stiffness matrix includes supports: name these as fixed_nodes, or remove "
+            "them from the matrix.",
         )
     return frequency
 

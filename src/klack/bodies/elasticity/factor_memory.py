@@ -75,7 +75,7 @@ def out_of_memory(backend: str, size: int, nonzeros: int, needed: float) -> Fact
     there = available_memory()
     return FactorMemoryError(
         "factorisation",
-        got=f"{what} that takes about {in_words(needed)} of memory, which was not available",
+        got=f"{what} needing about {in_words(needed)} of memory, which is not available",
         expected=f"what fits into {in_words(there.size)} ({there.bound})",
         hint=hint,
     )

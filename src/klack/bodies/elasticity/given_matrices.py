@@ -88,7 +88,7 @@ def first_frequency(where: str, body: ElasticBody) -> float:
         raise InputError(
             where,
             got=f"{body.rigid_modes.shape[1]} rigid motions free, and {error.got}",
-            expected="a stiffness with strain in every other motion, all eigenvalues above 0",
+            expected="a stiffness with strain in every other motion, with all eigenvalues above 0",
             hint="the body is in several pieces or has a mechanism (glue its solids before the "
             "matrices are written), or the matrix has stress stiffening, or K and M are exchanged.",
         ) from error
@@ -178,7 +178,7 @@ def check_matrices(
         ("density", material.density_in_words),
         ("modulus lambda + 2 mu", material.modulus_in_words),
         ("wave speed", f"{material.wave_speed:.4g} m/s"),
-        ("rigid motions", f"{rigid}; they cause {strain:.1g} of the forces that cancel"),
+        ("rigid motions", f"{rigid}; {strain:.1g} of their forces do not cancel"),
         ("definiteness", "mass positive, stiffness positive except for rigid motions"),
         ("first eigenfrequency", format_si(frequency, "Hz", 6)),
     )
@@ -313,8 +313,8 @@ def _require_one_mass(
         raise InputError(
             where,
             got=f"masses of {', '.join(f'{m:.6g}' for m in mass.values())} kg along x, y, z and "
-            f"{crossed:.3g} kg across",
-            expected="the same mass in all directions, without coupling",
+            f"{crossed:.3g} kg of coupling",
+            expected="the same mass in all directions, and no coupling",
             hint="the order of the rows differs (give 'dofs'), or nodes have "
             "rotated coordinate systems.",
         )

@@ -173,9 +173,9 @@ def layer_stiffness(
         raise InputError(
             f"bodies.{body}.layers.{layer.name}",
             got=f"a {way} stiffness {1 / beside if soft else beside:.2g} times as "
-            f"{'soft' if soft else 'stiff'} as one row of elements beside it",
+            f"{'soft' if soft else 'stiff'} as the adjacent row of elements",
             expected=f"at most {1 / _SOFTEST if soft else _STIFFEST:g} times",
-            hint="check its unit; parts that nothing holds together are bodies of their own."
+            hint="check its unit; parts that are not held together are separate bodies."
             if soft
             else "check its unit; without the layer the parts are glued.",
         )

@@ -125,7 +125,8 @@ def require_plausible_material(
     if fitting:
         name, other = fitting[0]
         hint = (
-            f"with units: {name} it would be {other.density_in_words} and {other.modulus_in_words}."
+            f"with units: {name} they would be {other.density_in_words} and "
+            f"{other.modulus_in_words}."
         )
     used = f" in {units.name}" if units is not None else ""
     raise InputError(

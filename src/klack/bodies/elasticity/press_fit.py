@@ -129,7 +129,7 @@ def pressed_state(
         raise JointError(
             joints[-1].name,
             got="joints that meet in a corner",
-            expected="one overlap at every node",
+            expected="a single overlap at every node",
             hint="give edges of one cylinder the same name.",
         )
     normal = np.vstack(
@@ -185,9 +185,10 @@ def _require_all_pressed(body: "PartedBody", joints: Sequence[Joint]) -> None:
         if np.any(np.abs(joint.height(normal)) < 1.0 - _LEVEL):
             raise JointError(
                 joint.name,
-                got="a part of the faces where '{}' and '{}' meet".format(*joint.solids),
-                expected="a fit for all of them that are not at a right angle to the axis",
-                hint="give all faces of one cylinder the same name, others a fit of their own.",
+                got="only part of the faces where '{}' and '{}' meet".format(*joint.solids),
+                expected="a fit for all of these faces that are not perpendicular to the axis",
+                hint="give all faces of one cylinder the same name, and other faces a fit of "
+                "their own.",
             )
 
 
@@ -396,8 +397,8 @@ def _glued_parts(apart: Mesh, joints: Sequence[Joint | FlatJoint]) -> list[set[s
             raise JointError(
                 joint.name,
                 got="'{}' and '{}', glued to each other by other parts".format(*joint.solids),
-                expected="parts that only this joint holds together",
-                hint="leave out the part that joins them: a later weld leaves the joint as it is.",
+                expected="parts held together only by this joint",
+                hint="leave out the part that joins them: a later weld does not change the joint.",
             )
     return parts
 

@@ -104,7 +104,7 @@ class RefinedFactorization(Closing):
             former, error = error, _products(R, Z)
             P = Z + P * np.maximum(turn, 0.0)
         raise ConvergenceError(
-            f"solutions through a factor in single precision: {self.size} degrees of freedom did "
+            f"solutions with a factor in single precision: {self.size} degrees of freedom did "
             f"not converge in {_ROUNDS} rounds.\n"
             "Try: a machine with twice the memory, or larger elements away from the contact."
         )
@@ -208,7 +208,7 @@ class Flexibility(Closing):
             refused = error
         budget.tell(
             f"memory of '{budget.name}': got {refused.got}, expected {refused.expected}: the "
-            "factor is taken in single precision, and solutions are refined"
+            "factor is computed in single precision, and solutions are refined"
         )
         try:
             rough = factorize(

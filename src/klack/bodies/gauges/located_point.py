@@ -83,10 +83,10 @@ def locate(
     if best.distance > _SNAP * size:
         raise InputError(
             where,
-            got=f"a point at {_text(point, pose)}, {format_si(best.distance, 'm')} outside of the "
+            got=f"a point at {_text(point, pose)}, {format_si(best.distance, 'm')} outside the "
             "body",
             expected=f"a point of the body; the nearest one is {_text(best.place, pose)}",
-            hint="take that one, or correct the coordinates: they count in the drawing.",
+            hint="use that point, or correct the coordinates, which refer to the drawing.",
         )
     near = best.distance + _SHARED * size
     return tuple(item for item in found if item.distance <= near)

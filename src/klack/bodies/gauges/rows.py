@@ -91,9 +91,9 @@ def displacement_row(mesh: Mesh, line: Line) -> Floats:
     if isinstance(line.direction, str):
         raise InputError(
             f"{line.where}: direction",
-            got="'around', along which a body of revolution does not move",
+            got="'around', a direction in which a body of revolution does not move",
             expected="r or z",
-            hint="strain and stress have that direction.",
+            hint="only strain and stress have that direction.",
         )
     row = np.zeros((mesh.node_count, mesh.dimension))
     for weight, place in line.places():

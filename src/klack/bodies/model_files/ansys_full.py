@@ -143,7 +143,7 @@ def _places(
             str(file.path),
             got=f"{equations} equations of {len(nodes)} nodes with {len(labels)} directions",
             expected="nodes that all have the same degrees of freedom",
-            hint="export a model of solid elements alone; no mass, contact or beam elements.",
+            hint="export a model of solid elements only, without mass, contact or beam elements.",
         )
     if len(marks) != equations or np.any(nodes < 1) or np.any((labels < 1) | (labels > 6)):
         raise _damaged(file.path, "inconsistent nodes, directions or marks")
@@ -173,7 +173,7 @@ def _entries(
             break
     column: NDArray[np.int64] = np.concatenate(columns).astype(np.int64) - 1
     if read != expected or column.min() < 0 or column.max() >= equations:
-        raise _damaged(file.path, f"{read} entries instead of {expected}, or columns outside")
+        raise _damaged(file.path, f"{read} entries instead of {expected}, or columns out of range")
     row = np.repeat(column[np.cumsum(lengths) - 1], lengths)
     return row, column, np.concatenate(values)
 

@@ -57,7 +57,9 @@ def read_matrix_market(path: Path, name: str | None, role: Role | None) -> Syste
             raise _damaged(path, f"'{words}' as sizes", "a square matrix")
         room = path.stat().st_size // _LEAST_BYTES
         if max(sizes) > room or (not entries and sizes[0] ** 2 > 2 * room + 2 * sizes[0]):
-            raise _damaged(path, f"{sizes} as sizes", "no more numbers than the file has bytes")
+            raise _damaged(
+                path, f"{sizes} as sizes", "at most as many numbers as the file has bytes"
+            )
         if entries:
             table = number_rows(stream, 3, where=str(path), line=line, comments=b"%")
             if len(table) != sizes[2]:
@@ -152,7 +154,7 @@ def read_abaqus_mtx(path: Path, name: str | None, role: Role | None) -> SystemMa
         raise InputError(
             str(path),
             got=f"an internal node {table[:, [0, 2]].min():g}",
-            expected="nodes of the mesh alone",
+            expected="only nodes of the mesh",
             hint="remove contact, couplings, connectors and hybrid elements from the "
             "model that writes the matrices.",
         )
@@ -233,5 +235,5 @@ def read_calculix_storage(path: Path, name: str | None, role: Role | None) -> Sy
     rows = None
     if beside.is_file():
         rows = read_row_places(beside)
-        notes = (*notes, f"rows as {beside.name} says")
+        notes = (*notes, f"rows as in {beside.name}")
     return SystemMatrix(path=path, name="", matrix=matrix, rows=rows, notes=notes)

@@ -55,7 +55,7 @@ class _Budget:
     def take(self, size: int) -> None:
         self.left -= size
         if self.left < 0:
-            raise _damaged(self.path, "more numbers than it can hold")
+            raise _damaged(self.path, "more numbers than fit into the file")
 
 
 @dataclass(frozen=True)
@@ -190,7 +190,7 @@ def _matrix(budget: _Budget, data: memoryview, order: str, depth: int) -> tuple[
         raise _damaged(budget.path, "structures nested too deeply")
     flags = _integers(budget, next(parts, None), order)
     if len(flags) < 1:
-        raise _damaged(budget.path, "a variable without kind")
+        raise _damaged(budget.path, "a variable without a type")
     kind, marks = int(flags[0]) & 0xFF, int(flags[0]) >> 8 & 0xFF
     if kind not in (_CELL, _STRUCTURE, _OBJECT, _TEXT, _SPARSE, *_NUMERIC):
         return "", None  # functions and opaque objects have another order
@@ -219,7 +219,7 @@ def _raw(budget: _Budget, element: _Element | None, order: str) -> NDArray[Any]:
     if element is None:
         raise _damaged(budget.path, "a variable without numbers")
     if element.kind not in _DTYPE:
-        raise _damaged(budget.path, f"numbers of the unknown kind {element.kind}")
+        raise _damaged(budget.path, f"numbers of the unknown type {element.kind}")
     dtype = np.dtype(order + _DTYPE[element.kind])
     if len(element.data) % dtype.itemsize:
         raise _damaged(budget.path, "half a number")
@@ -266,7 +266,7 @@ def _sparse(
     count = int(starts[-1])
     rows = rows[:count]
     if count and (rows.min() < 0 or rows.max() >= shape[0]):
-        raise _damaged(budget.path, "a sparse matrix with rows outside of it")
+        raise _damaged(budget.path, "a sparse matrix with rows out of range")
     budget.take(24 * count)
     matrix = csc_array(
         (values[:count].astype(np.complex128 if is_complex else np.float64), rows, starts),
@@ -278,7 +278,7 @@ def _sparse(
 
 def _text(budget: _Budget, element: _Element | None) -> str:
     if element is None:
-        raise _damaged(budget.path, "a variable without name")
+        raise _damaged(budget.path, "a variable without a name")
     return bytes(element.data).rstrip(b"\0").decode("latin-1")
 
 
@@ -337,5 +337,5 @@ def _structures(
 
 def _inner(budget: _Budget, element: _Element, order: str, depth: int) -> MatValue:
     if element.kind != _MATRIX:
-        raise _damaged(budget.path, f"an element of kind {element.kind} in a structure")
+        raise _damaged(budget.path, f"an element of type {element.kind} in a structure")
     return _matrix(budget, element.data, order, depth + 1)[1]

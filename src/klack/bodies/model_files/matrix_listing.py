@@ -135,7 +135,9 @@ def _blocks(path: Path, text: Iterable[str]) -> tuple[list[_Block], Texts]:
         values = _numbers(plain)
         if values is not None:
             if values and open_block is None:
-                raise _refused(path, number, "numbers before any name", "the name of a matrix")
+                raise _refused(
+                    path, number, "numbers before the first name", "the name of a matrix"
+                )
             if values and open_block is not None:
                 open_block.add(values)
             continue
@@ -260,7 +262,7 @@ def _from_market(path: Path, block: _Block, size: int) -> NDArray[np.float64]:
     index = table[:, :2]
     inside = (index >= 1) & (index <= [rows, columns]) & (index == np.round(index))
     if not np.all(inside):
-        raise _refused(path, block.line, "an entry outside of the matrix", f"{rows} x {columns}")
+        raise _refused(path, block.line, "an entry outside the matrix", f"{rows} x {columns}")
     i, j = index.astype(np.int64).T - 1
     matrix[i, j] = table[:, 2]
     if block.symmetric:

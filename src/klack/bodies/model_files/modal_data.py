@@ -58,7 +58,7 @@ def read_modal_data(path: Path) -> FileModalData:
             f"{path}: mode {worst + 1}",
             got=f"a modal mass of {data.modal_mass[worst]:g}",
             expected="a modal mass above 0 (1 for mass-normalised shapes)",
-            hint="export mass-normalised shapes; without modal mass their size has no meaning.",
+            hint="export mass-normalised shapes; without the modal mass their scale is undefined.",
         )
     return data
 
@@ -85,7 +85,7 @@ def _of_arrays(held: NamedArrays) -> FileModalData:
             f"{held.path}: residual",
             got=f"{residual.shape[0]} x {residual.shape[1]} numbers",
             expected=f"{ports} x {ports}: from every port to every port",
-            hint="leave it out if it is unknown.",
+            hint="leave the residual out if it is unknown.",
         )
     labels = held.find_text(*_LABELS, group=group)
     return FileModalData(
@@ -175,7 +175,7 @@ def _of_table(path: Path) -> FileModalData:
     if not own:
         raise InputError(
             f"{path}, line {lines[0][0]}",
-            got="no column of a port",
+            got="no column for a port",
             expected="at least one, with the mass-normalised shape",
             hint="add a column for each port.",
         )
@@ -195,7 +195,10 @@ def _cells(path: Path, number: int, line: str, mark: str) -> list[str]:
         return [cell.strip() for cell in next(csv.reader([line], delimiter=mark))]
     except (csv.Error, StopIteration) as error:
         raise InputError(
-            f"{path}, line {number}", got="a broken line", expected="a line of CSV", hint="mend it."
+            f"{path}, line {number}",
+            got="a broken line",
+            expected="a line of a CSV file",
+            hint="mend it.",
         ) from error
 
 

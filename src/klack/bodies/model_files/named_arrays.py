@@ -161,7 +161,7 @@ def _collect(
 def _numpy(path: Path) -> Read:
     arrays: dict[str, NDArray[np.float64]] = {}
     texts: dict[str, tuple[str, ...]] = {}
-    hint = "write it again with numpy.savez, arrays of numbers and texts alone."
+    hint = "write it again with numpy.savez, only arrays of numbers and texts."
     with foreign_reading(str(path), "a NumPy file", hint), zipfile.ZipFile(path) as archive:
         size = sum(item.file_size for item in archive.infolist())
         if size > _LARGEST:
@@ -185,8 +185,8 @@ def _entry(path: Path, archive: zipfile.ZipFile, item: zipfile.ZipInfo) -> NDArr
         lambda shape, dtype: InputError(
             str(path),
             got=f"'{item.filename}' of shape {shape} and type {dtype}",
-            expected="numbers or texts, as many as the file holds",
-            hint="store plain arrays; objects are refused.",
+            expected="numbers or texts, no more than the file holds",
+            hint="store plain arrays; objects are rejected.",
         ),
     )
 

@@ -56,7 +56,7 @@ class Op4Header:
                 f"{where}: {name}",
                 got=f"a matrix of {abs(rows)} rows, {columns} columns and type {kind}",
                 expected="a square matrix of type 1 or 2 (real)",
-                hint="write K and M alone, of a model without damping.",
+                hint="write only K and M, of a model without damping.",
             )
         return cls(
             name=name,
@@ -164,7 +164,7 @@ def _damaged(where: str) -> InputError:
     return InputError(
         where,
         got="a string of numbers that does not fit its column",
-        expected="strings inside of the matrix",
+        expected="strings inside the matrix",
         hint="the file is damaged; write it again.",
     )
 

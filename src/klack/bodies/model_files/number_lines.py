@@ -107,7 +107,7 @@ def whole_numbers(where: str, values: NDArray[np.float64], what: str) -> NDArray
         raise InputError(
             where,
             got=f"{values[wrong].flat[0]:g} as {what}",
-            expected="a whole number from 1",
+            expected="a whole number of 1 or more",
             hint="the file is damaged, or of another kind.",
         )
     return values.astype(np.int64)

@@ -140,7 +140,7 @@ def _of_nastran(path: Path) -> FileReducedMatrices:
         raise InputError(
             str(path),
             got=f"{rows} rows of stiffness and {M.matrix.shape[0]} of mass",
-            expected=f"as many of both, {_MOST_ROWS} at most",
-            hint="full matrices go into 'matrices'; this is for reduced ones.",
+            expected=f"an equal number of both, at most {_MOST_ROWS}",
+            hint="put full matrices into 'matrices'; this key is for reduced ones.",
         )
     return FileReducedMatrices(path=path, K=K.matrix.toarray(), M=M.matrix.toarray())

@@ -65,7 +65,7 @@ def triplet_matrix(where: str, row: Any, column: Any, value: Any, shape: Any) ->
         raise InputError(
             where,
             got=f"{len(row)} rows, {len(column)} columns and {len(value)} values",
-            expected="as many whole numbers of each",
+            expected="an equal number of each, all of them whole numbers",
             hint="the file is damaged; store the matrix again.",
         )
     row, column, value = row.astype(np.int64), column.astype(np.int64), value.astype(np.float64)
@@ -138,7 +138,7 @@ class _Arrays:
             lambda shape, dtype: InputError(
                 f"{self.path}: {name}",
                 got=f"an array of shape {shape} and type {dtype}",
-                expected="numbers, as many as the file holds",
+                expected="numbers, no more than the file holds",
                 hint=_HINT,
             ),
         )

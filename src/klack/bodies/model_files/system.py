@@ -205,11 +205,14 @@ def _require_full(system: FileSystem, nodes: int, dimension: int) -> None:
     rows = system.K.shape[0]
     if rows == dimension * nodes:
         return
-    hint = "give the node and direction of each row with 'dofs'; constrained ones may be missing."
+    hint = (
+        "give the node and direction of each row with 'dofs'; constrained degrees of freedom "
+        "may be missing."
+    )
     if rows % nodes == 0:
         hint = (
             f"the matrices have {rows // nodes} degrees of freedom per node: use solid elements "
-            "without rotations, and 'model: axisymmetric' for r and z alone."
+            "without rotations, and 'model: axisymmetric' if there are only r and z."
         )
     raise InputError(
         system.where,
@@ -228,5 +231,5 @@ def _require_translations(where: str, rows: RowPlaces, dimension: int) -> None:
             got=f"direction {rows.direction[turned][0]} at node {rows.node[turned][0]} and "
             f"{np.count_nonzero(turned)} rows of that kind",
             expected=f"the directions {', '.join(letters)}",
-            hint="use solid elements alone: no shells, beams, couplings or rotary inertia.",
+            hint="use only solid elements: no shells, beams, couplings or rotary inertia.",
         )

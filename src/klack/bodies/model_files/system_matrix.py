@@ -129,7 +129,7 @@ def symmetric_matrix(
     if A.nnz < len(value):
         raise InputError(
             where,
-            got=f"{len(value) - A.nnz} entries that are given twice",
+            got=f"{len(value) - A.nnz} duplicate entries",
             expected="each entry once",
             hint="write the matrix again; do not join files of several steps.",
         )
@@ -231,7 +231,7 @@ def read_row_places(path: Path) -> RowPlaces:
     ... for rotations.
     """
     if path.stat().st_size > _LARGEST:
-        hint = "give the table of node and direction alone."
+        hint = "give only the table of node and direction."
         raise InputError(str(path), got="more than 1 GB", expected="a table", hint=hint)
     node: list[int] = []
     direction: list[int] = []

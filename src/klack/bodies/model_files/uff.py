@@ -42,7 +42,7 @@ def uff_datasets(path: Path, lines: list[str]) -> Iterator[tuple[str, int, int]]
         while end < len(lines) and lines[end].strip() != "-1":
             end += 1
         if end == len(lines):
-            raise uff_refusal(path, len(lines), f"dataset {kind} without end", "-1")
+            raise uff_refusal(path, len(lines), f"dataset {kind} without an end", "-1")
         yield kind, i + 2, end
         i = end + 1
 
@@ -244,7 +244,7 @@ def read_uff_modes(path: Path) -> FileModalData:
     if len({mode.nodes for mode in modes}) > 1 or len({m.shapes.shape for m in modes}) > 1:
         odd = next(mode for mode in modes if mode.nodes != modes[0].nodes or mode is modes[-1])
         raise uff_refusal(
-            path, odd.line, "a mode with other nodes than the first", "the same nodes"
+            path, odd.line, "a mode with different nodes from the first", "the same nodes"
         )
     width = modes[0].shapes.shape[1]
     return FileModalData(

@@ -215,8 +215,8 @@ def _at_eigenfrequency(body: ElasticBody, shift: float, square: float) -> InputE
         expected=f"a frequency that is {100 * _NEAR:g} % or more from what the contact excites"
         if square
         else "a shift away from 0 Hz: the body is free",
-        hint="a shift below zero (-20 kHz: s = -(2 pi 20 kHz)^2) is at no eigenfrequency; take one "
-        "of the order of the first elastic frequency.",
+        hint="a shift below zero (-20 kHz: s = -(2 pi 20 kHz)^2) is never at an eigenfrequency; "
+        "use one of the order of the first elastic frequency.",
     )
 
 
@@ -224,10 +224,10 @@ def _parallel(body: ElasticBody, shifts: Sequence[float], i: int, sine: float) -
     others = ", ".join(format_si(frequency_of_shift(s), "Hz") for s in shifts[:i])
     return InputError(
         f"shifted attachment modes of body '{body.name}': shifts",
-        got=f"{format_si(frequency_of_shift(shifts[i]), 'Hz')} after {others}: beside the kept "
-        f"modes only {sine:.1g} of its attachment mode is new",
-        expected=f"{_PARALLEL:g} or more, else the modes are parallel but for round-off",
-        hint="set the shifts farther apart, keep fewer modes, or take one shift less.",
+        got=f"{format_si(frequency_of_shift(shifts[i]), 'Hz')} after {others}: only {sine:.1g} "
+        "of its attachment mode is independent of the kept modes",
+        expected=f"{_PARALLEL:g} or more; otherwise the modes are parallel except for round-off",
+        hint="move the shifts farther apart, keep fewer modes, or use one shift fewer.",
     )
 
 

@@ -47,7 +47,7 @@ class ModalDamping:
                 "ModalDamping.ratio",
                 got=f"{ratio.size} ratios",
                 expected=f"one ratio, or one for each of the {int(elastic.sum())} elastic modes",
-                hint="give a single number, or repeat the reduction with that many modes.",
+                hint="give a single number, or reduce again with that many modes.",
             )
         result = np.zeros(omega.shape)
         result[elastic] = ratio

@@ -100,9 +100,9 @@ def body_of_craig_bampton(
             raise InputError(
                 f"{where}: {key}",
                 got=f"{matrix[i, j]:.6g} in row {i + 1}, column {j + 1} and {matrix[j, i]:.6g} "
-                "across",
+                "in the transposed place",
                 expected="a symmetric matrix",
-                hint="rotating and damping terms are not supported; export K and M alone.",
+                hint="rotating and damping terms are not supported; export only K and M.",
             )
     omega2, shapes = _all_modes(where, 0.5 * (K + K.T), 0.5 * (M + M.T))
     limit = (2.0 * np.pi * RIGID_FREQUENCY) ** 2 + 1e-12 * float(np.max(np.abs(omega2)))
@@ -110,7 +110,7 @@ def body_of_craig_bampton(
         raise InputError(
             f"{where}: K",
             got=f"a negative stiffness (lowest omega^2 {omega2[0]:.4g} 1/s^2)",
-            expected="a stiffness of 0 or more in every direction: else the body is unstable",
+            expected="a stiffness of 0 or more in every direction: otherwise the body is unstable",
             hint="export K without preload and geometric stiffness.",
         )
     rigid = omega2 < limit
@@ -203,7 +203,7 @@ def fit_residual(
     if not apart <= _AGREEMENT:
         raise InputError(
             where,
-            got=f"responses that differ from the modes by {100 * apart:.3g} % in the median",
+            got=f"responses with a median difference of {100 * apart:.3g} % from the modes",
             expected="at most 10 %",
             hint="modes and responses belong to different bodies, supports or units.",
         )

@@ -133,8 +133,8 @@ def _split_rigid(
             f"{where}: poles at zero",
             got=f"{V0.shape[1]} of them in {chains} chains",
             expected="two for each rigid motion: its displacement and its velocity",
-            hint="a body is free or supported; a drag on the rigid motion is not part of "
-            "it, and integrated outputs are not possible.",
+            hint="a body is free or supported; drag on the rigid motion is not part of it, and "
+            "integrated outputs are not possible.",
         )
     inner = W0.T @ V0
     into, out = np.linalg.solve(inner, W0.T @ B), C @ V0
@@ -248,7 +248,7 @@ def _overdamped(where: str, found: _Poles, wanted: NDArray[np.bool_]) -> list[_P
             raise InputError(
                 f"{where}: real pole at {found.poles[i].real:.6g} 1/s",
                 got="no second real pole with the opposite residue",
-                expected="overdamped modes have two",
+                expected="overdamped modes have a pair of real poles",
                 hint="filters, actuators and drag on the rigid motion are not part of a body.",
             )
         j = left.pop(k)
@@ -283,9 +283,10 @@ def _check_gram(where: str, ports: Sequence[str], G: Complex, largest: float) ->
             where,
             got=f"{G[i, j].real:.6g} 1/kg from '{ports[j]}' to '{ports[i]}', "
             f"{G[j, i].real:.6g} 1/kg back ({100 * apart[i, j] / own:.2g} % apart)",
-            expected="the same both ways (reciprocity): else a contact creates or removes energy",
-            hint="weight the displacement of a port like its force; a single node for a "
-            "loaded area is different.",
+            expected="the same in both directions (reciprocity): otherwise a contact creates or "
+            "removes energy",
+            hint="weight the displacement of a port like its force; the displacement of a single "
+            "node is not that of a loaded area.",
         )
     values, vectors = np.linalg.eigh(0.5 * (G.real + G.real.T))
     if values[0] < -limit:

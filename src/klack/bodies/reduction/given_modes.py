@@ -122,7 +122,7 @@ def _residual(where: str, modes: ModesAtPorts) -> Floats:
         raise InputError(
             f"{where}: feedthrough",
             got=f"{D[i, j]:.6g} m/N from '{b}' to '{a}', {D[j, i]:.6g} m/N back",
-            expected="the same both ways (reciprocity)",
+            expected="the same in both directions (reciprocity)",
             hint="force and displacement of a port must be weighted alike.",
         )
     D = 0.5 * (D + D.T)
@@ -180,15 +180,15 @@ def _checked_mass(where: str, axial: Floats, rank: int, mass: float | None) -> f
         raise InputError(
             f"{where}: mass",
             got=f"{rank} rigid motions at the ports, and no mass",
-            expected="the mass: it separates translation from rotation",
+            expected="the mass, which separates translation from rotation",
             hint="add 'mass: 5 g' to the reduced model, or give ports on the axis only.",
         )
     if mass is not None and abs(found - mass) > _MASS * mass:
         raise InputError(
             f"{where}: mass",
             got=f"{found:.6g} kg from the rigid motion of the model",
-            expected=f"{mass:.6g} kg, as the case says, within 1 %",
-            hint="check 'units', and that the port is on the axis: off-axis a body "
-            "rotates as well and seems lighter.",
+            expected=f"{mass:.6g} kg within 1 %, as in the case",
+            hint="check 'units', and that the port is on the axis: off-axis the body also "
+            "rotates and seems lighter.",
         )
     return found if mass is None or rank == 1 else float(mass)

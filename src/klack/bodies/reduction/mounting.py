@@ -125,7 +125,7 @@ def _by_order(
         body.order > 1,
         f"mounts of body '{body.name}'",
         got=f"Fourier order {body.order}",
-        expected="0 or 1, in which rigid motions are",
+        expected="0 or 1, the orders of rigid motions",
         hint="other orders do not move a mounting surface as a whole.",
     )
     r, z = body.mesh.points.T

@@ -119,7 +119,7 @@ def _weights(where: str, values: ArrayLike) -> NDArray[np.float64]:
             where,
             got=f"an array of shape {array.shape} with {np.count_nonzero(array)} non-zero entries",
             expected="one finite number per degree of freedom, not all of them zero",
-            hint="check that the surface has faces and that the load is not empty.",
+            hint="check that the surface has faces and that the load is not zero.",
         )
     array.setflags(write=False)
     return array
@@ -194,7 +194,7 @@ def node_set_port(mesh: Mesh, node_set: str, direction: Direction, *, name: str)
     if nodes is None or not len(nodes):
         raise InputError(
             where,
-            got="a name that the mesh does not have" if nodes is None else "a set without nodes",
+            got="a name that is not in the mesh" if nodes is None else "a set without nodes",
             expected=f"one of: {', '.join(sorted(mesh.node_sets)) or 'none'}",
             hint="name the set in geometry.nodes.sets, or in the mesh file.",
         )

@@ -55,7 +55,7 @@ def read_arrays(path: Path, kind: str, version: int, required: Sequence[str]) ->
     except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error, *_OTHERS) as error:
         raise InputError(
             where,
-            got=f"something unreadable ({type(error).__name__})",
+            got=f"unreadable contents ({type(error).__name__})",
             expected=f"a complete {kind} file",
             hint="the file is damaged or not written by klack; write it again.",
         ) from error
@@ -85,7 +85,7 @@ def _check_kind(where: str, arrays: Arrays, kind: str, version: int) -> None:
             where,
             got=f"version {int(arrays['version'])}",
             expected=f"version {version} or older",
-            hint="it was written by a newer version of klack; update this one.",
+            hint="the file was written by a newer version of klack; update klack.",
         )
 
 
@@ -94,7 +94,7 @@ def port_among(known: Sequence[str], name: str, where: str, what: str, hint: str
     if name not in known:
         raise InputError(
             f"{where}: port '{name}'",
-            got=f"a name that {what} does not have",
+            got=f"a name unknown to {what}",
             expected=f"one of: {', '.join(known)}",
             hint=hint,
         )

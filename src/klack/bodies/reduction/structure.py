@@ -127,7 +127,7 @@ class Structure:
 
     def port_index(self, name: str) -> int:
         """Column of a port."""
-        hint = "a contact port is named like its surface; of klack impact 'contact'."
+        hint = "a contact port has the name of its surface; in klack impact its name is 'contact'."
         return port_among(self.port_names, name, f"body '{self.name}'", "the body", hint)
 
     @property

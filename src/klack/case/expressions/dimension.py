@@ -118,7 +118,7 @@ class Dimension:
             if self == dimension_of(kind.unit):
                 return kind.name if kind.bare else f"{kind.name} [{kind.unit}]"
         if self.number:
-            return "a number without unit"
+            return "a number without a unit"
         for kind in KINDS:
             if self.fits(kind.unit):
                 return f"{kind.name} [{kind.unit}]"

@@ -84,7 +84,7 @@ class Expression:
         ('tip_radius',)
         """
         if not isinstance(text, str):
-            _refuse(where, f"{text!r}", 'write it as text: "2 * tip_radius".')
+            _refuse(where, f"{text!r}", 'write the expression as text: "2 * tip_radius".')
         squeezed = " ".join(text.split())
         if len(squeezed) > _LONGEST:
             _refuse(
@@ -156,7 +156,7 @@ class Expression:
                     got=f"'{literal.text}' at character {literal.place + 1} of '{self.text}', "
                     f"where '{word}' is a unit and a parameter",
                     expected="one meaning",
-                    hint=f"write blanks and the operator for the parameter ('2 * {word}', '2 / "
+                    hint=f"write spaces and the operator for the parameter ('2 * {word}', '2 / "
                     f"{word}'), or rename it.",
                 )
 
@@ -194,8 +194,8 @@ def ordered(expressions: Mapping[str, Expression], known: Collection[str]) -> tu
         circle = fault.args[1][::-1]
         raise InputError(
             expressions[circle[0]].where,
-            got=f"expressions in a circle: {' needs '.join(circle)}",
-            expected="expressions that lead back to parameters",
+            got=f"expressions that form a loop: {' needs '.join(circle)}",
+            expected="expressions that depend only on parameters",
             hint=f"write '{circle[0]}' in terms of parameters.",
         ) from None
 
@@ -224,8 +224,8 @@ def _unknown(expression: Expression, name: str, known: Collection[str]) -> Input
 def _taken(expression: Expression, name: str, by: str) -> InputError:
     return InputError(
         expression.where,
-        got=f"the name '{name}', which is {by} too",
-        expected="a name of its own for every parameter and expression",
+        got=f"the name '{name}', which is also {by}",
+        expected="a different name for every parameter and expression",
         hint="remove one of the two, or rename it.",
     )
 
@@ -341,6 +341,6 @@ def _mismatch(whole: Expression, node: Node, got: str, expected: str) -> NoRetur
         whole.where,
         got=f"{got}{place}",
         expected=expected,
-        hint="a literal without unit is a number: give it its unit, or make the parts one kind "
-        "with a parameter or a quotient of parameters.",
+        hint="a literal without a unit is a plain number: give it a unit, or give the parts the "
+        "same kind with a parameter or a quotient of parameters.",
     )

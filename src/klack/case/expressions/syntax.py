@@ -94,7 +94,9 @@ def _token(text: str, at: int) -> Token:
     if match := _SIGN.match(text, at):
         kind = "^" if match[0] == "**" else match[0]
         return Token(kind, match[0], at, match.end())
-    raise UnreadableError(f"'{text[at]}'", at, _ADVICE.get(text[at], "use only what is listed."))
+    raise UnreadableError(
+        f"'{text[at]}'", at, _ADVICE.get(text[at], "use only the operators and functions listed.")
+    )
 
 
 def _number(text: str, at: int, match: re.Match[str]) -> Token:
@@ -129,9 +131,9 @@ def _number(text: str, at: int, match: re.Match[str]) -> Token:
 
 _ADVICE = {
     ".": "name a parameter by its short name, without points.",
-    "=": "write the value alone; a name is given by its key.",
+    "=": "write only the value; its name is the key.",
     "#": "remove the # and what follows it.",
-    "[": "use parentheses; a list has an expression for each value.",
+    "[": "use parentheses; in a list write an expression for each value.",
     "%": "write a share as 5 %, or divide by 100.",
     "·": "write * for a product.",
     "×": "write * for a product.",
@@ -228,7 +230,7 @@ class _Parser:
             raise self._unexpected()
         if any(word.celsius for word in self.words) and len(self.words) > 2:
             word = next(word for word in self.words if word.celsius)
-            hint = f"write it in K: {word.number:g} K; differences of temperatures are in K too."
+            hint = f"write it in K: {word.number:g} K; temperature differences are in K too."
             raise UnreadableError(f"'{word.text}' as a part of an expression", word.start, hint)
         return root
 
@@ -240,7 +242,7 @@ class _Parser:
     def _node(self, start: int, symbol: str, *arguments: Node) -> Node:
         depth = 1 + max(argument.depth for argument in arguments)
         if depth > _DEEPEST:
-            hint = "compute it in several steps, each a parameter."
+            hint = "compute it in several steps, each of them a parameter."
             raise UnreadableError(f"more than {_DEEPEST} levels of nesting", start, hint)
         return self._counted(
             Node(self._since(start), start, symbol=symbol, arguments=arguments, depth=depth)
@@ -250,7 +252,7 @@ class _Parser:
         self.count += 1
         if self.count > _MOST_NODES:
             got = f"more than {_MOST_NODES} numbers, names and operations"
-            hint = "compute it in several steps, each a parameter."
+            hint = "compute it in several steps, each of them a parameter."
             raise UnreadableError(got, node.place, hint)
         return node
 
@@ -283,8 +285,11 @@ class _Parser:
         if self.now.kind != "^":
             return base
         if base.dimension is not None and self.words[self.at - 1].kind != ")":
-            got = f"'{base.text}' to a power"
-            hint = f"write ({base.text})^2 for the power of both, mm^2 for one of the unit."
+            got = f"'{base.text}' raised to a power"
+            hint = (
+                f"write ({base.text})^2 to raise number and unit to the power, mm^2 to raise "
+                "only the unit."
+            )
             raise UnreadableError(got, start, hint)
         self._next()
         with self._level(start):
@@ -349,7 +354,7 @@ class _Parser:
         self.level += 1
         if self.level > _BRACKETS:
             got = f"more than {_BRACKETS} levels of parentheses, signs and powers"
-            hint = "compute it in several steps, each a parameter."
+            hint = "compute it in several steps, each of them a parameter."
             raise UnreadableError(got, start, hint)
         yield
         self.level -= 1
@@ -365,9 +370,11 @@ class _Parser:
         word = self.now
         before = self.words[self.at - 1] if self.at else None
         if word.kind == "":
-            return UnreadableError("an end where a value must follow", word.start, "complete it.")
+            return UnreadableError(
+                "the end of the expression where a value must follow", word.start, "complete it."
+            )
         if word.kind == ",":
-            hint = "use a point as decimal sign: 0.5."
+            hint = "use a decimal point: 0.5."
         elif word.kind == ")" and before is not None and before.kind not in ("number", "name"):
             hint = "write a value there."
         elif word.kind == ")":

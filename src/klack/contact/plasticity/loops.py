@@ -223,8 +223,9 @@ def yielding_loops(
             break
         if state.plastic_strain > _STRAIN:
             limit = (
-                f"plastic strain of {100 * state.plastic_strain:.2g} %, far beyond small strain.\n"
-                "Try: a lower speed, or a yield stress that suits the body."
+                f"plastic strain of {100 * state.plastic_strain:.2g} %, far beyond small "
+                "strain.\n"
+                "Try: a lower speed, or a realistic yield stress."
             )
             break
     first = openings[0]
@@ -342,7 +343,7 @@ def yielding_law(loops: YieldingLoops, modal_compliance: float) -> YieldingLaw:
             raise InputError(
                 "law of faces that yield",
                 got=f"modes with more than the static compliance below {force[i]:.4g} N",
-                expected="a remainder that rises with the force",
+                expected="a remaining indentation that increases with the force",
                 hint="keep fewer modes.",
             )
         along = scipy.interpolate.PchipInterpolator(

@@ -144,8 +144,9 @@ class YieldingBody:
         if self._radius * _WIDER > self._widest:
             raise ConvergenceError(
                 f"elastic-plastic contact: '{self._body.body.name}' yields more than "
-                f"{1e3 * self._radius:.3g} mm from the contact.\nTry: a lower speed, or a yield "
-                "stress that suits the body; this is no local contact any more."
+                f"{1e3 * self._radius:.3g} mm from the contact.\n"
+                "Try: a lower speed, or a realistic yield stress; the contact is not local at "
+                "this depth."
             )
         self._radius *= _WIDER
         load = np.zeros(self._body.body.dof_count)

@@ -112,8 +112,9 @@ def compile_library(
     done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
     if done.returncode != 0 or not library.is_file():
         raise ConvergenceError(
-            f"compiling an FMU for {platform}: {command[0]} failed.\n{done.stderr[:_LOG_HEAD]}\n"
-            "Try: another compiler; the sources need C99 and nothing else."
+            f"compiling an FMU for {platform}: {command[0]} failed.\n"
+            f"{done.stderr[:_LOG_HEAD]}\n"
+            "Try: another compiler; the sources need only C99."
         )
 
 

@@ -41,7 +41,7 @@ class Curves(Dataset):
         axes = ", ".join(f"{name} ({size})" for name, size in sizes.items())
         raise InputError(
             "to_dataframe",
-            got=f"axes of their own: {axes}; {prod(sizes.values()):.2g} rows in one table",
+            got=f"different axes: {axes}; {prod(sizes.values()):.2g} rows in one table",
             expected="curves over one axis",
             hint=f'result.to_dataframe(axis="{next(iter(sizes))}"), or some of the curves: '
             'data[["NAME", "NAME"]].to_dataframe().',
@@ -107,7 +107,7 @@ def curve_of(data: Dataset, name: str, short: Mapping[str, str]) -> DataArray:
     more = f" and {len(near) - _SHOWN} more" if len(near) > _SHOWN else ""
     raise UnknownCurve(
         f"result[{name!r}]",
-        got="a name of several curves" if found else "a name that it does not have",
+        got="a name of several curves" if found else "a name that the result does not contain",
         expected=f"one of: {', '.join(near[:_SHOWN])}{more}",
-        hint="list(result) has all names.",
+        hint="list(result) gives all names.",
     )

@@ -61,7 +61,8 @@ def noise_variables(design: NoiseDesign) -> tuple[dict[str, Variable], dict[str,
             design.net_share,
             {
                 "units": "1",
-                "long_name": "share of the energy of the contact forces that others do not balance",
+                "long_name": "share of the energy of the contact forces that is not balanced by "
+                "others",
             },
         )
     }
@@ -106,7 +107,7 @@ def noise_variables(design: NoiseDesign) -> tuple[dict[str, Variable], dict[str,
     return variables, coordinates
 
 
-_SAID = {"failure": "why there are no measures", "doubts": "what speaks against the numbers"}
+_SAID = {"failure": "why there are no measures", "doubts": "doubts about the numbers"}
 
 
 def points_variables(study: StudyRecord) -> tuple[dict[str, Variable], dict[str, Variable]]:
@@ -153,7 +154,10 @@ def shots_variables(study: ShotsStudy) -> tuple[dict[str, Variable], dict[str, V
     variables["height"] = Variable(
         ("shot", "time"),
         np.vstack([shots.height, centred.height]),
-        {"units": "m", "long_name": "height of the centre of mass above that at first touch"},
+        {
+            "units": "m",
+            "long_name": "height of the centre of mass above its position at first touch",
+        },
     )
     variables["contact_force"] = Variable(
         ("shot", "force_time"),
@@ -165,7 +169,7 @@ def shots_variables(study: ShotsStudy) -> tuple[dict[str, Variable], dict[str, V
         "shot": Variable(
             ("shot",),
             np.append(np.arange(1, count + 1), 0),
-            {"long_name": "number of the shot; 0 is the centred one"},
+            {"long_name": "number of the shot; 0 is the centred shot"},
         ),
         "time": Variable(("time",), shots.time, after),
         "force_time": Variable(("force_time",), shots.force_time, after),
@@ -197,7 +201,7 @@ def strokes_variables(shots: VariantShots) -> tuple[dict[str, Variable], dict[st
         "stroke": Variable(
             ("stroke",),
             np.append(np.arange(shots.strokes.count), -1),
-            {"long_name": "number of the stroke; -1 is the one that starts centred"},
+            {"long_name": "number of the stroke; -1 starts centred"},
         ),
         "time": Variable(("time",), shots.time, {"units": "s", "long_name": "time"}),
     }

@@ -45,7 +45,7 @@ def write_netcdf(table: ResultTable, path: Path) -> Path:
         lines = {key: text for key, text in table.about.items() if text}
         for name, text in zip(identifiers(list(lines)), lines.items(), strict=True):
             file.attrs[_PLACES.get(text[0], name)] = text[1][:_LONGEST]
-        _text(file, "case_text", table.case_text, "case file as it was read")
+        _text(file, "case_text", table.case_text, "case file as read")
         names = identifiers([run.name for run in table.runs], ["case_text"])
         for name, run in zip(names, table.runs, strict=True):
             _write_run(file.create_group(name), run)

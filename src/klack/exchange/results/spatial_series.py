@@ -217,7 +217,7 @@ def _require_solids(case: ValveCase) -> None:
                 f"{case.path or 'case'}: bodies.{name}",
                 got="a half section, whose motion in Fourier orders has no grid",
                 expected="bodies of three dimensions",
-                hint="the report has the line load of the impact; for grids take 'model: swept' "
+                hint="the report has the line load of the impact; for grids use 'model: swept' "
                 "with 'layers: 18' for all bodies.",
             )
 
@@ -250,7 +250,7 @@ def _recorded(run: StrokeVariant, impact: int) -> tuple[SpatialImpact, ModalMome
             expected=f"one of: {', '.join(map(str, known))}" if known else "a recorded impact",
             hint="run the stroke again with this version of klack."
             if old
-            else "the motion of the first 8 impacts of a stroke in three dimensions is recorded.",
+            else "only the first 8 impacts of a stroke in three dimensions are recorded.",
         )
     return found[0], found[1]
 
@@ -299,14 +299,14 @@ def _require_same(name: str, found: BodyShapes, q: Floats, marks: Floats) -> Non
             f"{found.shapes.shape[1]} modes of '{name}', and {q.shape[1]} in the result"
         )
     if len(marks) != len(here) or np.any(np.abs(here - marks) > _SAME * np.abs(here).max()):
-        raise _other_bodies(f"modes of '{name}' with other shapes than those of the result")
+        raise _other_bodies(f"modes of '{name}' whose shapes differ from the result")
 
 
 def _other_bodies(got: str) -> InputError:
     return InputError(
         "bodies of the case in the result",
         got=got,
-        expected="those that the stroke was computed with",
+        expected="the bodies that the stroke was computed with",
         hint="run the stroke again on this machine, with this version of klack.",
     )
 

@@ -288,7 +288,7 @@ def _variant(variant: StrokeVariant, step: float) -> ResultRun:
 
 
 def _interface(stop: str, record: InterfaceRecord) -> tuple[ResultAxis, list[ResultChannel]]:
-    end = "" if record.complete else "; cut off, the record was full"
+    end = "" if record.complete else "; truncated because the record was full"
     axis = ResultAxis(
         name=f"{stop}_time",
         quantity="time",

@@ -105,7 +105,8 @@ class ResultRun:
                 raise InputError(
                     f"result '{self.name}': channel '{channel.name}'",
                     got=f"values of shape {channel.values.shape} over '{channel.axis}'",
-                    expected=f"one value for each of the {sizes.get(channel.axis, 0)} of its axis",
+                    expected=f"one value for each of the {sizes.get(channel.axis, 0)} points of "
+                    f"its axis",
                     hint="the stored result is damaged; run the case again.",
                 )
 

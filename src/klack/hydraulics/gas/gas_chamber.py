@@ -53,10 +53,12 @@ class GasChamber(Component):
     heat_conductance: ThermalConductance | None = Field(
         default=None,
         ge=0,
-        description="Heat flow from the wall per temperature, coefficient times area; default "
-        "none: adiabatic.",
+        description="Heat flow from the wall per temperature difference, coefficient times "
+        "area; default none: adiabatic.",
     )
-    isothermal: bool = Field(default=False, description="The gas is as warm as the wall.")
+    isothermal: bool = Field(
+        default=False, description="Whether the gas stays at the temperature of the wall."
+    )
     wall_temperature: Temperature | None = Field(
         default=None, gt=0, description="Default that of the surroundings."
     )

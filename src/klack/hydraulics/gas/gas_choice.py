@@ -24,7 +24,9 @@ class GasChoice(NamedSection):
     ``viscosity``.
     """
 
-    name: Text = Field(description=f"Of the library: {one_of(GASES)}; or of your own gas.")
+    name: Text = Field(
+        description=f"A gas of the library: {one_of(GASES)}; or a name for your own gas."
+    )
     gas_constant: GasConstant | None = Field(
         default=None, gt=0, description="Specific: the molar one over the molar mass."
     )
@@ -33,7 +35,7 @@ class GasChoice(NamedSection):
     )
     viscosity: DynamicViscosity | None = Field(default=None, gt=0, description="At 20 degC.")
     highest_pressure: Pressure | None = Field(
-        default=None, gt=0, description="Up to which your own gas is ideal; default no limit."
+        default=None, gt=0, description="Limit up to which your own gas is ideal; default: none."
     )
 
     @model_validator(mode="after")
@@ -51,7 +53,7 @@ class GasChoice(NamedSection):
             raise CaseProblem(
                 (given[0],),
                 got=f"{given[0]} for '{self.name}', a gas of the library",
-                expected="the name alone, or a name of your own",
+                expected="only the name, or a name of your own",
                 hint="give your gas another name, and all of gas_constant, kappa and viscosity.",
                 on_key=True,
             )

@@ -34,7 +34,7 @@ _FIRST_STEP, _LONGER = 1e-7, 8.0  # of pseudo-time to steady flow [s]
 _LONG, _LONGEST = 1e3, 1e12  # from here on it may be found; it must be here
 _FOUND, _NEARLY = 1e-11, 1e-6  # change of each pressure in the last of these steps
 _FAILURES = {
-    1: "the gas does not settle in this step",
+    1: "the gas does not converge in this step",
     2: "a chamber has no volume left (V_0 + A y)",
 }
 _STATE_IT = "Try: state the 'pressure' of these chambers, and check their outlets."
@@ -149,7 +149,8 @@ class GasNetwork:
             state[4 : OF_CHAMBER * n : OF_CHAMBER] = 1e30  # fully implicit: nothing swings
         if left > _NEARLY:
             raise ConvergenceError(
-                f"{_names(free)}, at the start: the pressures find no steady flow.\n{_STATE_IT}"
+                f"{_names(free)}, at the start: no steady flow was found for the pressures.\n"
+                f"{_STATE_IT}"
             )
         return {handle: float(state[OF_CHAMBER * i + 2]) for i, handle in enumerate(free)}
 
@@ -299,7 +300,7 @@ def _pressure_limit(name: str, gas: Gas) -> LimitRow:
         law=f"the ideal gas '{gas.name}'",
         source=gas.source,
         effect=effect,
-        advice="take masses and flows as estimates, or check the pressure and its unit.",
+        advice="treat masses and flows as estimates, or check the pressure and its unit.",
         channel=f"{name} pressure",
     )
 

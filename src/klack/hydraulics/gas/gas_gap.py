@@ -55,7 +55,7 @@ class GasGap(Component):
                 valid=(-most, most),
                 law=f"the laminar gap '{rows.component}'",
                 source="Reynolds number 1000 of a narrow gap",
-                effect=lambda value: "The flow is turbulent there, and less than computed.",
+                effect=lambda value: "The flow is turbulent there, and smaller than computed.",
                 advice="check clearance and length; a wide gap is a gas-orifice.",
                 channel=f"{rows.component} mass flow",
             )

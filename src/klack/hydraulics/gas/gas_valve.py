@@ -50,10 +50,10 @@ class GasValve(RestrictionComponent):
     }
 
     lift: tuple[Length, ...] | None = Field(
-        default=None, min_length=2, description="Lifts of the table, rising."
+        default=None, min_length=2, description="Lifts of the table, ascending."
     )
     conductance: tuple[SonicConductance, ...] | None = Field(
-        default=None, min_length=2, description="Sonic conductance C, one for each lift; of air."
+        default=None, min_length=2, description="Sonic conductances C with air, one for each lift."
     )
     diameter: Length | None = Field(
         default=None, gt=0, description="Of the edge of the seat, instead of a table."
@@ -69,7 +69,7 @@ class GasValve(RestrictionComponent):
     )
     start_lift: Length = Field(default=0.0, description="Lift at the start.")
     leak: SonicConductance = Field(
-        default=0.0, ge=0, description="Sonic conductance that remains when it is closed."
+        default=0.0, ge=0, description="Sonic conductance that remains in the closed state."
     )
 
     @model_validator(mode="after")

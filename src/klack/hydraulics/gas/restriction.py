@@ -29,7 +29,9 @@ class RestrictionComponent(Component):
     cracking_pressure: Pressure = Field(
         default=0.0, ge=0, description="Pressure drop up to which nothing flows."
     )
-    one_way: bool = Field(default=False, description="Lets no gas pass from b to a.")
+    one_way: bool = Field(
+        default=False, description="Whether gas is kept from flowing from b to a."
+    )
 
     def _require_with(self, names: tuple[str, ...], chosen: str, why: str) -> Self:
         for name in names:

@@ -109,7 +109,7 @@ def read_entry(path: Path, key: str) -> Entry:
         try:
             entry = _fill(file, json.loads(header), key, size - _PREFIX - length, digest)
         except (ValueError, KeyError, TypeError, RecursionError, OverflowError) as error:
-            raise DamagedEntry("its header makes no sense") from error
+            raise DamagedEntry("its header is invalid") from error
         if digest.digest() != prefix[len(_MAGIC) : -8]:
             raise DamagedEntry("its checksum is wrong")
     return entry
@@ -140,7 +140,7 @@ def _fill(file: BufferedReader, header: Any, key: str, left: int, digest: Any) -
         array = np.empty(shape[::-1] if columns else shape, dtype=kind)
         view = _raw_bytes(array)
         if view.nbytes and file.readinto(view) != view.nbytes:
-            raise DamagedEntry("it is cut off")
+            raise DamagedEntry("it is truncated")
         digest.update(view)
         arrays[name] = array.T if columns else array
     return Entry(arrays=arrays, text=str(header["text"]))
@@ -158,5 +158,5 @@ def _known(kind: object) -> np.dtype[Any]:
 
 def _bytes(kind: np.dtype[Any], shape: tuple[Any, ...]) -> int:
     if not all(type(n) is int and n >= 0 for n in shape) or len(shape) > 4:
-        raise DamagedEntry("a shape that no array has")
+        raise DamagedEntry("a shape that is not valid for an array")
     return kind.itemsize * math.prod(shape)

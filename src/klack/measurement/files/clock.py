@@ -103,7 +103,7 @@ def clock_factor(unit: str, step: float, where: str) -> tuple[float, str]:
     if not no_unit(unit):
         return unit_factor(unit, TIME, where).factor, ""
     if step <= SLOWEST:
-        return 1.0, f"{where}: the time has no unit; taken as seconds."
+        return 1.0, f"{where}: the time has no unit and is taken as seconds."
     raise InputError(
         where,
         got=f"a time without unit, with steps of {step:g}",

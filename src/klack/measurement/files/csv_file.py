@@ -113,7 +113,7 @@ class NumberTable:
         if error == TOO_MANY:
             return InputError(
                 where,
-                got=f"a value '{cell.strip()}' too many",
+                got=f"a surplus value '{cell.strip()}'",
                 expected=f"{self._dialect.width} values ({self._dialect})",
                 hint="check the line; every row needs the same columns.",
             )
@@ -180,24 +180,24 @@ class CsvFile(Recording):
         notes: list[str] = []
         if above := rows_above(texts, dialect):
             notes.append(
-                f"{path.name}: {len(above)} row{'s' * (len(above) > 1)} above the first whole "
-                f"ones, from line {above[0] + 1} on, left out."
+                f"{path.name}: {len(above)} row{'s' * (len(above) > 1)} above the first complete "
+                f"rows, from line {above[0] + 1}, left out."
             )
         if len(header.names) == dialect.width:
             columns = tuple(Column(name, "", name) for name in header.names)
         if columns is None:
-            notes.append(f"{path.name}: no names; columns are called column 1, column 2, ...")
+            notes.append(f"{path.name}: no column names; they are called column 1, column 2, ...")
             columns = tuple(Column(f"column {k + 1}", "", "") for k in range(dialect.width))
             clocks = _first_as_clock(path, self._table, time_step, notes)
         else:
             clocks = _named_clocks(path, self._table, columns, time_step, notes)
         channels = self._channels(columns, clocks, time_step, header, notes)
         if not channels and self._table.rows:
-            notes.append("all values are missing or signs of over range")
+            notes.append("all values are missing or marked as over range")
         longest = max((channel.count for channel in channels), default=0)
         if header.count and longest != header.count:
             notes.append(
-                f"{path.name}: the header speaks of {header.count} rows, the table has {longest}."
+                f"{path.name}: the header states {header.count} rows, but the table has {longest}."
             )
         super().__init__(path, channels, tuple(notes))
 
@@ -275,7 +275,8 @@ class CsvFile(Recording):
             parts = [(0, count)]
         if len(parts) > 1:
             notes.append(
-                f"{self._table.path.name}: time starts again; cut into {len(parts)} parts."
+                f"{self._table.path.name}: the time restarts; the record is cut into "
+                f"{len(parts)} parts."
             )
         self._segments[clock] = parts
         return parts
@@ -300,7 +301,7 @@ class CsvFile(Recording):
                 f"{self._table.path.name}: column {column + 1}",
                 got=f"{rows} rows counted from {first:g} to {last:g}",
                 expected="every row of the record",
-                hint="export the record again, whole.",
+                hint="export the whole record again.",
             )
         return 0.0
 
@@ -376,7 +377,7 @@ def _with_its_header(path: Path, data: NDArray[np.uint8]) -> NDArray[np.uint8]:
         found = said.get(_LENGTHS[0][0], ["none"])
         raise InputError(
             f"{path.name}, with its header {beside.name}",
-            got=f"{count} rows, where the header says {' '.join(found)}",
+            got=f"{count} rows, but the header states {' '.join(found)}",
             expected="one record of one channel: SignalHardwareRecordLength rows",
             hint="export each channel and each acquisition as a file of its own.",
         )
@@ -435,7 +436,7 @@ def _survey(
         raise InputError(
             str(path),
             got="no line of numbers",
-            expected="a table: values separated by commas, semicolons, tabs or blanks",
+            expected="a table: values separated by commas, semicolons, tabs or spaces",
             hint=f"give {table.name}, whose header this is."
             if (table := path.with_name(path.stem + ".Wfm.csv")).is_file()
             else "check the file; MDF4, TDMS, UFF, HDF5 and MATLAB files are recognised as well.",
@@ -494,5 +495,5 @@ def _first_as_clock(
     mean = float(np.mean(steps))
     if not 0 < mean <= SLOWEST or np.max(np.abs(steps - mean)) > 0.01 * mean:
         return {}
-    notes.append(f"{path.name}: column 1 rises evenly; taken as time in seconds.")
+    notes.append(f"{path.name}: column 1 increases evenly and is taken as the time in seconds.")
     return {0: 1.0}

@@ -105,7 +105,7 @@ def _group(node: Any, path: str, depth: int) -> StoredGroup:
         elif item is None or (
             isinstance(item, h5py.Dataset) and (item.external or item.is_virtual)
         ):
-            reason = "its values lie in another file"
+            reason = "its values are in another file"
         elif isinstance(item, h5py.Dataset):
             value = _single(item)
             if value is not None:
@@ -133,7 +133,7 @@ def _check_size(name: str, item: Any) -> None:
     raise InputError(
         f"{Path(item.file.filename).name}: '{name}'",
         got=f"{item.size} values in {item.id.get_storage_size()} bytes",
-        expected="a completely written array",
+        expected="an array that is completely written",
         hint="the file is damaged, or this array was never filled: remove it.",
     )
 

@@ -77,7 +77,7 @@ class MdfFile(Recording):
         notes += left_out(path.name, without)
         texts = [self._mdf.groups[g].channels[c].name for g, c in self._partial]
         if texts:
-            notes.append(f"{path.name}: {', '.join(texts)}: samples that are texts are missing.")
+            notes.append(f"{path.name}: {', '.join(texts)}: text samples are treated as missing.")
         names = unique_names([self._mdf.groups[g].channels[c].name for g, c in places])
         self._place = dict(zip(names, places, strict=True))
         times = {g: self._group_time(path, g, time_step, old) for g in {g for g, _ in places}}
@@ -102,7 +102,7 @@ class MdfFile(Recording):
             return ""
         partial = None if old else _partial(channel.conversion)
         if partial is None:
-            return "its values stand for texts, or follow a formula"
+            return "its values are codes of texts, or follow a formula"
         self._partial[g, c] = partial
         return ""
 
@@ -176,7 +176,7 @@ class MdfFile(Recording):
         refuse_if(
             values.size != last - first,
             f"{self.path.name}: channel '{channel.name}'",
-            got=f"{values.size} values from sample {first + 1} on",
+            got=f"{values.size} values from sample {first + 1}",
             expected=f"{last - first}",
             hint="the recording was truncated; repair it with the program that wrote it.",
         )

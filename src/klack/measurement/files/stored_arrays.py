@@ -280,7 +280,7 @@ def _require_one_start(file: str, lines: Sequence[_Line]) -> None:
             ]
             raise InputError(
                 f"{file}: start of '{line.name}'",
-                got=f"different starts beside one stored time: {', '.join(starts)}",
+                got=f"different starts with one stored time: {', '.join(starts)}",
                 expected="a start, or a stored time",
                 hint="give each channel its own time, or a step and a start.",
             )

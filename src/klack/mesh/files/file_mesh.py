@@ -58,7 +58,7 @@ def require_right_of_axis(path: Path, mesh: Mesh, numbers: Ints) -> None:
             f"{path}: node {numbers[lowest]}",
             got=f"r = x = {mesh.points[lowest, 0] * 1e3:.6g} mm",
             expected="r >= 0: the axis of an axisymmetric mesh is x = 0",
-            hint="draw the half of the section that lies at positive x.",
+            hint="draw the half of the section at positive x.",
         )
 
 
@@ -74,11 +74,11 @@ def require_sound(path: Path, mesh: Mesh, numbers: Sequence[Ints]) -> None:
             first, second = np.concatenate([numbers[i] for i in alike])[list(twice)]
             raise InputError(
                 f"{path}: element {second}",
-                got=f"the corners of element {first} again"
+                got=f"the same corners as element {first}"
                 if first != second
                 else "the same element for the second time",
                 expected="every element once",
-                hint="look for lines that are there twice, or write the file again.",
+                hint="look for duplicate lines, or write the file again.",
             )
     blocks, labels = [], []
     for block, own in zip(mesh.blocks, numbers, strict=True):
@@ -207,7 +207,7 @@ def mesh_model(
     if raw.of_netgen and _all_mirrored(points, blocks):
         warnings.warn(
             f"{path.name}: netgen has written all tetrahedra mirrored ('Gmsh2 Format'); their "
-            "nodes are reordered, and the shape stays.",
+            "nodes are reordered, and the shape is unchanged.",
             AccuracyWarning,
             stacklevel=4,
         )
@@ -278,7 +278,7 @@ def _require_once(path: Path, kind: str, ascending: Ints) -> None:
             str(path),
             got=f"{kind} {ascending[twice[0]]} for the second time",
             expected=f"every {kind} once",
-            hint="look for lines that are there twice, or write the file again.",
+            hint="look for duplicate lines, or write the file again.",
         )
 
 
@@ -327,7 +327,7 @@ def _kept(path: Path, blocks: tuple[ElementBlock, ...], wanted: Sequence[str] | 
         if name not in known:
             raise InputError(
                 f"{path}: solid '{name}'",
-                got="a name that the file does not have",
+                got="a name that is not in the file",
                 expected=f"one of: {', '.join(known)}",
                 hint="'klack inspect FILE' lists the solids of a mesh file.",
             )

@@ -89,8 +89,8 @@ def read_mesh_file(
     if model.left_out:
         counted = ", ".join(f"{count} {kind}" for kind, count in model.left_out.items())
         warnings.warn(
-            f"{path.name}: left out, since klack computes solids only: {counted}. Their "
-            "stiffness, mass and constraints are missing in the body.",
+            f"{path.name}: left out, because klack computes only solids: {counted}. Their "
+            "stiffness, mass and constraints are missing from the body.",
             AccuracyWarning,
             stacklevel=2,
         )

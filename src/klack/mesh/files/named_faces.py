@@ -18,7 +18,7 @@ ALSO_OTHERS = (
     "them from the file."
 )
 """Advice for a file with elements besides solids."""
-LOOSE = "surface elements on no solid"
+LOOSE = "surface elements that are not on a solid"
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +131,7 @@ def _covered(table: FaceTable, name: str, nodes: Ints, count: int) -> Surface:
 def _refuse_shells(where: str, mark: MarkedFaces, lost: NDArray[np.bool_]) -> None:
     raise InputError(
         f"{where}: element {mark.numbers[lost][0]} ('{mark.name}')",
-        got=f"{lost.sum()} surface elements that are no faces of a solid element",
+        got=f"{lost.sum()} surface elements that are not faces of a solid element",
         expected="surface elements that only mark faces of the solid mesh",
         hint=f"shells and membranes are not modelled: {ALSO_OTHERS}",
     )

@@ -65,7 +65,7 @@ def require_unit(path: Path, unit_length: float | None) -> float:
         raise InputError(
             str(path),
             got="no unit of length",
-            expected="the unit of its coordinates, which such files do not state",
+            expected="the unit of its coordinates, which files of this kind do not state",
             hint=SAY_UNIT,
         )
     return unit_length

@@ -70,7 +70,7 @@ def read_placement(keyword: Keyword) -> Placement:
             f"{keyword.place}: *INSTANCE",
             got=f"data lines of {', '.join(str(len(row)) for row in rows[:8])} numbers",
             expected="a translation (3 numbers) and, if rotated, two points and an angle (7)",
-            hint="write both lines; zeros for no translation.",
+            hint="write both lines, with zeros for no translation.",
         )
     shift = np.array(rows[0] if rows else [0.0, 0.0, 0.0])
     if len(rows) < 2:
@@ -317,8 +317,8 @@ class _Reader:
             case name if name in _GENERATING:
                 raise InputError(
                     f"{keyword.place}: *{keyword.name}",
-                    got="a keyword that makes nodes or elements",
-                    expected="all nodes and elements written out",
+                    got="a keyword that generates nodes or elements",
+                    expected="all nodes and elements listed explicitly",
                     hint="write the file again from the preprocessor, as a flat mesh.",
                 )
             case name if name in _IGNORED:
@@ -442,7 +442,7 @@ class _Reader:
         if self.tags:
             warnings.warn(
                 f"ignored: *ELSET, ELSET={_TAGS} ({self.tags}), in which meshio stores tags of "
-                "Gmsh in place of numbers of elements.",
+                "Gmsh instead of element numbers.",
                 AccuracyWarning,
                 stacklevel=4,
             )

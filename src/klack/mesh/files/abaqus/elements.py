@@ -105,8 +105,8 @@ def read_elements(keyword: Keyword, *, solids_only: bool) -> tuple[str, bool, ND
     if "OFFSET" in keyword.parameters:
         raise InputError(
             f"{keyword.place}: *ELEMENT",
-            got="the parameter OFFSET, which makes node numbers",
-            expected="all nodes written out",
+            got="the parameter OFFSET, which generates node numbers",
+            expected="all nodes listed explicitly",
             hint="write the file again from the preprocessor, as a flat mesh.",
         )
     return family, solid, integer_records(keyword, *_record(family, kind))
@@ -155,7 +155,7 @@ def _family(keyword: Keyword, kind: str) -> tuple[str, bool]:
     for family, pattern in _SURFACES.items():
         if re.fullmatch(pattern, kind):
             return family, False
-    of_meshio = " meshio writes quadrilaterals so." if kind == "CAX4P" else ""
+    of_meshio = " meshio writes quadrilaterals like this." if kind == "CAX4P" else ""
     _refuse(keyword, kind, f"remove elements of other kinds from the file.{of_meshio}")
 
 

@@ -114,7 +114,7 @@ def left_out(scope: Scope, blocks: Sequence[RowBlock]) -> dict[str, int]:
         elif lost.any():
             raise InputError(
                 f"{group.place}: *ELEMENT: element {group.numbers[lost][0]}",
-                got=f"{lost.sum()} surface elements that are no faces of a solid element",
+                got=f"{lost.sum()} surface elements that are not faces of a solid element",
                 expected="surface elements that only mark faces of the solid mesh",
                 hint=f"shells and membranes are not modelled: {ALSO_OTHERS}",
             )

@@ -236,8 +236,8 @@ class _Source:
                 str(path)[:200],
                 got=(error.strerror or str(error)).lower(),
                 expected="an Abaqus or CalculiX input file (.inp)",
-                hint="check the path; that of an *INCLUDE is relative to the file that contains "
-                "it.",
+                hint="check the path; the path of an *INCLUDE is relative to the file that "
+                "contains it.",
             ) from None
         raise InputError(
             str(path),

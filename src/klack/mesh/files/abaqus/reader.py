@@ -207,7 +207,7 @@ def _kept(
         if solid not in known:
             raise InputError(
                 f"{path}: solid '{name}'",
-                got="a name that the file does not have",
+                got="a name that is not in the file",
                 expected=f"one of: {', '.join(sorted(known))}",
                 hint="solids are named after the sets of *SOLID SECTION or *ELEMENT.",
             )

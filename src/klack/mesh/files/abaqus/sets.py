@@ -240,7 +240,7 @@ class NamedSets:
         if self.size > LARGEST_MEMBERS:
             raise InputError(
                 place,
-                got=f"sets of {self.size} members together",
+                got=f"sets with a total of {self.size} members",
                 expected=f"at most {LARGEST_MEMBERS}",
                 hint="remove unneeded sets from the file.",
             )
@@ -259,7 +259,7 @@ def read_members(
             f"{keyword.place}: *{keyword.name}",
             got=", ".join(sorted(unknown)),
             expected=one_of(sorted(_FLAGS)),
-            hint="without GENERATE, a range is read as three members of the set.",
+            hint="without GENERATE a range is read as three members of the set.",
         )
     if "GENERATE" in flags:
         return _collected(

@@ -112,7 +112,7 @@ def _require_bodies(
     if dimension != 3 and not flat:
         raise InputError(
             str(path),
-            got=f"elements of dimension {dimension} at most" if dimension else "no elements",
+            got=f"only elements of dimension {dimension} or less" if dimension else "no elements",
             expected="volume elements, or a plane mesh in z = 0 (axisymmetric: x = r, y = z)",
             hint="mesh the volume (gmsh -3), and put it into a physical group.",
         )
@@ -151,7 +151,7 @@ def _require_once(path: Path, bodies: list[GmshElements]) -> None:
         nodes = np.concatenate([part.nodes[:, :corners] for part in same])
         if (twice := same_nodes(nodes)) is not None:
             numbers = np.concatenate([part.numbers for part in same])
-            _refuse_two_groups(path, int(numbers[twice[0]]), "the file has it twice")
+            _refuse_two_groups(path, int(numbers[twice[0]]), "the file contains it twice")
 
 
 def _solid(path: Path, content: GmshContent, part: GmshElements) -> FileElements:

@@ -114,7 +114,7 @@ class BinaryStream:
 def whole_of(place: str, values: NDArray[np.float64]) -> Ints:
     """Reals as whole numbers; rejects fractions."""
     if (np.abs(values) > 2**53).any() or (values != np.rint(values)).any():
-        refuse(place, "a number with a fraction, or a huge one", "whole numbers")
+        refuse(place, "a fractional or very large number", "whole numbers")
     return values.astype(np.int64)
 
 

@@ -308,7 +308,7 @@ def _fields(text: str, place: str) -> list[str]:
                 place,
                 got=f"{len(words)} fields between commas",
                 expected=f"at most {count} and the mark of a continuation",
-                hint="put the fields behind them into a continuation line.",
+                hint="put the further fields into a continuation line.",
             )
         return (words + [""] * count)[:count]
     text = text.expandtabs(8)
@@ -385,7 +385,7 @@ def _require_marks_in_order(
                 f"{path.name}:{row + 1}",
                 got=f"a continuation marked {lines.line(row)[:8]!r}",
                 expected="the mark at the end of the line before",
-                hint="write the file again with every continuation behind its card.",
+                hint="write the file again with every continuation after its card.",
             )
 
 
@@ -436,12 +436,12 @@ def _split(
     if not len(end):
         raise InputError(
             str(path),
-            got=f"no ENDDATA behind its last line ({lines.line(int(filled[-1]))[:40].strip()!r})"
+            got=f"no ENDDATA after its last line ({lines.line(int(filled[-1]))[:40].strip()!r})"
             if len(filled)
             else "an empty file",
             expected="bulk data that end with the line ENDDATA",
-            hint="the file may be truncated: write it again from the preprocessor. Where it is "
-            "whole, as one for INCLUDE, add ENDDATA as its last line.",
+            hint="the file may be truncated: write it again from the preprocessor. If it is "
+            "complete, such as a file for INCLUDE, add ENDDATA as its last line.",
         )
     last = first + int(end[0])
     behind = np.flatnonzero(np.isin(words[last + 1 :], _MESH_CARDS))
@@ -449,10 +449,10 @@ def _split(
         row = int(filled[last + 1 + behind[0]])
         raise InputError(
             lines.place(row),
-            got=f"{words[last + 1 + behind[0]].decode()} behind ENDDATA",
+            got=f"{words[last + 1 + behind[0]].decode()} after ENDDATA",
             expected="ENDDATA as the last line of the bulk data",
-            hint="lines are out of order, or two files in one: write it again, or remove what "
-            "stands behind ENDDATA.",
+            hint="lines are out of order, or two files are joined: write the file again, or "
+            "remove the lines after ENDDATA.",
         )
     head = tuple(lines.line(row) for row in filled[: max(first - 1, 0)].tolist())
     return head, filled[first:last]

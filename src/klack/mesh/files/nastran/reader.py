@@ -165,7 +165,10 @@ def _nodes(bulk: BulkData) -> tuple[Ints, NDArray[np.float64]]:
     """Numbers and basic coordinates of all nodes."""
     for card in bulk.cards("GRDSET"):
         if card.field(2) not in ("", "0"):
-            card.refuse(f"coordinate system {card.field(2)} for all nodes", "one in every GRID")
+            card.refuse(
+                f"coordinate system {card.field(2)} for all nodes",
+                "a coordinate system in every GRID",
+            )
     numbers, systems, points, lines = [], [], [], []
     for rows, cells in bulk.tables("GRID", 5):
         whole = _whole(bulk, "GRID", rows, cells[:, :2])
@@ -244,7 +247,8 @@ def _solids_of(
                 f"{bulk.place(int(rows[first]))}: {name} {table[first, 0]}",
                 got=f"{np.count_nonzero(nodes[first] > 0)} nodes",
                 expected=f"{corners} corners, and all or none of {most - corners} mid nodes",
-                hint="the file may be truncated; else let the mesher put a node on every edge.",
+                hint="the file may be truncated; otherwise let the mesher put a node on every "
+                "edge.",
             )
         for full, family in ((middle == 0, linear), (middle > 0, quadratic)):
             for label in np.unique(table[full, 1]).tolist():

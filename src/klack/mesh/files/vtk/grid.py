@@ -297,7 +297,7 @@ def read_xml(path: Path) -> VtkGrid:
     """Read an unstructured grid of one piece."""
     data = read_bytes(path, "a VTK file")
     if b"<!DOCTYPE" in data[:10_000] or b"<!ENTITY" in data[:10_000]:
-        refuse(str(path), "an XML file with own entities", "a VTK file")
+        refuse(str(path), "an XML file with its own entities", "a VTK file")
     appended = _APPENDED.search(data)
     tail, encoding = b"", ""
     if appended:
