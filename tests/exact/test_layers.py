@@ -338,7 +338,7 @@ def test_layers_that_cannot_be_are_refused():
     """No such faces, faces of three solids, a layer like steel of no thickness, one like air."""
     mesh = rods()
     with pytest.raises(
-        InputError, match=r"parted\.seam: got a name of no face between two solids.*here: joint"
+        InputError, match=r"joint .seam.: got a name of no face between two solids.*here: joint"
     ):
         parted(mesh, ["seam"])
     for numbers, said in (

@@ -26,12 +26,19 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csr_array, vstack
+from scipy.sparse import csr_array, vstack
 
 from klack.bodies.elasticity.condensation import condensed_inverse
 from klack.bodies.elasticity.factorization import factorize
-from klack.bodies.elasticity.loads import face_points, traction_load
-from klack.bodies.elasticity.press_fit import WITHOUT, JointSides, PartedBody, far_from, nodes_of
+from klack.bodies.elasticity.loads import face_points
+from klack.bodies.elasticity.press_fit import (
+    WITHOUT,
+    JointSides,
+    PartedBody,
+    along,
+    far_from,
+    nodes_of,
+)
 from klack.bodies.elasticity.quadrature import quadrature
 from klack.bodies.elasticity.shape_functions import shape_functions
 from klack.contact.complementarity import ComplementaritySolver
@@ -169,26 +176,21 @@ def _pushes(
     mesh: Mesh, side: JointSides, normal: Floats
 ) -> tuple[csr_array, Floats, Floats, Floats]:
     """Nodal forces (n, n_dof) of 1 N at each corner, its area, its middle, the corner (n, d)."""
-    N, x, size, _ = face_points(mesh, FaceBlock(side.family, side.faces))
+    N, _, size, _ = face_points(mesh, FaceBlock(side.family, side.faces))
     family = FAMILIES[side.family]
     chi = shape_functions(family.linear, quadrature(side.family, "mass")[0])[0]
     corners, at = np.unique(side.faces[:, : family.corners], return_inverse=True)
     at = at.reshape(len(side.faces), family.corners)
-    count, d = len(corners), mesh.dimension
     weight = np.einsum("fq,qc,qi->fci", size, chi, N)
-    area = np.bincount(at.ravel(), weight.sum(axis=2).ravel(), minlength=count)
+    area = np.bincount(at.ravel(), weight.sum(axis=2).ravel(), minlength=len(corners))
+    node = np.searchsorted(side.nodes[1], side.faces)[:, None, :]
+    place = [np.broadcast_to(index, weight.shape).ravel() for index in (at[:, :, None], node)]
     share = weight / area[at][:, :, None]
-    row = np.broadcast_to(at[:, :, None], share.shape).ravel()
-    local = np.searchsorted(side.nodes[1], side.faces)
-    forces = csr_array((count, mesh.dof_count))
-    for sign, nodes in zip((-1.0, 1.0), side.nodes, strict=True):
-        node = np.broadcast_to(nodes[local][:, None, :], share.shape).ravel()
-        for way in np.flatnonzero(normal):
-            value = sign * normal[way] * share.ravel()
-            forces = forces + coo_array((value, (row, d * node + way)), shape=forces.shape)
-    middle = np.zeros((count, d))
-    np.add.at(middle, at, np.einsum("fq,qc,fqa->fca", size, chi, x) / area[at][:, :, None])
-    return csr_array(forces), area, middle, mesh.points[corners]
+    means = csr_array((share.ravel(), place), shape=(len(corners), len(side.nodes[1])))
+    normals = np.broadcast_to(normal, (len(side.nodes[1]), len(normal)))
+    lower, upper = (along(mesh, nodes, normals) for nodes in side.nodes)
+    points = mesh.points[side.nodes[1]]
+    return csr_array(means @ (upper - lower)), area, means @ points, mesh.points[corners]
 
 
 def _loads(mesh: Mesh, parted: PartedBody, joint: FlatJoint) -> tuple[Floats, Floats, Floats]:
@@ -213,17 +215,15 @@ def _loads(mesh: Mesh, parted: PartedBody, joint: FlatJoint) -> tuple[Floats, Fl
         if len(sides) > 1:
             raise _wrong(joint, f"'{end}' is on both sides of the joint", "one face on either side")
         away = 1.0 if sides == {part_of[joint.upper]} else -1.0
-        facing: list[Floats] = []
-
-        def along(x: Floats, normal: Floats, facing: list[Floats] = facing) -> Floats:
-            facing.append(normal @ joint.normal)
-            return np.broadcast_to(joint.normal, x.shape)
-
-        glued = traction_load(mesh, surface, along).reshape(-1, d) @ joint.normal
-        normal = away * np.concatenate(facing)
+        weight, facing = np.zeros(mesh.node_count), []
+        for block in surface.blocks:
+            N, _, size, normal = face_points(mesh, block)
+            np.add.at(weight, block.connectivity, np.einsum("qi,fq->fi", N, size))
+            facing.append(away * (normal @ joint.normal).ravel())
+        normal = np.concatenate(facing)
         if normal.min() < -_FACING:
             raise _wrong(joint, f"'{end}', a face towards the joint", "faces away from the joint")
-        weight = glued / glued.sum()
+        weight /= weight.sum()
         own = np.unique(np.concatenate([nodes_of(parted.mesh, owner) for owner in owners]))
         load[own] -= away * weight[parted.nodes[own]][:, None] * joint.normal
         middles[away] = weight @ mesh.points

@@ -57,6 +57,7 @@ const STYLE = `
 .ks dt{color:var(--soft);float:left;clear:left;margin-right:6px}
 .ks .ks-joint{float:none;margin-top:5px;color:inherit;font-weight:600}
 .ks dd{margin:0;overflow-wrap:anywhere;font-variant-numeric:tabular-nums}
+.ks .ks-joint~dd{overflow-wrap:normal}
 .ks-said-of{margin:5px 0;overflow-wrap:anywhere;font-variant-numeric:tabular-nums;font-size:12.5px}
 .ks-said-of b{font-weight:600}
 .ks-said-of button{padding:0 5px;min-height:24px;font-size:12.5px;overflow-wrap:anywhere}

@@ -41,6 +41,7 @@ __all__ = [
     "JointSides",
     "PartedBody",
     "PressedState",
+    "along",
     "far_from",
     "nodes_of",
     "pressed_state",
@@ -137,20 +138,12 @@ def pressed_state(
     )
     overlap = np.repeat(overlaps, [len(each.nodes[1]) for each in sides])
     T, jump = _tied(apart, masters, slaves, normal, overlap)
-    d = apart.dimension
-    row = np.repeat(np.arange(len(slaves)), d)
-    along = tuple(
-        csr_array(
-            (normal.ravel(), (row, (d * nodes[:, None] + np.arange(d)).ravel())),
-            shape=(len(slaves), apart.dof_count),
-        )
-        for nodes in (slaves, masters)
-    )
-    kept = np.setdiff1d(T.indices, body.held(along[0] - along[1], T))
+    outer = along(apart, slaves, normal)
+    kept = np.setdiff1d(T.indices, body.held(outer - along(apart, masters, normal), T))
     K, T = body.stiffness, T[:, kept]
     with factorize(csr_array(T.T @ K @ T)) as factor:
         u = jump + T @ factor.solve(-(T.T @ (K @ jump)))
-    force = np.split(along[0] @ (K @ u), np.cumsum([len(s.nodes[1]) for s in sides])[:-1])
+    force = np.split(outer @ (K @ u), np.cumsum([len(s.nodes[1]) for s in sides])[:-1])
     corners = body.sharp_corners
     found = []
     for joint, side, push in zip(joints, sides, force, strict=True):
@@ -177,6 +170,13 @@ def pressed_state(
             u, materials, corners, WITHOUT * min(joint.length for joint in joints)
         ),
     )
+
+
+def along(mesh: Mesh, nodes: Ints, normal: Floats) -> csr_array:
+    """Displacement of nodes along their normals (n, d), shape (n, n_dof)."""
+    d = mesh.dimension
+    place = np.repeat(np.arange(len(nodes)), d), (d * nodes[:, None] + np.arange(d)).ravel()
+    return csr_array((normal.ravel(), place), shape=(len(nodes), mesh.dof_count))
 
 
 def _require_all_pressed(body: "PartedBody", joints: Sequence[Joint]) -> None:
