@@ -305,6 +305,33 @@ def test_enclosed_fluid_holds_a_piston():
     squeezed = volume * (float(fluid.density(AMBIENT.pressure)) / float(fluid.density(p)) - 1.0)
     assert found.displacement["piston.at"] == pytest.approx(squeezed / area, rel=1e-7)
     stays(result, "oil pressure")
+    assert not found.stated["oil"]
+
+
+def test_a_stated_pressure_that_holds_no_body_is_a_doubt_where_fluid_can_leave():
+    """Truth: balance of forces; it starts elsewhere than the case states, and flow sets in."""
+    area, force, stated = 2e-5, 5.0, 5e5
+    parts = {
+        "piston": RigidMass(mass=5e-3, points=("at",)),
+        "load": ConstantForce(force=-force),
+        "face": PressureFace(direction="opening", area=area),
+        "oil": Chamber(volume=3e-7, pressure=stated),
+        "bore": Orifice(diameter=0.5e-3),
+        "rail": PressureSource(pressure=stated),
+    }
+    joints = [
+        ["piston.at", "load.end", "face.body"],
+        ["face.fluid", "oil.fluid", "bore.a"],
+        ["bore.b", "rail.fluid"],
+    ]
+
+    with pytest.warns(
+        AccuracyWarning, match="'oil' starts at 351.3 kPa, not at the stated 500 kPa"
+    ):
+        found = start(parts, joints, fluid="n-heptane")
+
+    assert found.pressure["oil"] == pytest.approx(AMBIENT.pressure + force / area, rel=1e-11)
+    assert not found.stated["oil"]
 
 
 def test_a_holding_current_balances_the_spring():

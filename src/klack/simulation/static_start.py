@@ -92,6 +92,7 @@ _DEEP = 10.0  # of the way between the stops: nobody means a stop so soft
 _ROUND_OFF = 1e-14  # of the sum of absolute forces, flows and displacements: they balance
 _IDLE = 1e-6  # of the largest flow: where less flows, behind closed valves, that is the measure
 _FILLED = 1e-6  # of ambient pressure: a closed volume that something has filled
+_MOVED = 1e-3  # of a stated pressure: another one
 _NEARLY = 1e-9  # the same where they come no closer
 
 
@@ -204,6 +205,7 @@ def begin_at_rest(
     """
     problem, found, closed = _settled(network, step, near, shift=shift)
     notes = [_no_pressure(network, i) for i in closed]
+    notes += problem.instead_of_stated(found._state.p) if near is None else []
     for note in notes:
         warnings.warn(note, AccuracyWarning, stacklevel=3)
     notes += problem.held_by_friction()
@@ -1021,11 +1023,36 @@ class _Balance:
                 for name, y in zip(network.ports, state.y[:-1], strict=True)
             },
             pressure={names[i]: float(state.p[i]) for i in range(nodes.volumes)},
-            stated={names[i]: bool(self.stated[i]) for i in range(nodes.volumes)},
+            stated={
+                names[i]: bool(self.stated[i]) and i not in self._restated(state.p)
+                for i in range(nodes.volumes)
+            },
             flow=flow,
             residual=self.left_on_bodies(),
             notes=(*notes, *(self._closed(names, state.p) if tells_closed else ())),
         )
+
+    def _restated(self, p: Vector) -> list[int]:
+        """Volumes whose stated pressure has become another one, as nothing else holds a body."""
+        return [
+            int(i)
+            for i in self.free
+            if self.stated[i] and abs(p[i] / self.at_first[i] - 1.0) > _MOVED
+        ]
+
+    def instead_of_stated(self, p: Vector) -> list[str]:
+        """Doubts about volumes with a way out that do not start at the pressure of the case."""
+        handles, rows = self.network.node_order, self.network.rows
+        ways = {end for row in (*rows.branches, *rows.lines, *rows.waves) for end in (row.a, row.b)}
+        return [
+            f"'{rows.nodes[handles[i]].component}' starts at {format_si(float(p[i]), 'Pa', 4)}, "
+            f"not at the stated {format_si(float(self.at_first[i]), 'Pa', 4)}: nothing but its "
+            "fluid holds a body, so it starts as if it were enclosed and had been compressed or "
+            "expanded until the forces balance. Try: the pressure at which they balance; a spring, "
+            "a stop or friction that holds the body; or its 'speed': then it starts in flight."
+            for i in self._restated(p)
+            if handles[i] in ways
+        ]
 
     def _closed(self, names: list[str], p: Vector) -> tuple[str, ...]:
         """Notes on volumes without a stated pressure that nothing fills or empties.
