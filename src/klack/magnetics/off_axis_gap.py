@@ -20,17 +20,13 @@ from math import pi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from klack.errors import InputError, require_positive
-from klack.magnetics.air_gap import face_permeance
+from klack.errors import InputError
 from klack.magnetics.iron import VACUUM_PERMEABILITY
 
 __all__ = [
     "eccentric_ring",
     "guide_ring",
-    "ring_sectors",
-    "sector_pulls",
     "tilted_ring_face",
-    "tilted_strip",
 ]
 
 Vector = NDArray[np.float64]
@@ -121,8 +117,7 @@ def tilted_ring_face(
 
     The slope with the gap is the pull, that with the tilt the moment that tilts further.
 
-    Limits: the field of parallel faces at every point; a tilt of 0.1 changes it by 0.3 %
-    (:func:`tilted_strip`).
+    Limits: the field of parallel faces at every point; a tilt of 0.1 changes it by 0.3 %.
 
     Parameters
     ----------
@@ -144,68 +139,6 @@ def tilted_ring_face(
         dg = dg - one / s
         dt = dt + one * t * r * r / (s * (g + s))
     return P, dg, dt
-
-
-def tilted_strip(
-    length: float, width: float, gap: ArrayLike, tilt: ArrayLike
-) -> tuple[Vector, Vector, Vector]:
-    r"""Permeance [H] between a strip and a plane tilted along it; its slopes [H/m], [H].
-
-    .. math:: P = \frac{\mu_0 b}{t} \ln\frac{g + a}{g - a}, \qquad a = \tfrac12 t l
-
-    The field between planes at the angle ``alpha`` is exactly circular, with ``alpha`` in place of
-    ``t = tan(alpha)``: the faces taken as parallel at every point cost :math:`\alpha^2/3`.
-
-    Parameters
-    ----------
-    length, width [m]
-        Along the tilt, and across.
-    gap [m]
-        In the middle.
-    tilt [-]
-        Slope, with ``|tilt| length/2 < gap``.
-    """
-    g, t = np.asarray(gap, dtype=float), np.asarray(tilt, dtype=float)
-    a = 0.5 * length * t
-    _require_open("tilted_strip: tilt", np.abs(a), g, "the gap")
-    u = a / g
-    series = 1.0 + u * u * (1.0 / 3.0 + u * u * (0.2 + u * u / 7.0))
-    turned = u * u * u * (2.0 / 3.0 + u * u * (0.8 + u * u * 6.0 / 7.0))  # u d/du of it, over u
-    small = np.abs(u) < 1e-2
-    safe = np.where(small, 1.0, u)
-    with np.errstate(all="ignore"):
-        ratio = np.where(small, series, np.arctanh(safe) / safe)
-        rise = np.where(small, turned / np.where(u == 0.0, 1.0, u), 1.0 / (1.0 - u * u) - ratio)
-    flat = VACUUM_PERMEABILITY * width * length / g
-    dt = np.where(u == 0.0, 0.0, flat * rise / np.where(t == 0.0, 1.0, t))
-    return flat * ratio, -flat * (ratio + rise) / g, dt
-
-
-def ring_sectors(inner: float, outer: float, length: float, sectors: int) -> Vector:
-    """Areas [m^2] of the sectors of a radial gap, shape (S,), for :func:`sector_pulls`.
-
-    At the geometric mean of the radii their sum differs from the exact permeance by
-    ``(c^2 - e^2)/(24 r^2)`` only.
-    """
-    return np.full(sectors, 2.0 * pi * np.sqrt(inner * outer) * length / sectors)
-
-
-def sector_pulls(areas: Vector, gaps: Vector, mmf: float) -> tuple[Vector, Vector]:
-    r"""Permeances [H] of sectors in parallel, and the pull [N] that closes each, shape (S,).
-
-    .. math:: P_k = \mu_0 \frac{A_k}{g_k}, \qquad N_k = \tfrac12 V^2 \mu_0 \frac{A_k}{g_k^2}
-
-    For faces of any form: the pulls times the rows of the gaps over the coordinates of the armature
-    are force and moments with the same work.
-
-    Parameters
-    ----------
-    areas, gaps (S,) [m^2], [m]
-    mmf [A]
-    """
-    require_positive("sector_pulls: smallest gap", float(np.min(gaps)), "m")
-    P = face_permeance(1.0, gaps) * areas
-    return P, 0.5 * mmf**2 * P / gaps
 
 
 def _require_open(where: str, used: Vector, room: ArrayLike, what: str) -> None:
