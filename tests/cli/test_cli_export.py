@@ -130,11 +130,44 @@ def test_what_makes_no_sense_is_refused_at_once(tmp_path, capsys, arguments, wor
     assert not (tmp_path / "x").exists()
 
 
-def test_a_valve_on_the_ground_is_refused_and_told_why(tmp_path, capsys):
+@pytest.mark.parametrize("part", ["body", "pair"])
+def test_a_valve_of_rigid_bodies_is_refused_and_told_why(tmp_path, capsys, part):
     valve = Path(__file__).parents[2] / "docs" / "how-to" / "small_valve.yaml"
-    assert main(["export", str(valve), "--to", "fmu", "--out", str(tmp_path / "x"), "-q"]) == 2
+    words = ["--to", "fmu", "--part", part, "--out", str(tmp_path / "x"), "-q"]
+    assert main(["export", str(valve), *words]) == 2
     told = capsys.readouterr().err
-    assert "network.components.seat: got an end stop on the ground, expected" in told
+    assert "network.components: got rigid bodies only, expected" in told
+
+
+def test_the_flexible_body_of_a_valve_with_rigid_ones_is_exported_alone(tmp_path, capsys):
+    """The refusal of the whole valve says how; an elastic housing, needle and armature rigid."""
+    words = ["export", "free-travel", "--to", "csv", "-q", "--out", str(tmp_path / "x")]
+    assert main(words) == 2
+    told = capsys.readouterr().err
+    assert "network.components.needle: got a rigid-mass at an end stop" in told
+    assert "--part body" in told
+
+    assert main([*words, "--part", "body"]) == 0
+    assert {path.name.split("_")[0] for path in (tmp_path / "x").iterdir()} == {"housing"}
+
+
+@pytest.mark.slow
+def test_a_stop_on_the_ground_is_refused_and_told_why(tmp_path, capsys):
+    text = find_case("demo-stroke").read_text(encoding="utf-8")
+    for old, new in (
+        ("  opening: {between: [pole.stop, needle.land], speed: 1.5 m/s, force: 60 N}\n", ""),
+        (
+            "gap: 100 um  # the lift, as drawn\n      law: {kind: consistent}",
+            "gap: 100 um\n      law: {kind: linear, stiffness: 1e8 N/m}",
+        ),
+        ("[pole.stop, opening.upper]", "[ground, opening.upper]"),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    case = tmp_path / "case.yaml"
+    case.write_text(text, encoding="utf-8")
+    assert main(["export", str(case), "--to", "csv", "--out", str(tmp_path / "x"), "-q"]) == 2
+    assert "network.components.opening: got an end stop on the ground" in capsys.readouterr().err
 
 
 def test_models_do_not_come_from_a_result(stored, capsys):

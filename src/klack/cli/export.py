@@ -333,11 +333,12 @@ def _export_models(
 
         require_compilers(choice.platforms)
     with show_progress(wanted.quiet) as progress:
-        every = case_models(case, progress, threads=wanted.threads)
+        alone = choice.part == "body" or choice.body is not None
+        every = case_models(case, progress, threads=wanted.threads, alone=alone)
         bodies: tuple[ModalModel, ...] = ()
         if choice.part != "pair" or choice.body is not None:
             bodies = every.body_models(choice.body)
-        pair = (every.pair,) if choice.part != "body" and choice.body is None else ()
+        pair = (every.pair,) if every.pair and not alone else ()
         progress(to, 0.0)
         with staged_folder(folder) as stage:
             _write_models((*bodies, *pair), to, stage, choice)

@@ -36,14 +36,14 @@ class CaseModels:
     Parameters
     ----------
     pair
-        All bodies, contacts and films; other drives stay outside.
+        All bodies, contacts and films; other drives stay outside. None of a valve for ``alone``.
     step [s]
     outside
         Components of a valve that no model has.
     """
 
     bodies: tuple[ReducedBody, ...]
-    pair: ModalModel
+    pair: ModalModel | None
     provenance: Provenance
     step: float
     outside: tuple[str, ...] = ()
@@ -58,9 +58,13 @@ class CaseModels:
 
 @tells_place
 def case_models(
-    case: Case | ValveCase, progress: Progress = silent, *, threads: int | None = None
+    case: Case | ValveCase,
+    progress: Progress = silent,
+    *,
+    threads: int | None = None,
+    alone: bool = False,
 ) -> CaseModels:
-    """Reduce the bodies of a case as its runs do, and join them.
+    """Reduce the bodies of a case as its runs do, and join them, those of a valve unless ``alone``.
 
     The pair of an impact keeps constant force and spring; that of a valve its end stops with
     films, while the user gives the forces of springs, fluid and solenoid. Rejects a valve without
@@ -73,7 +77,7 @@ def case_models(
     """
     tell_elastic(case, "exported models are those of")
     if isinstance(case, ValveCase):
-        return _of_valve(_smooth_valve(case), progress, threads)
+        return _of_valve(_smooth_valve(case), progress, threads, alone)
     if not case.has_surfaces:
         return _of_given(case, progress, threads)
     case.require_ends("an exported model")
@@ -147,10 +151,20 @@ def _of_given(case: Case, progress: Progress, threads: int | None) -> CaseModels
     return _of_impact(case, (given.upper, given.lower), given.system(case), provenance)
 
 
-def _of_valve(case: ValveCase, progress: Progress, threads: int | None) -> CaseModels:
+def _of_valve(case: ValveCase, progress: Progress, threads: int | None, alone: bool) -> CaseModels:
     require_axial(case, "the export of models")
     valve = build_valve(case, progress, threads=threads)
     provenance = _provenance(case, {name: body.mesh for name, body in valve.bodies.items()})
+    bodies, step = tuple(valve.reduced.values()), case.run.fine_step
+    if not bodies:
+        raise InputError(
+            f"{case.path or 'case'}: network.components",
+            got="rigid bodies only",
+            expected="at least one flexible-body",
+            hint="describe its shape in bodies and name it in a flexible-body.",
+        )
+    if alone:
+        return CaseModels(bodies=bodies, pair=None, provenance=provenance, step=step)
     rows = valve.network.rows()
     parts = valve.network.components
     meetings = find_meetings(valve.network)
@@ -172,9 +186,9 @@ def _of_valve(case: ValveCase, progress: Progress, threads: int | None) -> CaseM
         (upper, a), (lower, b) = met.upper, met.lower
         contacts.append(
             ContactPair(
-                body_a=_body_of(parts[upper]),
+                body_a=_body_of(case, upper, parts[upper]),
                 port_a=a,
-                body_b=_body_of(parts[lower]),
+                body_b=_body_of(case, lower, parts[lower]),
                 port_b=b,
                 law=row.law,
                 gap=row.gap,
@@ -195,22 +209,23 @@ def _of_valve(case: ValveCase, progress: Progress, threads: int | None) -> CaseM
         for body in valve.reduced.values()
         if any(body.name in (contact.body_a, contact.body_b) for contact in contacts)
     ]
+    needle = find_roles(case).needle
     pair = pair_model(
         f"{case.name}_pair",
         ReducedSystem(bodies=tuple(used), contacts=tuple(contacts)),
-        moving=_body_of(parts[find_roles(case).needle]),
+        moving=_body_of(case, needle, parts[needle]),
         contact_names=names,
         films=films,
         speed=0.0,
-        step=case.run.fine_step,
+        step=step,
         duration=case.run.duration,
         provenance=provenance,
     )
     return CaseModels(
-        bodies=tuple(valve.reduced.values()),
+        bodies=bodies,
         pair=pair,
         provenance=provenance,
-        step=case.run.fine_step,
+        step=step,
         outside=tuple(
             name
             for name, part in parts.items()
@@ -219,13 +234,14 @@ def _of_valve(case: ValveCase, progress: Progress, threads: int | None) -> CaseM
     )
 
 
-def _body_of(part: object) -> str:
+def _body_of(case: ValveCase, name: str, part: object) -> str:
     if not isinstance(part, FlexibleBody):
         raise InputError(
-            "export of the pair",
+            f"{case.path or 'case'}: network.components.{name}",
             got=f"a {getattr(part, 'type', type(part).__name__)} at an end stop",
-            expected="flexible bodies only",
-            hint="describe it as a body of the case and a flexible-body of the network.",
+            expected="flexible bodies only, in a model of all of them",
+            hint="describe it as a body of the case and a flexible-body of the network, or export "
+            "the flexible bodies alone: --part body.",
         )
     return part.body
 
