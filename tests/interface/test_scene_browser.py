@@ -3,6 +3,7 @@
 Chromium draws by software: it takes seconds, so all of these are slow tests.
 """
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -51,6 +52,25 @@ class Opened:
 
     def state(self) -> dict[str, Any]:
         return self.page.evaluate("klackScene.state()")
+
+
+@pytest.mark.parametrize("bodies", [0, 1])
+def test_a_wide_schematic_is_scrolled_and_not_shrunk_beyond_reading(browser, tmp_path, bodies):
+    """Its letters of 10 px keep 8: at 400 px a picture of 2000 px is 1600 px wide."""
+    picture = '<svg xmlns="http://www.w3.org/2000/svg" width="2000" height="500"/>'
+    view = brick_view()
+    path = tmp_path / "wide.html"
+    view = replace(view, bodies=view.bodies[:bodies], schematic=picture)
+    path.write_text(page_of(view), encoding="utf-8")
+    for width, wanted in ((400, 1600), (3000, 2000)):
+        with Opened(browser, path.as_uri(), width) as opened:
+            if bodies:
+                opened.click("Schematic")
+            page = opened.page
+            shown = page.evaluate("document.querySelector('.ks-schematic').clientWidth")
+            assert shown == pytest.approx(wanted, abs=3)  # pixels of its edge
+            assert page.evaluate("document.documentElement.scrollWidth") <= width
+            assert opened.said == []
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

@@ -89,6 +89,7 @@ const JOINTS = ['press fit', 'bolts', 'layer'];
 const WEIGHED = ['solid', 'volume', 'mass', 'centre of gravity', 'inertia', ...JOINTS, 'doubt'];
 const TURN = Math.PI / 180;
 const UNNAMED = 65535;
+const LEAST_SCHEMATIC = 0.8; // of its size, whose letters have 10 px: a narrow window scrolls instead
 const STRESS_DECADES = 3; // of the colours: the contact has a hundred times the stress of the rest
 
 // viridis as a polynomial (M. Zucker, CC0): the same coefficients in the shader and in the legend
@@ -1003,6 +1004,7 @@ class SceneView {
       let binary = '';
       for (const byte of text) binary += String.fromCharCode(byte);
       const picture = el('img', {class: 'ks-schematic', alt: 'Schematic of the network', src: `data:image/svg+xml;base64,${btoa(binary)}`});
+      picture.style.minWidth = `${Math.round(LEAST_SCHEMATIC * / width="([\d.]+)"/.exec(payload.schematic)[1])}px`;
       if (this.bodies.length) {
         const net = el('div', {class: 'ks-net', hidden: '', tabindex: 0, 'aria-label': 'Schematic of the network'}, picture);
         this.view.append(net);
