@@ -132,7 +132,8 @@ EVENT_MEASURES: tuple[Measure[ImpactEvent], ...] = described_in(
         key="contact_time",
         symbol="t_c",
         unit="s",
-        definition="Time closed, all contacts of the impact together.",
+        definition="Time closed, all contacts of the impact together; of a contact that stays "
+        "closed, up to rest: three of the longest periods of its bodies, or four bounces.",
         column=Column("us", 1000000.0, ".2f"),
         page=True,
     ),
