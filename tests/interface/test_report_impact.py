@@ -14,7 +14,7 @@ import pytest
 from plotly.offline import get_plotlyjs
 
 from klack.analyses.impact.content import Content, report_content
-from klack.analyses.impact.figures import charts
+from klack.analyses.impact.figures import charts, spectrum_chart
 from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.impact.section_figure import section_figure
 from klack.analyses.impact.wording import answer
@@ -263,3 +263,15 @@ def test_without_a_full_run_the_report_says_why_it_has_no_picture(
     assert section.picture is None
     assert "only available at level 'full'" in section.paragraphs[0]
     assert "--level reduced,full" in section.paragraphs[0]
+
+
+def test_frequencies_in_figures_have_prefixes(impact_study: ImpactStudy) -> None:
+    """A small stiff needle keeps modes above 1 MHz."""
+    high = tuple(
+        replace(body, frequencies=np.append(body.frequencies[:-1], 1.53e6))
+        for body in impact_study.bodies
+    )
+    chart = spectrum_chart(replace(impact_study, bodies=high))
+    (band,) = chart.panels[0].bands
+
+    assert band.label.replace("\N{NO-BREAK SPACE}", " ") == "below the highest kept mode, 1.53 MHz"

@@ -281,7 +281,7 @@ def spectrum_chart(study: ImpactStudy) -> Chart:
     ]
     trusted = _kept_up_to(study)
     if trusted > _LOW_FREQUENCY:
-        label = f"below the highest kept mode, {1e-3 * trusted:.3g} kHz"
+        label = f"below the highest kept mode, {quantity(trusted, 'Hz', 3)}"
         band = Band(low=1e-3 * _LOW_FREQUENCY, high=1e-3 * min(trusted, top), label=label)
         panels[0] = replace(panels[0], bands=(band,))
     if differences:
@@ -349,7 +349,7 @@ def transfer_chart(comparison: TransferComparison) -> Chart:
         differences.append(look_of(i).curve(frequency, deviation))
         limit = 1e-3 * float(comparison.valid_up_to[i])
         if frequency[0] < limit < frequency[-1]:
-            marks.append(Mark(value=limit, label=f"{limit:.3g} kHz"))
+            marks.append(Mark(value=limit, label=quantity(1e3 * limit, "Hz", 3)))
     top = max(float(curve.y.max()) for curve in differences) if differences else 10.0
     return Chart(
         name=f"transfer-{comparison.body}-{comparison.port}",
