@@ -135,11 +135,13 @@ def test_lift_that_is_zeroed_forgets_the_offset(result, tmp_path):
 
 
 @pytest.mark.slow
-def test_one_stroke_has_no_scatter(result, tmp_path):
+def test_one_stroke_has_no_scatter(result, tmp_path, capsys):
     """What strokes scatter is not known of one; differences are judged by its reading error."""
     path = record(result, tmp_path / "strokes.csv", strokes=1)
     found = compared(result, "--measurement", str(path))
 
+    assert main(["compare", str(result), "--measurement", str(path), "--no-report"]) == 0
+    assert ", wet: 1 stroke " in capsys.readouterr().out
     assert found["strokes"] == 1
     assert "times the reading error" in found["verdict"]
     assert "does not show the scatter between strokes" in found["verdict"]

@@ -10,11 +10,12 @@ Truth: exact.  A trapezoid has its length, rise and plateau by construction; a c
 another factor and shift is found again.
 """
 
-from math import exp, pi
+from math import exp, isnan, pi
 
 import numpy as np
 import pytest
 
+from klack.analyses.comparison.strokes import _read, compare_numbers
 from klack.errors import InputError
 from klack.measurement.channels import LiftSensor
 from klack.measurement.differentiation import differentiator_gain, noise_floor, velocity_of
@@ -436,3 +437,18 @@ def test_factor_and_shift_are_found_again():
 def test_records_without_a_pulse_are_refused(values, text):
     with pytest.raises(InputError, match=text):
         measure_pulse(TIME, values, "shot.csv: strain")
+
+
+def test_a_level_that_the_drawing_gives_is_no_measured_travel():
+    """A needle that turns at its opening stop without resting there: its travel is not known."""
+    way, time = 60e-6, 1e-6 * np.arange(2000)
+    lift = np.maximum(way * (1.0 - ((time - 0.6e-3) / 0.3e-3) ** 2), 0.0)
+    lift += 0.1e-6 * np.random.default_rng(3).normal(size=time.size)
+    reading = _read(time, lift, SENSOR, way)
+
+    assert reading.by_drawing
+    assert reading.measures.lift == pytest.approx(way)  # which impacts are read with
+    assert isnan(reading.travel)
+    found = compare_numbers([way], [reading.travel], [1e-7])
+    assert found.count == 0
+    assert isnan(found.difference)

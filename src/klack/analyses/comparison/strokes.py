@@ -7,7 +7,7 @@ alike, so that what a differentiator or a fit takes away is taken from both.
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from math import hypot, isfinite, sqrt
+from math import hypot, isfinite, nan, sqrt
 from pathlib import Path
 from time import perf_counter
 
@@ -158,8 +158,8 @@ def _compare(
         lift_scatter=_scatter(lift, median),
         velocity_scatter=_scatter(estimate.velocity, middle),
         way=compare_numbers(
-            [item.measures.lift for item in model],
-            [item.measures.lift for item in readings],
+            [item.travel for item in model],
+            [item.travel for item in readings],
             [item.measures.level_se for item in readings],
         ),
         impacts=_impacts(model, readings, strokes.step),
@@ -189,6 +189,11 @@ class _Reading:
     measures: StrokeMeasures
     moves: float
     by_drawing: bool
+
+    @property
+    def travel(self) -> float:
+        """Between the stops [m]; nan unless the needle rested on both."""
+        return nan if self.by_drawing else self.measures.lift
 
     def on(self, stop: Stop) -> tuple[MeasuredImpact, ...]:
         """Impacts on a stop after the first motion, without trembling at rest."""

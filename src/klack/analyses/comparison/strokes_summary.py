@@ -113,7 +113,8 @@ _STUDY = JsonForm(
 def _told(study: MeasuredStrokeStudy) -> Iterator[TextTable | Notes | str]:
     for variant in study.variants.values():
         aside = f", {len(variant.rejected)} discarded" if variant.rejected else ""
-        title = f"{study.title}, {variant.variant}: {variant.count} strokes{aside}"
+        strokes = "stroke" if variant.count == 1 else "strokes"
+        title = f"{study.title}, {variant.variant}: {variant.count} {strokes}{aside}"
         yield TextTable(title=title, columns=CURVE_COLUMNS, rows=curve_rows(variant))
         impacts = impact_rows(variant)
         yield TextTable(title="Impacts", columns=IMPACT_COLUMNS, rows=impacts, left=2)
