@@ -170,31 +170,54 @@ def test_from_two_step_files_by_clicking_to_a_case(page, server, folder):
     assert sorted(p.name for p in (folder / "first").iterdir()) == ["case.yaml"]
 
 
+def tab_to(page: Any, wanted: Any) -> None:
+    """Press Tab until the focus is there."""
+    for _ in range(150):
+        page.keyboard.press("Tab")
+        if wanted.evaluate("e => e === document.activeElement"):
+            return
+    raise AssertionError(f"no Tab leads to {wanted}")
+
+
+def press_next(page: Any, sign: str) -> None:
+    page.wait_for_selector("#k-next:enabled")
+    tab_to(page, page.locator("#k-next"))
+    page.keyboard.press("Enter")
+    page.wait_for_selector(sign)
+
+
 def test_from_drawings_by_keyboard_and_it_survives(page, server, folder, browser):
+    """Tab, arrows, letters and Enter lead through all steps; nothing is focused by a script."""
     open_guide(page, server)
-    page.get_by_label("The two bodies come from").focus()
+    tab_to(page, page.get_by_label("The two bodies come from"))
     page.keyboard.press("ArrowDown")
     for body in ("needle", "housing"):
-        page.get_by_role("button", name=f"Fill in the example of the {body}").press("Enter")
+        fill_in = page.get_by_role("button", name=f"Fill in the example of the {body}")
+        fill_in.wait_for()
+        tab_to(page, fill_in)
+        page.keyboard.press("Enter")
         page.wait_for_function(
             "body => [...document.querySelectorAll('textarea')]"
             ".find(e => e.ariaLabel.includes(body)).value.includes('z, surface')",
             arg=body,
         )
     read(page)
-    page.locator("#k-next").press("Enter")
-    page.wait_for_selector(".ks-view canvas")
-    for name, key in (("needle.tip", "c"), ("housing.seat", "c"), ("housing.rim", "h")):
-        box = page.get_by_label(name, exact=True)
-        box.focus()
+    press_next(page, ".ks-view canvas")
+    page.wait_for_selector("text=Proposed from the geometry: needle.tip hits housing.seat")
+    for name, key, role in (("rim", "Home", ""), ("outside", "h", "held")):
+        tab_to(page, page.get_by_label(f"housing.{name}", exact=True))
         page.keyboard.press(key)
-        page.keyboard.press("Tab")
-    page.wait_for_function("!document.getElementById('k-next').disabled")
-    page.locator("#k-next").press("Enter")
-    page.wait_for_selector("text=Young's modulus")  # shown after it is kept
-
+        page.wait_for_function("role => document.activeElement.value === role", arg=role)
+    press_next(page, "text=Young's modulus")
+    tab_to(page, page.get_by_label("Material of the housing"))
+    page.keyboard.press("ArrowDown")
+    press_next(page, "text=Closing force")
+    tab_to(page, page.get_by_label("Speed at the impact"))
+    page.keyboard.press("Control+a")
+    page.keyboard.type("0.25 m/s")
+    press_next(page, "text=static hold")
     page.reload()  # and another server: the step and all choices are there
-    page.wait_for_selector("text=Young's modulus")
+    page.wait_for_selector("text=static hold")
     with Served(folder) as other:
         context = browser.new_context()
         second = context.new_page()
@@ -202,23 +225,62 @@ def test_from_drawings_by_keyboard_and_it_survives(page, server, folder, browser
         second.goto(other.address)
         second.wait_for_selector("#k-body")
         second.goto(f"{other.base}/new")
-        second.wait_for_selector("text=Young's modulus")
+        second.wait_for_selector("text=static hold")
         second.get_by_role("button", name="2 Faces").press("Enter")
         second.wait_for_selector(".k-face select")
-        assert second.get_by_label("housing.rim", exact=True).input_value() == "held"
+        assert second.get_by_label("housing.outside", exact=True).input_value() == "held"
         context.close()
     page.goto(f"{server.base}/new")
-    page.locator("button:enabled", has_text="6 Case").press("Enter")
+    page.wait_for_selector("button:enabled >> text=6 Case")
+    tab_to(page, page.get_by_role("button", name="6 Case"))
+    page.keyboard.press("Enter")
     page.wait_for_selector("text=klack: 1")
-    page.get_by_label("Name of the valve").fill("drawn")
-    page.get_by_label("Name of the valve").press("Tab")
-    page.get_by_role("button", name="Write, open editor").press("Enter")
+    tab_to(page, page.get_by_label("Name of the valve"))
+    page.keyboard.press("Control+a")
+    page.keyboard.type("drawn")
+    tab_to(page, page.get_by_role("button", name="Write, open editor"))
+    page.keyboard.press("Enter")
     page.wait_for_selector("text=valid impact, saved")
-    assert (folder / "drawn" / "case.yaml").is_file()
+    case = load_any_case(folder / "drawn" / "case.yaml")
+    assert case.bodies["housing"].fixed[0].surface == "outside"
+    assert case.motion.speed == 0.25
+    assert case.bodies["housing"].material != case.bodies["needle"].material
+
+
+@pytest.mark.parametrize("kind", ["turned", "square"])
+def test_faces_are_proposed_with_the_reason_of_files_chosen_at_once(page, server, folder, kind):
+    """Truth: as drawn; a square rod, no turned part, ends 0.1 mm above its block."""
+    from netgen.occ import Box, Pnt, Z
+
+    faces, how = ("tip", "seat", "rim"), "nearest along the axis"
+    if kind == "square":
+        faces, how = ("foot", "up", "base"), "nearest along the axis, 100 um apart as drawn"
+        rod, block = Box(Pnt(-1, -1, 0.1), Pnt(1, 1, 9)), Box(Pnt(-3, -2, -6), Pnt(3, 2, 0))
+        ends = rod.faces.Min(Z), block.faces.Max(Z), block.faces.Min(Z)
+        for face, name in zip(ends, faces, strict=True):
+            face.name = name
+        rod.WriteStep(str(folder / "cad" / "square-needle.step"))
+        block.WriteStep(str(folder / "cad" / "square-housing.step"))
+    file = {"turned": "cad/{}.step", "square": "cad/square-{}.step"}[kind]
+    open_guide(page, server)
+    choose_step(page, "needle", "cad/words.step")
+    page.wait_for_selector("text=which starts with")  # so the process that reads is there
+    with slow(server, "shapes:Shapes"):
+        for body in ("needle", "housing"):
+            choose_step(page, body, file.format(body))
+        page.wait_for_function("document.body.innerText.split('Reading ...').length == 3")
+    read(page)
+    page.wait_for_selector("#k-next:enabled")
+    onward(page, ".ks-view canvas")
+    words = page.locator("#k-step .k-read").inner_text()
+    assert f"needle.{faces[0]} hits housing.{faces[1]}, which are {how}" in words
+    roles = (("needle", "contact"), ("housing", "contact"), ("housing", "held"))
+    for (body, role), face in zip(roles, faces, strict=True):
+        assert page.get_by_label(f"{body}.{face}", exact=True).input_value() == role
 
 
 def test_what_rests_on_the_checks_cannot_be_pressed_before_they_are_done(page, server, folder):
-    planned(3)(folder)
+    planned(3, model="solid")(folder)  # chosen of STEP files, before there were drawings
     page.goto(f"{server.base}/new")
     page.wait_for_selector("text=Closing force")
     with slow(server, "shapes:Shapes"):

@@ -14,6 +14,7 @@ from klack.app.folder import OpenFolder
 from klack.app.guard import LARGEST_UPLOAD
 from klack.app.parts import outline_of_table, part_of_step, part_of_table
 from klack.app.plan_review import review
+from klack.app.proposals import proposal
 from klack.app.state import Uploads
 from klack.app.valve_plan import BODIES, EXAMPLES, Plans, ValvePlan
 from klack.case.any_case import load_any_case
@@ -342,13 +343,90 @@ def test_the_faces_of_the_demo_valve_are_proposed_from_its_geometry(source, tabl
         parts = {body: part_of_step(body, steps / f"{body}.step") for body in BODIES}
     if source == "raised":
         parts["needle"] = part_of_table("needle", raised(EXAMPLES["needle"], 0.1))
-    faces = {body: part.facts.faces for body, part in parts.items()}
-    plan, words = ValvePlan().with_proposals(faces)
-    given = ValvePlan(held=("top",))
+    found = proposal(parts, "half")
 
-    assert plan.roles == PLAN.roles
-    assert ("100 um apart" in words) is (source == "raised")
-    assert given.with_proposals(faces) == (given, "")  # what is chosen stays
+    assert ValvePlan().with_proposal(found).roles == PLAN.roles
+    assert ("100 um apart" in found.words) is (source == "raised")
+
+
+def test_of_equally_near_faces_one_place_gets_a_proposal_and_two_get_none():
+    """Both gaps are drawn as 0.1 mm: a foot over a land and its chamfer, a flange over a step."""
+
+    def found(needle: str, housing: str):
+        outlines = {"needle": f"0, 0.1\n2, 0.1, foot\n{needle}0, 9, top"}
+        outlines["housing"] = f"0.5, -4\n5, -4, low\n{housing}1, 0, land\n0.5, -0.5, chamfer"
+        return proposal(
+            {body: part_of_table(body, rows) for body, rows in outlines.items()}, "half"
+        )
+
+    one = found("2, 9, shaft\n", "5, 0, out\n")
+    two = found(
+        "2, 2.1, shaft\n3, 2.1, flange\n3, 9, rim\n", "5, 2, out\n2.5, 2, step\n2.5, 0, wall\n"
+    )
+
+    assert (one.needle_contact, one.housing_contact, one.held) == ("foot", "land", "out")
+    assert "100 um apart as drawn" in one.words
+    assert two.words.startswith("No contact faces are proposed: ")
+    assert "needle.flange on housing.step" in two.words
+    assert (two.needle_contact, two.housing_contact, two.held) == ("", "", "")
+
+
+def pins_and_pads(place: Path, gaps) -> dict:
+    """Parts whose ``pin1``, ``pin2`` ..., balls of 1 mm, hang above ``pad1``, ``pad2`` ... [mm]."""
+    from netgen.occ import Box, Cylinder, Pnt, Sphere, Z
+
+    needle, housing = Box(Pnt(0, 0, 20), Pnt(60, 6, 24)), Box(Pnt(0, 0, -4), Pnt(60, 6, 0))
+    housing.faces.Min(Z).name = "base"
+    for k, gap in enumerate(gaps, 1):
+        x, top = 5.0 * k, 10.0 + k
+        pad = Cylinder(Pnt(x, 3, 0), Z, r=2.0, h=top)
+        middle = Pnt(x, 3, top + gap + 1)
+        pin = Sphere(middle, 1.0)
+        pad.faces.Max(Z).name, pin.faces[0].name = f"pad{k}", f"pin{k}"
+        needle = needle + pin + Cylinder(middle, Z, r=0.8, h=20 - middle.z)
+        housing = housing + pad
+    for body, shape in zip(BODIES, (needle, housing), strict=True):
+        shape.WriteStep(str(place / f"{body}.step"))
+    return {body: part_of_step(body, place / f"{body}.step") for body in BODIES}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("gaps", "faces", "words"),
+    [
+        (
+            (0.5, 0.0),
+            ("pin2", "pad2", "base"),
+            "touching as drawn (next: needle.pin1 on housing.pad1, 500 um)",
+        ),
+        ((0.1, 0.1), ("", "", ""), "are equally near along the axis"),
+        ((0.5, -0.2), ("", "", ""), "overlap as drawn (0.117 mm^3 in common, at z 11.8 to 12 mm)"),
+    ],
+)
+def test_faces_of_solids_are_proposed_or_not_as_they_were_drawn(gaps, faces, words, tmp_path):
+    """Gaps as drawn, to 5e-4 of a side; a cap 0.2 mm high has pi h^2 (3 R - h) / 3 in common."""
+    found = proposal(pins_and_pads(tmp_path, gaps), "solid")
+
+    assert (found.needle_contact, found.housing_contact, found.held) == faces
+    assert words in found.words
+
+
+@pytest.mark.slow
+def test_solids_without_one_pair_or_one_flat_end_say_so(tmp_path):
+    from netgen.occ import Box, Pnt, Sphere, Z
+
+    parts = pins_and_pads(tmp_path, (0.1,))
+    upside_down = proposal({"needle": parts["housing"], "housing": parts["needle"]}, "solid")
+    ball = Sphere(Pnt(10, 3, 0), 8.0) - Box(Pnt(0, -9, 3), Pnt(20, 15, 9))
+    ball.faces.Max(Z).name = "flat"
+    ball.WriteStep(str(tmp_path / "ball.step"))
+    on_ball = proposal(
+        {**parts, "housing": part_of_step("housing", tmp_path / "ball.step")}, "solid"
+    )
+
+    assert upside_down.words.startswith("No contact faces are proposed: no face of the housing")
+    assert (on_ball.needle_contact, on_ball.housing_contact, on_ball.held) == ("pin1", "flat", "")
+    assert "no held face is proposed: the housing has no flat outer face" in on_ball.words
 
 
 def test_faces_are_called_by_their_place(tables):

@@ -403,20 +403,11 @@ class NetworkView:
 
 @dataclass(frozen=True, kw_only=True)
 class FaceFacts:
-    """A face of a part, for a list.
-
-    Parameters
-    ----------
-    place
-        Where it lies on its part: ``"bottom"``, ``"outside"``.
-    line
-        Points (r, z) [m] along it; none for a part that is not turned.
-    """
+    """A face of a part, for a list; ``place`` is ``"bottom"``, ``"outside"``."""
 
     name: str
     words: str
     place: str = ""
-    line: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -431,6 +422,16 @@ class PartFacts:
     faces: tuple[FaceFacts, ...]
     solid_faces: tuple[FaceFacts, ...]
     not_turned: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Proposal:
+    """Faces that meet and the held one, each empty if unknown; ``words`` say why these or none."""
+
+    needle_contact: str = ""
+    housing_contact: str = ""
+    held: str = ""
+    words: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -311,8 +311,7 @@ def _profile_faces(profiles: Mapping[str, Profile]) -> tuple[FaceFacts, ...]:
         low, high = points.min(axis=0), points.max(axis=0)
         place = "arc" if name in arcs else _place(low, high, ends)
         words = f"r {_range(low[0], high[0])}, z {_range(low[1], high[1])}"
-        line = tuple((float(r), float(z)) for r, z in points)
-        found.append(FaceFacts(name=name, words=words, place=place, line=line))
+        found.append(FaceFacts(name=name, words=words, place=place))
     return tuple(found)
 
 

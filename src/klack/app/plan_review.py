@@ -29,7 +29,7 @@ from klack.mesh.profile import Arc, Curve, Line, Profile
 from klack.mesh.sizing import MeshSizing, Refinement, mesh_nodes, run_time
 from klack.units import FORCE, LENGTH, SPEED, format_si, parse_quantity
 
-__all__ = ["review"]
+__all__ = ["overlap", "review"]
 
 
 _MM = 1e3
@@ -46,28 +46,18 @@ class BodySizes:
     extent: float
 
 
-def case_text(
-    plan: ValvePlan,
-    profiles: Mapping[str, Mapping[str, Profile] | None],
-    sizes: Mapping[str, BodySizes],
-    duration: float,
-    files: Mapping[str, str],
-) -> str:
-    """YAML of a case; ``duration`` in s.
-
-    ``profiles`` are half sections, None for a body that stays in its STEP file; ``files`` are these
-    as the case names them.
-    """
-    return "\n".join(_lines(plan, profiles, sizes, duration, files)) + "\n"
-
-
-def _lines(
+def _case_lines(
     plan: ValvePlan,
     profiles: Mapping[str, Mapping[str, Profile] | None],
     sizes: Mapping[str, BodySizes],
     duration: float,
     files: Mapping[str, str],
 ) -> Iterator[str]:
+    """YAML of a case; ``duration`` in s.
+
+    ``profiles`` are half sections, None for a body that stays in its STEP file; ``files`` are these
+    as the case names them.
+    """
     yield "klack: 1"
     yield f"title: {json.dumps(plan.name)}"
     yield f"# Written by the guide of klack app from {_origin(plan)}; all of it may be changed."
@@ -233,18 +223,19 @@ def review(plan: ValvePlan, parts: Mapping[str, Part], place: Path) -> Review:
     if any(finding.grade == "error" for finding in findings):
         return Review(findings=tuple(findings))
     profiles = {b: p.profiles if p.is_half(plan.model) else None for b, p in parts.items()}
-    present = {body: str(part.path) for body, part in parts.items()}
-    copied = {body: f"{body}.step" for body in parts}
+
+    def text(files: Mapping[str, str]) -> str:
+        return "\n".join((*_case_lines(plan, profiles, sizes, meeting.duration, files), ""))
+
     try:
-        text = case_text(plan, profiles, sizes, meeting.duration, present)
-        tree_of(text, place).any_case()
+        tree_of(text({b: str(part.path) for b, part in parts.items()}), place).any_case()
     except KlackError as error:
         advice = "change what it names; the guide wrote the rest."
         findings.append(_error("case file", str(error), advice, _FACES))
         return Review(findings=tuple(findings))
     return Review(
         findings=tuple(findings),
-        text=case_text(plan, profiles, sizes, meeting.duration, copied),
+        text=text({body: f"{body}.step" for body in parts}),
         steps=tuple(body for body, profile in profiles.items() if profile is None),
     )
 
@@ -421,10 +412,10 @@ def _placing(
         yield _doubt("gap", words, advice, _PARTS)
     else:
         yield _good("gap", words)
-    overlap = _overlap(plan, parts, -drawn + numbers["gap"] + _CLEAR)
-    if overlap:
+    common = overlap(parts, -drawn + numbers["gap"] + _CLEAR)
+    if common:
         advice = "check the contact faces: another pair touches first; or the unit of a file."
-        yield _error("overlap", overlap, advice, _FACES)
+        yield _error("overlap", common, advice, _FACES)
     else:
         yield _good("overlap", "none: the bodies touch at the contact faces alone")
     yield _first_touch(meeting)
@@ -451,7 +442,7 @@ def _first_touch(meeting: _Meeting) -> Finding:
     return _good("first touch", f"a ring of radius {1e3 * meeting.radius:.3g} mm at {where}")
 
 
-def _overlap(plan: ValvePlan, parts: Mapping[str, Part], shift: float) -> str:
+def overlap(parts: Mapping[str, Part], shift: float) -> str:
     """Overlap of both bodies with a shifted needle, in words; empty for none."""
     from netgen.occ import gp_Vec
 

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from klack import __version__
-from klack.app.answers import PartFacts, Review, typed
+from klack.app.answers import PartFacts, Proposal, Review, typed
 from klack.app.parts import Part, part_of_step, part_of_table
 from klack.app.plan_review import review
+from klack.app.proposals import proposal
 from klack.app.valve_plan import ValvePlan
 from klack.case.any_case import tree_of
 from klack.errors import InputError
@@ -65,6 +66,10 @@ class Shapes:
             notes=("Meshed coarsely, only for this picture.",),
         )
         return packed_scene(view)
+
+    def proposal(self, sources: Sources, model: str) -> Proposal:
+        """See :func:`klack.app.proposals.proposal`."""
+        return proposal({name: self._part(name, one) for name, one in sources.items()}, model)
 
     def review(self, plan: ValvePlan, sources: Sources, place: str) -> Review:
         """See :func:`klack.app.plan_review.review`."""

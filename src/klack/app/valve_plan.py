@@ -2,17 +2,13 @@
 
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
-from itertools import pairwise
-from math import hypot
-from statistics import fmean
 from typing import Any
 
-from klack.app.answers import FaceFacts
+from klack.app.answers import Proposal
 from klack.app.folder import OpenFolder
 from klack.errors import InputError
-from klack.units import format_si
 
 __all__ = ["BODIES", "EXAMPLES", "STEPS", "Plans", "ValvePlan"]
 
@@ -158,36 +154,14 @@ class ValvePlan:
             radiating=tuple(face for face in plan.radiating if face in own),
         )
 
-    def with_proposals(self, faces: Mapping[str, Sequence[FaceFacts]]) -> tuple["ValvePlan", str]:
-        """The same with the faces that meet and are held, where none is chosen, and why these.
-
-        Those of needle and housing that are nearest along the axis meet; the outer face of the
-        housing farthest from there is held.
-        """
-        if self.needle_contact or self.housing_contact or self.held:
-            return self, ""
-        gaps = _gaps(faces["needle"], faces["housing"])
-        nearest = min(gaps, key=lambda found: abs(found[0]), default=None)
-        if nearest is None:
-            return self, ""
-        gap, upper, lower, (r, z) = nearest
-        outer = [face for face in faces["housing"] if face.line and face.place == "outside"]
-        others = outer or [face for face in faces["housing"] if face.line]
-        held = max(
-            (face for face in others if face.name != lower),
-            key=lambda face: hypot(
-                *(fmean(at) - x for at, x in zip(zip(*face.line, strict=True), (r, z), strict=True))
-            ),
-        ).name
-        how = "apart" if gap >= 0.0 else "overlapping"
-        apart = f"{format_si(abs(gap), 'm', 2)} {how} as drawn" if gap else "touching as drawn"
-        words = (
-            f"Proposed from the geometry: needle.{upper} hits housing.{lower}, which are nearest "
-            f"along the axis, {apart}; housing.{held} is held, the outer face farthest from "
-            "there. Change what is otherwise."
+    def with_proposal(self, found: Proposal) -> "ValvePlan":
+        """The same with proposed faces."""
+        return replace(
+            self,
+            needle_contact=found.needle_contact,
+            housing_contact=found.housing_contact,
+            held=(found.held,) if found.held else (),
         )
-        plan = replace(self, needle_contact=upper, housing_contact=lower, held=(held,))
-        return plan, words
 
     def require_name(self) -> None:
         """Refuse a name that is no plain name of a folder."""
@@ -198,31 +172,6 @@ class ValvePlan:
                 expected="letters, digits, - and _, 61 at most",
                 hint="my-valve",
             )
-
-
-_ROUND = 1e-9  # [m] of drawings in mm with six digits
-_OVERLAP = 0.01  # of the height of a face: of a drawing with digits, not of a face inside a body
-
-
-def _gaps(
-    above: Sequence[FaceFacts], below: Sequence[FaceFacts]
-) -> Iterator[tuple[float, str, str, tuple[float, float]]]:
-    """Smallest gap along z of each pair of faces, and its place (r, z); none within each other."""
-    for upper in above:
-        for lower in below:
-            gaps = [
-                (z - height, (r, height))
-                for r, z in upper.line
-                for (r0, z0), (r1, z1) in pairwise(lower.line)
-                if min(r0, r1) <= r <= max(r0, r1) and abs(r1 - r0) > _ROUND
-                for height in [z0 + (z1 - z0) * (r - r0) / (r1 - r0)]
-            ]
-            if not gaps:
-                continue
-            gap, place = min(gaps)
-            reach = max(max(at) - min(at) for at in zip(*upper.line, strict=True))
-            if gap > -_OVERLAP * reach:
-                yield (gap if abs(gap) > _ROUND else 0.0), upper.name, lower.name, place
 
 
 class Plans:

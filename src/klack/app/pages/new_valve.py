@@ -9,7 +9,7 @@ from typing import Any
 from nicegui import ui
 from nicegui.elements.mixins.text_element import TextElement
 
-from klack.app.answers import Finding, PartFacts, Review
+from klack.app.answers import Finding, PartFacts, Proposal, Review
 from klack.app.folder import LARGEST_FILE
 from klack.app.pages.frame import (
     Handler,
@@ -65,7 +65,7 @@ class _Guide:
     def __init__(self, state: State, plan: ValvePlan) -> None:
         self._state, self._plan = state, plan
         self._facts: dict[str, PartFacts | str] = {}
-        self._proposed = ""  # why faces were chosen
+        self._proposed = Proposal()  # faces, and why these
         self._writing, self._turn = asyncio.Lock(), asyncio.Lock()
         self._is_checking = False  # the step that is shown has not its answer yet
 
@@ -178,7 +178,9 @@ class _Guide:
 
     @property
     def model(self) -> str:
-        """``"half"`` if chosen and both parts are turned."""
+        """``"half"`` of drawings, and if chosen and both parts are turned."""
+        if self._plan.source == "table":
+            return "half"
         turned = all((f := self.facts(b)) is not None and not f.not_turned for b in BODIES)
         return self._plan.model if turned else "solid"
 
@@ -205,7 +207,10 @@ class _Guide:
         self._next.set_visibility(self._plan.step < _LAST)
         missing = ("choose two parts that can be read", "choose both contact faces and a held face")
         stuck = self._plan.step == furthest < 2
-        self._why.set_text(f"To continue, {missing[furthest]}." if stuck else "")
+        why = f"To continue, {missing[furthest]}." if stuck else ""
+        if self._is_checking and not self._plan.step:
+            why = "Looking for the faces that meet; solids are meshed for that, in seconds ..."
+        self._why.set_text(why)
 
     async def _show(self) -> None:
         if self._plan.step > self._furthest():
@@ -242,16 +247,36 @@ class _Guide:
         self._parts.show_facts()
         async with self._turn:
             await self._read_parts()
-            known = {body: tuple(face.name for face in self._faces_of(body)) for body in BODIES}
-            if all(self.facts(body) is not None for body in BODIES):
-                faces = {body: self._faces_of(body) for body in BODIES}
-                plan, self._proposed = self._plan.with_faces(known).with_proposals(faces)
-                await self.keep(plan)
+            self._parts.show_facts()
+            await self._propose()
             if self._plan.step:  # another step is shown by now, of what was read before
                 await self._show()
             else:
                 self._show_steps()
-                self._parts.show_facts()
+
+    async def _propose(self) -> None:
+        """Choose faces from the geometry, unless others than the last proposed ones are chosen."""
+        plan, none, sources = self._plan, Proposal(), self.sources()
+        if any(self.facts(body) is None or body not in sources for body in BODIES):
+            return
+        if plan == plan.with_proposal(self._proposed):
+            plan = plan.with_proposal(none)
+        self._proposed = none
+        known = {body: tuple(face.name for face in self._faces_of(body)) for body in BODIES}
+        await self.keep(plan.with_faces(known))
+        if self._plan != self._plan.with_proposal(none):
+            return
+        self._is_checking = True
+        self._show_steps()
+        try:
+            found = await self._state.shapes.call("proposal", sources, self.model)
+        except (KlackError, OSError) as error:
+            found = Proposal(words=f"No faces are proposed: {error}")
+        finally:
+            self._is_checking = False
+        if self._plan == self._plan.with_proposal(none):  # none was chosen meanwhile
+            self._proposed = found
+            await self.keep(self._plan.with_proposal(found))
 
     def _faces_of(self, body: str) -> tuple[Any, ...]:
         facts = self.facts(body)
@@ -263,7 +288,7 @@ class _Guide:
 
     async def _show_faces(self) -> None:
         faces = {body: self._faces_of(body) for body in BODIES}
-        step = FacesStep(faces, lambda: self._plan, self.keep, self._proposed)
+        step = FacesStep(faces, lambda: self._plan, self.keep, self._proposed.words)
         step.build()
 
         async def drawn() -> None:
