@@ -13,9 +13,10 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from klack.analyses.magnet.case import magnet_case_schema
-from klack.case import case_schema
-from klack.case.any_case import valve_case_schema
+from klack.analyses.magnet.case import MagnetCase
+from klack.case.reader import schema_of
+from klack.case.schema import Case
+from klack.case.valve import ValveCase
 from klack.units import KINDS, Kind, format_si
 
 __all__ = ["PAGES", "anchor", "page"]
@@ -39,7 +40,7 @@ PAGES = {
         "Every key that `klack impact`, `klack shots`, `klack reduce` and `klack noise` read in a "
         "case of two bodies. What they mean together, with examples: "
         "[case files](case.md). The same for editors: `klack schema`.",
-        case_schema,
+        Case,
     ),
     "valve-keys": (
         "Keys of a valve case",
@@ -47,14 +48,14 @@ PAGES = {
         "(`klack stroke`, `klack calibrate`, `klack noise`). What they mean together, with "
         "examples: [cases of a whole valve](valve-case.md). The same for editors: "
         "`klack schema --kind stroke`.",
-        valve_case_schema,
+        ValveCase,
     ),
     "magnet-keys": (
         "Keys of the case of a magnet",
         "Every key that `klack magnet` reads. With examples: "
         "[bring a magnet map](../how-to/bring-a-magnet-map.md#from-a-drawing). The same for "
         "editors: `klack schema --kind magnet`.",
-        magnet_case_schema,
+        MagnetCase,
     ),
 }
 _NOTES = """\
@@ -305,8 +306,8 @@ def _classes() -> Iterator[type[BaseModel]]:
 
 def main() -> None:
     """Write both pages."""
-    for name, (title, about, schema) in PAGES.items():
-        (FOLDER / f"{name}.md").write_text(page(title, about, schema()), encoding="utf-8")
+    for name, (title, about, kind) in PAGES.items():
+        (FOLDER / f"{name}.md").write_text(page(title, about, schema_of(kind)), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -8,11 +8,13 @@ from typing import Any
 from draws import each
 from ruamel.yaml import YAML
 
-from klack.case import case_schema, read_case
+from klack.case import read_case
+from klack.case.reader import schema_of
+from klack.case.schema import Case
 
 ROOT = Path(__file__).parents[2]
 DRAWN = ROOT / "tests" / "data" / "case" / "drawn.yaml"
-SCHEMA = case_schema()
+SCHEMA = schema_of(Case)
 
 
 def resolve(node: dict[str, Any]) -> dict[str, Any]:
@@ -22,7 +24,7 @@ def resolve(node: dict[str, Any]) -> dict[str, Any]:
 
 
 def fits(value: Any, node: dict[str, Any]) -> bool:
-    """Check the part of JSON schema that case_schema uses."""
+    """Check the part of JSON schema that schema_of uses."""
     node = resolve(node)
     for word in ("anyOf", "oneOf"):
         if word in node:

@@ -16,7 +16,7 @@ import pytest
 
 from klack.analyses.stroke.analysis import STROKE, first_impact, stroke_answer
 from klack.analyses.stroke.axis import guide_of
-from klack.analyses.stroke.content import stroke_charts, stroke_content
+from klack.analyses.stroke.content import stroke_content
 from klack.analyses.stroke.film_frames import film_charts
 from klack.analyses.stroke.measures import pace
 from klack.analyses.stroke.record import (
@@ -29,7 +29,7 @@ from klack.analyses.stroke.record import (
 )
 from klack.analyses.stroke.ring_figure import line_load_picture
 from klack.assembling.body_summary import BodySummary
-from klack.report.chart import BarChart, Chart, RingFrames, frame_text, squeezed, ticks_of
+from klack.report.chart import AnyChart, BarChart, Chart, RingFrames, frame_text, squeezed, ticks_of
 from klack.report.html import render_html, write_report
 from klack.report.looks import thinned
 from klack.report.pdf import render_pdf
@@ -228,6 +228,10 @@ def study() -> StrokeStudy:
 @pytest.fixture(scope="module")
 def page(study: StrokeStudy) -> str:
     return render_html(stroke_content(study))
+
+
+def stroke_charts(study: StrokeStudy) -> list[AnyChart]:
+    return [chart for section in stroke_content(study).sections for chart in section.charts]
 
 
 def chart(study: StrokeStudy, name: str) -> Chart:

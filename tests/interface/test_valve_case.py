@@ -7,13 +7,9 @@ from pathlib import Path
 import pytest
 
 from klack.case import read_case
-from klack.case.any_case import (
-    load_any_case,
-    load_valve_case,
-    read_valve_case,
-    valve_case_schema,
-)
+from klack.case.any_case import load_any_case, load_valve_case, read_valve_case
 from klack.case.bodies import CaseBody
+from klack.case.reader import schema_of
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import find_roles
 from klack.case.valve_sections import BodyPort, CaseStop, StrokeRun, ValveBody
@@ -254,7 +250,7 @@ def test_either_kind_is_told_by_its_sections():
 
 
 def test_schema_is_plain_json_and_holds_the_components():
-    schema = valve_case_schema()
+    schema = schema_of(ValveCase)
 
     assert '"flexible-body"' in json.dumps(schema, allow_nan=False)
     assert set(schema["required"]) == {"klack", "title", "network", "run"}

@@ -12,7 +12,8 @@ from doubts import doubts
 
 from klack.analyses.impact.contact_check import check_yield
 from klack.assembling.problem import build_problem
-from klack.case.reader import case_schema, read_case
+from klack.case.reader import read_case, schema_of
+from klack.case.schema import Case
 from klack.errors import InputError
 from klack.materials.library import MATERIALS, library_material
 
@@ -96,7 +97,7 @@ def test_names_and_mixtures_that_cannot_be_are_refused(written, message):
 
 
 def test_editors_accept_a_name_alone_and_beside_own_numbers():
-    node = case_schema()["$defs"]["CaseMaterial"]
+    node = schema_of(Case)["$defs"]["CaseMaterial"]
     assert node["type"] == ["string", "object"]
     assert node["anyOf"] == [
         {"required": ["young", "poisson", "density"]},

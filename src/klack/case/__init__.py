@@ -2,7 +2,7 @@
 
 from klack.case.bodies import SurfaceName
 from klack.case.levels import LEVELS
-from klack.case.reader import case_schema, find_case, load_case, read_case, shipped_cases
+from klack.case.reader import find_case, load_case, read_case, shipped_cases
 from klack.case.schema import Case
 from klack.input.problem import CaseProblem
 
@@ -11,7 +11,6 @@ __all__ = [
     "Case",
     "CaseProblem",
     "SurfaceName",
-    "case_schema",
     "find_case",
     "load_case",
     "read_case",

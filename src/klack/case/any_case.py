@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from klack.case.parts import self_contained
-from klack.case.reader import Lines, find_case, parse, schema_of, text_of, validated
+from klack.case.reader import Lines, find_case, parse, text_of, validated
 from klack.case.schema import Case
 from klack.case.valve import ValveCase, require_valve
 from klack.input.problem import Key
@@ -24,7 +24,6 @@ __all__ = [
     "read_case_tree",
     "read_valve_case",
     "tree_of",
-    "valve_case_schema",
 ]
 
 
@@ -64,11 +63,6 @@ def read_valve_case(text: str, path: Path, components: OwnComponents = ()) -> Va
 def read_any_case(text: str, path: Path, components: OwnComponents = ()) -> AnyCase:
     """Check the text of a case of either kind."""
     return _parsed(text, path, components).any_case()
-
-
-def valve_case_schema() -> dict[str, Any]:
-    """JSON schema of a valve case, with all components."""
-    return schema_of(ValveCase)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -24,7 +24,6 @@ from klack.input.section import Section
 
 __all__ = [
     "Lines",
-    "case_schema",
     "expanded",
     "find_case",
     "load_case",
@@ -161,13 +160,8 @@ def validated(
     return checked
 
 
-def case_schema() -> dict[str, Any]:
-    """JSON schema of an impact case (draft 2020-12), for editors."""
-    return schema_of(Case)
-
-
 def schema_of(kind: type[BaseModel]) -> dict[str, Any]:
-    """JSON schema of a kind of file."""
+    """JSON schema of a kind of file (draft 2020-12), for editors."""
     schema = kind.model_json_schema(by_alias=True)
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 

@@ -52,7 +52,6 @@ __all__ = [
     "sphere_over_cylinder",
     "square_pulse",
     "two_spheres",
-    "zener_parameter",
 ]
 
 
@@ -357,15 +356,6 @@ def _strip(length: float, radius: float, elements: int) -> Mesh:
             "top": Surface("top", (FaceBlock("line3", top[None]),)),
         },
     )
-
-
-def zener_parameter(material: Material, sphere_radius: float, radius: float, speed: float) -> float:
-    """Zener's lambda = m / (Z T0), sphere on a rod of the same material [-]."""
-    mass = material.density * 4.0 / 3.0 * pi * sphere_radius**3
-    stiffness = 4.0 / 3.0 * 0.5 * material.plane_strain_modulus * np.sqrt(sphere_radius)
-    time = (mass**2 / (stiffness**2 * speed)) ** 0.2
-    impedance = material.density * material.bar_wave_speed * pi * radius**2
-    return float(mass / (impedance * time))
 
 
 _RIGID = Material(name="rigid", young=1e6 * STEEL.young, poisson=0.3, density=STEEL.density)

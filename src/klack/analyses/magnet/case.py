@@ -7,7 +7,7 @@ from typing import Any, Literal, Self
 from pydantic import Field, PrivateAttr, model_validator
 
 from klack.case.bodies import WrittenCase
-from klack.case.reader import find_case, parse, schema_of, text_of, validated
+from klack.case.reader import find_case, parse, text_of, validated
 from klack.errors import InputError
 from klack.input.problem import CaseProblem, Key
 from klack.input.section import Name, Number, Section
@@ -16,7 +16,7 @@ from klack.magnetics.iron_choice import IronChoice
 from klack.mesh.profile import Profile
 from klack.units import LENGTH, Current, Length, LengthUnit, format_si
 
-__all__ = ["MagnetCase", "load_magnet_case", "magnet_case_schema"]
+__all__ = ["MagnetCase", "load_magnet_case"]
 
 _CORNERS = "Corners (r, z) of the half section in order; two corners define a rectangle."
 
@@ -159,8 +159,3 @@ def load_magnet_case(path: str | Path) -> MagnetCase:
             hint=f"run it with klack {'stroke' if other == 'network' else 'impact'}.",
         )
     return validated(MagnetCase, text, path, data, lines)
-
-
-def magnet_case_schema() -> dict[str, Any]:
-    """JSON schema of the case of a magnet."""
-    return schema_of(MagnetCase)

@@ -51,7 +51,6 @@ from klack.units import format_si
 __all__ = [
     "PointFound",
     "find_point",
-    "held_network",
     "run_operating_points",
     "searched",
     "valve_at",
@@ -186,11 +185,6 @@ def find_point(
     return PointFound(
         point=point, network=network, rows=rows, currents=currents, notes=tuple(notes)
     )
-
-
-def held_network(network: Network, currents: Mapping[str, float]) -> Network:
-    """Network with constant currents, sources and forces, which stays at rest."""
-    return driven(network, currents).at_start()
 
 
 def valve_at(

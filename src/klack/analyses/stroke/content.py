@@ -60,7 +60,7 @@ from klack.report.page import Content, NextStep, Section, Table
 from klack.report.wording import quantity
 from klack.simulation.network_result import EnergyBooks
 
-__all__ = ["NEXT_STEPS", "stroke_charts", "stroke_content"]
+__all__ = ["NEXT_STEPS", "stroke_content"]
 
 _MOST_IMPACTS = 12
 _MOST_STAIRS, _MOST_FLOWS = 24, 40
@@ -116,11 +116,6 @@ def stroke_content(study: StrokeStudy) -> Content:
         limits=_limits(study),
         next_steps=_next_steps(study),
     )
-
-
-def stroke_charts(study: StrokeStudy) -> tuple[AnyChart, ...]:
-    """Every figure that the study has data for, in the order of the report."""
-    return tuple(chart for section in stroke_content(study).sections for chart in section.charts)
 
 
 def _named(*charts: AnyChart | None) -> tuple[AnyChart, ...]:
