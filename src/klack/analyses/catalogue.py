@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from klack.analyses.named import named
-from klack.errors import InputError
+from klack.errors import refuse_if
 
 if TYPE_CHECKING:
     from klack.analyses.analysis import Analysis, StoredAnalysis
@@ -113,14 +113,14 @@ def analysis_in(folder: Path) -> "StoredAnalysis[Any]":
 
     name = stored_format(folder)
     places = {entry.form: entry.place for entry in ANALYSES if entry.form}
-    if name not in places:
-        raise InputError(
-            f"result {folder}",
-            got=f"a Zarr store with format {name!r}",
-            expected="a result of klack",
-            hint="give the result folder of a klack command; a later version of klack may "
-            "support further kinds.",
-        )
+    refuse_if(
+        name not in places,
+        f"result {folder}",
+        got=f"a Zarr store with format {name!r}",
+        expected="a result of klack",
+        hint="give the result folder of a klack command; a later version of klack may "
+        "support further kinds.",
+    )
     found: StoredAnalysis[Any] = named(places[name])
     return found
 

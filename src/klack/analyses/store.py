@@ -20,7 +20,7 @@ from zlib import crc32
 
 import numpy as np
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.files.own import kind_of
 from klack.files.whole import completed, in_exchange, whole_file
 
@@ -103,13 +103,13 @@ def _load(path: Path, form: RecordFormat, largest: int) -> Any:
             hint=f"give the folder of a result written by `{form.command}`.",
         )
     version = attributes.get("format_version")
-    if version != form.version:
-        raise InputError(
-            f"result {path}",
-            got=f"format version {version}",
-            expected=f"version {form.version}",
-            hint="read it with the version of klack that wrote it, or run the case again.",
-        )
+    refuse_if(
+        version != form.version,
+        f"result {path}",
+        got=f"format version {version}",
+        expected=f"version {form.version}",
+        hint="read it with the version of klack that wrote it, or run the case again.",
+    )
     try:
         record = _read(_nodes(path, largest), path / "study", form.kind)
     except InputError as error:

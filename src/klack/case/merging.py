@@ -18,7 +18,7 @@ from klack.case.parameters import (
     parameters_of_text,
 )
 from klack.case.parts import DEEPEST, CaseInclude, PartFile, part_name
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.input.problem import Key, nearest, one_of
 from klack.input.section import Section
 
@@ -128,15 +128,15 @@ def shown_include(item: CaseInclude, scope: Scope, origin: Origin) -> dict[str, 
 
 
 def _require_count(item: CaseInclude, values: list[Any], where: str) -> None:
-    if item.count is None or len(values) != item.count:
-        raise InputError(
-            where,
-            got=f"a list of {len(values)}",
-            expected="one value, or a count together with the list"
-            if item.count is None
-            else f"one value for each of the {item.count} copies",
-            hint="count and list belong together: {count: 2, with: {lift: [80 um, 82 um]}}.",
-        )
+    refuse_if(
+        item.count is None or len(values) != item.count,
+        where,
+        got=f"a list of {len(values)}",
+        expected="one value, or a count together with the list"
+        if item.count is None
+        else f"one value for each of the {item.count} copies",
+        hint="count and list belong together: {count: 2, with: {lift: [80 um, 82 um]}}.",
+    )
 
 
 _MOST_COPIES = 1000

@@ -12,7 +12,7 @@ from ruamel.yaml import YAML
 
 from klack.case.case_text import LARGEST_CASE, Lines, parse, text_of
 from klack.case.parameters import PARAMETERS, Written
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.input.problem import Key, key_text
 from klack.input.section import Count, Name, PlainName, Section, Text
 
@@ -122,13 +122,13 @@ def with_parts(text: str, path: Path, texts: Mapping[str, str]) -> str:
         same = parse(whole, path)[0] == expected
     except InputError:
         same = False
-    if not same:
-        raise InputError(
-            str(path),
-            got="a layout in which the included files cannot be kept with the case",
-            expected="a mapping in block style: key: value, line by line",
-            hint="write the case without a line '...' at its end.",
-        )
+    refuse_if(
+        not same,
+        str(path),
+        got="a layout in which the included files cannot be kept with the case",
+        expected="a mapping in block style: key: value, line by line",
+        hint="write the case without a line '...' at its end.",
+    )
     return whole
 
 
@@ -203,13 +203,13 @@ def _read(found: _Found, name: str, where: str) -> str:
         inside = path.resolve().is_relative_to(root)
     except (OSError, RuntimeError, ValueError):  # links in a circle, a null character
         inside = True  # reading it says so
-    if not inside:
-        raise InputError(
-            where,
-            got=f"'{name}', a link that leaves the folder of the case",
-            expected="a file in the folder of the case or below",
-            hint="copy the part there.",
-        )
+    refuse_if(
+        not inside,
+        where,
+        got=f"'{name}', a link that leaves the folder of the case",
+        expected="a file in the folder of the case or below",
+        hint="copy the part there.",
+    )
     try:
         text = text_of(path)
     except InputError as error:

@@ -12,7 +12,7 @@ from klack.case.reader import validated
 from klack.case.rewriting import merged
 from klack.case.schema import Case
 from klack.case.valve import ValveCase
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.input.problem import CaseProblem, Key, one_of
 from klack.network.component import Component
 from klack.units import Kind, parse_quantity
@@ -230,13 +230,13 @@ def _not_points(got: str) -> InputError:
 
 
 def _column(name: str, values: Any) -> list[Any]:
-    if isinstance(values, str | int | float) or not isinstance(values, Iterable):
-        raise InputError(
-            f"{_WHERE}: {name}",
-            got=f"'{values}'",
-            expected="a list with a value for every point",
-            hint="put it into brackets; a constant value belongs in the case.",
-        )
+    refuse_if(
+        isinstance(values, str | int | float) or not isinstance(values, Iterable),
+        f"{_WHERE}: {name}",
+        got=f"'{values}'",
+        expected="a list with a value for every point",
+        hint="put it into brackets; a constant value belongs in the case.",
+    )
     return list(values)
 
 

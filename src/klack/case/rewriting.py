@@ -15,7 +15,7 @@ from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from klack.case.any_case import CaseTree, exchanged
 from klack.case.key_path import Quantity, written_at
 from klack.case.reader import parse
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.input.problem import CaseProblem, Key
 from klack.units import parse_quantity
 
@@ -56,13 +56,13 @@ def _require_same(tree: CaseTree, values: Mapping[Key, str], text: str) -> None:
             data = exchanged(data, key, written_at(tree.data, key))
     except InputError:  # an alias that lost its anchor
         data = None
-    if data != tree.data:
-        raise InputError(
-            str(tree.path),
-            got="values that YAML anchors share with other keys",
-            expected="every calibrated value written out",
-            hint="replace the anchors and aliases (& and *) of these keys with plain values.",
-        )
+    refuse_if(
+        data != tree.data,
+        str(tree.path),
+        got="values that YAML anchors share with other keys",
+        expected="every calibrated value written out",
+        hint="replace the anchors and aliases (& and *) of these keys with plain values.",
+    )
 
 
 def written_quantity(tree: CaseTree, place: Quantity, value: float, digits: int = 7) -> str:
@@ -217,11 +217,10 @@ def _require_only(tree: CaseTree, values: Mapping[Key, str], text: str) -> None:
         same = plain_data(parse(text, tree.path)[0]) == plain_data(expected)
     except InputError:
         same = False
-    if not same:
-        raise InputError(
-            str(tree.path),
-            got="a layout in which these values cannot be changed on their own",
-            expected="the sections bodies, reduction and run written out, without anchors",
-            hint="replace anchors and aliases (& and *) with plain values, or change the text by "
-            "hand.",
-        )
+    refuse_if(
+        not same,
+        str(tree.path),
+        got="a layout in which these values cannot be changed on their own",
+        expected="the sections bodies, reduction and run written out, without anchors",
+        hint="replace anchors and aliases (& and *) with plain values, or change the text by hand.",
+    )

@@ -8,7 +8,7 @@ from pydantic import model_validator
 from klack.case.consistency import BACKING_LEVELS, check_consistency, check_noise
 from klack.case.impact_sections import ImpactSections
 from klack.case.levels import LEVELS, OBLIQUE_LEVELS, OFF_AXIS_LEVELS, ROUGH_LEVELS, Level
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.input.problem import nearest, one_of
 from klack.units import format_si
 
@@ -37,13 +37,13 @@ class Case(ImpactSections):
                     expected=f"one of: {one_of(LEVELS)}",
                     hint=nearest(level, LEVELS, "see klack impact --help."),
                 )
-            if level == "lumped" and self.lumped is None:
-                raise InputError(
-                    f"{self._path or 'case'}: lumped",
-                    got="no section 'lumped'",
-                    expected="its stiffness, required by the level 'lumped'",
-                    hint="add 'lumped: {stiffness: 1e9 N/m}'.",
-                )
+            refuse_if(
+                level == "lumped" and self.lumped is None,
+                f"{self._path or 'case'}: lumped",
+                got="no section 'lumped'",
+                expected="its stiffness, required by the level 'lumped'",
+                hint="add 'lumped: {stiffness: 1e9 N/m}'.",
+            )
         for level in wanted:
             if level not in BACKING_LEVELS:
                 self.require_pair(f"the level '{level}'")
@@ -65,14 +65,14 @@ class Case(ImpactSections):
 
     def require_pair(self, what: str) -> None:
         """Reject a third body behind the struck one."""
-        if self.backing is not None:
-            raise InputError(
-                f"{self._path or 'case'}: backing",
-                got=f"{what} of three bodies in a row",
-                expected=f"klack impact with --level {one_of(BACKING_LEVELS)}",
-                hint="use that, or klack stroke; or draw the struck body and the one behind it "
-                "as one glued body (how-to/two-materials), without 'backing'.",
-            )
+        refuse_if(
+            self.backing is not None,
+            f"{self._path or 'case'}: backing",
+            got=f"{what} of three bodies in a row",
+            expected=f"klack impact with --level {one_of(BACKING_LEVELS)}",
+            hint="use that, or klack stroke; or draw the struck body and the one behind it "
+            "as one glued body (how-to/two-materials), without 'backing'.",
+        )
 
     def require_on_axis(self, what: str) -> None:
         """Reject off-axis axisymmetric bodies, oblique motion and a body behind the struck one."""
@@ -107,11 +107,11 @@ class Case(ImpactSections):
     def require_ends(self, what: str) -> None:
         """Reject a non-reflecting end, which modes, exports and decks leave out."""
         for name, body in self.bodies.items():
-            if body.non_reflecting is not None:
-                raise InputError(
-                    f"{self._path or 'case'}: bodies.{name}.non_reflecting",
-                    got=f"{what} of a body with a non-reflecting end",
-                    expected="klack impact with --level full",
-                    hint="remove the end, and make the bar long enough that no echo returns "
-                    "during the run.",
-                )
+            refuse_if(
+                body.non_reflecting is not None,
+                f"{self._path or 'case'}: bodies.{name}.non_reflecting",
+                got=f"{what} of a body with a non-reflecting end",
+                expected="klack impact with --level full",
+                hint="remove the end, and make the bar long enough that no echo returns "
+                "during the run.",
+            )

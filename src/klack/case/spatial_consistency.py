@@ -7,7 +7,7 @@ from klack.case.bodies import SurfaceName
 from klack.case.consistency import check_surface
 from klack.case.valve_roles import END_STOP, FLEXIBLE_BODY, Meeting, ValveRoles
 from klack.case.valve_sections import ValveSections
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.input.problem import CaseProblem, Key, one_of, refuse_key_if
 from klack.network.across import OffAxisPart
 from klack.network.component import Component
@@ -303,22 +303,22 @@ def require_bodies(case: ValveSections, variants: tuple[str, ...], where: str) -
     if case.motion == "axial":
         return
     for variant in variants:
-        if variant.endswith("lumped"):
-            raise InputError(
-                f"{where}: variant",
-                got=f"'{variant}' with motion: three-dimensional, and rigid bodies on a spring",
-                expected="dry or wet",
-                hint="rigid bodies on a spring move along the axis: use motion: axial for them.",
-            )
+        refuse_if(
+            variant.endswith("lumped"),
+            f"{where}: variant",
+            got=f"'{variant}' with motion: three-dimensional, and rigid bodies on a spring",
+            expected="dry or wet",
+            hint="rigid bodies on a spring move along the axis: use motion: axial for them.",
+        )
 
 
 def require_axial(case: ValveSections, command: str) -> None:
     """Reject a motion in space, for a ``command`` that knows the axis alone."""
-    if case.motion != "axial":
-        raise InputError(
-            f"{case.path or 'case'}: motion",
-            got=f"'{case.motion}' in {command}",
-            expected="motion: axial",
-            hint="klack stroke computes it in three dimensions; for this command set motion: axial "
-            "and remove 'guide' and 'placement'.",
-        )
+    refuse_if(
+        case.motion != "axial",
+        f"{case.path or 'case'}: motion",
+        got=f"'{case.motion}' in {command}",
+        expected="motion: axial",
+        hint="klack stroke computes it in three dimensions; for this command set motion: axial "
+        "and remove 'guide' and 'placement'.",
+    )

@@ -7,7 +7,7 @@ from pathlib import Path
 from klack.case.any_case import AnyCase, CaseTree
 from klack.case.reader import Lines, parse, text_of, validated
 from klack.case.study import CaseStudy, StudyFile
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.input.problem import CaseProblem, Key, key_text
 
 __all__ = ["StudySource", "study_if_any", "study_of"]
@@ -38,13 +38,13 @@ class StudySource:
 
     def made(self, valves: int) -> "StudySource":
         """Same study of 1 to 1e6 valves made after the case."""
-        if isinstance(valves, bool) or not 1 <= valves <= _MOST_VALVES:
-            raise InputError(
-                "--made",
-                got=f"{valves} valves",
-                expected=f"1 to {_MOST_VALVES}",
-                hint="with 1024 valves a probability of 1 % is known to about half its value.",
-            )
+        refuse_if(
+            isinstance(valves, bool) or not 1 <= valves <= _MOST_VALVES,
+            "--made",
+            got=f"{valves} valves",
+            expected=f"1 to {_MOST_VALVES}",
+            hint="with 1024 valves a probability of 1 % is known to about half its value.",
+        )
         design = self.study.design.model_copy(
             update={"kind": "made", "points": valves, "file": None}
         )

@@ -13,7 +13,7 @@ from klack.case.reader import Lines
 from klack.case.spatial_consistency import require_bodies
 from klack.case.valve_consistency import check_thermal, check_valve
 from klack.case.valve_sections import ValveSections
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.input.problem import nearest, one_of
 from klack.network.catalogue import source_digests
 
@@ -67,13 +67,13 @@ class ValveCase(ValveSections):
                     expected=f"one of: {one_of(VARIANTS)}",
                     hint=nearest(variant, VARIANTS, "see klack stroke --help."),
                 )
-            if variant.endswith("lumped") and self.lumped is None:
-                raise InputError(
-                    f"{self.path or 'case'}: lumped",
-                    got="no section 'lumped'",
-                    expected=f"its stiffness, because the variant '{variant}' is requested",
-                    hint="add 'lumped: {stiffness: 1e9 N/m}'.",
-                )
+            refuse_if(
+                variant.endswith("lumped") and self.lumped is None,
+                f"{self.path or 'case'}: lumped",
+                got="no section 'lumped'",
+                expected=f"its stiffness, because the variant '{variant}' is requested",
+                hint="add 'lumped: {stiffness: 1e9 N/m}'.",
+            )
         require_bodies(self, variants, str(self.path or "case"))
         return tuple(v for v in VARIANTS if v in variants)
 

@@ -22,7 +22,7 @@ from klack.cli.compare import compare
 from klack.cli.export import export
 from klack.cli.show import show
 from klack.cli.verify import verify
-from klack.errors import InputError, MissingExtraError
+from klack.errors import InputError, MissingExtraError, refuse_if
 from klack.terminal.options import (
     SHOWN,
     WANTED,
@@ -72,10 +72,13 @@ def app(
 
     Serves this machine alone, at an address with a random token. Runs continue when it is stopped.
     """
-    if not 0 <= port <= 65535:
-        raise InputError(
-            f"--port {port}", got=str(port), expected="0 to 65535", hint="leave it out."
-        )
+    refuse_if(
+        not 0 <= port <= 65535,
+        f"--port {port}",
+        got=str(port),
+        expected="0 to 65535",
+        hint="leave it out.",
+    )
     try:
         from klack.app.server import serve
     except ModuleNotFoundError as error:
@@ -238,13 +241,13 @@ def inspect(
         _show(str(file), parts, wanted)
         return 0
     length = None if unit is None else parse_quantity(f"1 {unit}", LENGTH, "--unit")
-    if unit is not None and file.is_file() and file.suffix.lower() in STEP_ENDINGS:
-        raise InputError(
-            "--unit",
-            got=f"'{unit}' for a STEP file, which has its own unit",
-            expected="no --unit",
-            hint="leave it out; klack shows sizes in mm.",
-        )
+    refuse_if(
+        unit is not None and file.is_file() and file.suffix.lower() in STEP_ENDINGS,
+        "--unit",
+        got=f"'{unit}' for a STEP file, which has its own unit",
+        expected="no --unit",
+        hint="leave it out; klack shows sizes in mm.",
+    )
     _show(str(file), [(file.name, inspect_file(file, length, matrix))], wanted)
     return 0
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from klack.analyses.ending import Ending
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.terminal.options import SHOWN, Components, Shown, imported
 from klack.terminal.output import require_folder, staged_folder
 from klack.terminal.progress import show_progress
@@ -108,13 +108,13 @@ def compare(
             expected="the variant before its recording",
             hint=f"--measurement {variant[0] if variant else 'dry'}=FILE.",
         )
-    if (calculix is None) == (not measurement):
-        raise InputError(
-            "--measurement and --calculix",
-            got="neither of them" if calculix is None else "both of them",
-            expected="one: a measurement, or a run of CalculiX",
-            hint="klack compare RESULT --measurement strokes.csv.",
-        )
+    refuse_if(
+        (calculix is None) == (not measurement),
+        "--measurement and --calculix",
+        got="neither of them" if calculix is None else "both of them",
+        expected="one: a measurement, or a run of CalculiX",
+        hint="klack compare RESULT --measurement strokes.csv.",
+    )
     if calculix is not None:
         folder = out if out is not None else result
         _with_calculix(result, calculix, level, folder, wanted)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from klack.analyses.ending import is_result
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.terminal.options import WANTED, Components, Out, Wanted, imported
 from klack.terminal.output import Written, require_folder, staged_folder
 from klack.terminal.progress import show_progress
@@ -215,13 +215,13 @@ def export(
             told = _export_stored(source, to, out, wanted)
         _tell(*told, to, wanted)
         return 0
-    if choice.impact is not None or choice.variant is not None:
-        raise InputError(
-            str(source),
-            got="a case with --impact or --variant",
-            expected="the folder of a stored stroke in three dimensions",
-            hint="run klack stroke first, and give the folder that it names at the end.",
-        )
+    refuse_if(
+        choice.impact is not None or choice.variant is not None,
+        str(source),
+        got="a case with --impact or --variant",
+        expected="the folder of a stored stroke in three dimensions",
+        hint="run klack stroke first, and give the folder that it names at the end.",
+    )
     if to == "parquet":
         raise _parquet_is_for_studies(f"'{source}', which is no stored result")
 
@@ -397,13 +397,13 @@ def _export_result(study: Any, to: str, folder: Path) -> Written:
 def _export_points(study: "StudyRecord", to: str, folder: Path) -> Written:
     from klack.analyses.study.record import study_table
 
-    if to not in ("csv", "parquet"):
-        raise InputError(
-            f"--to {to}",
-            got="points of a study",
-            expected="--to csv or parquet, or --to case with --point",
-            hint='in Python, klack.load_result("FOLDER").to_xarray().',
-        )
+    refuse_if(
+        to not in ("csv", "parquet"),
+        f"--to {to}",
+        got="points of a study",
+        expected="--to csv or parquet, or --to case with --point",
+        hint='in Python, klack.load_result("FOLDER").to_xarray().',
+    )
     table = study_table(study)
     with staged_folder(folder) as stage:
         if to == "parquet":
@@ -495,13 +495,13 @@ def _export_stored_impact(
     from klack.case.any_case import read_valve_case
     from klack.exchange.results.spatial_series import write_spatial_series
 
-    if choice.level is not None:
-        raise InputError(
-            "--level",
-            got="it with the result of a stroke",
-            expected="no level: the motion is that of the recorded modes",
-            hint="leave --level out.",
-        )
+    refuse_if(
+        choice.level is not None,
+        "--level",
+        got="it with the result of a stroke",
+        expected="no level: the motion is that of the recorded modes",
+        hint="leave --level out.",
+    )
     study = load_result(source)
     if not isinstance(study, StrokeStudy):
         raise InputError(

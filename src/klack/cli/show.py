@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.terminal.options import SHOWN, Components, Shown, imported
 from klack.terminal.output import require_file_target
 from klack.terminal.tables import TextTable, plain_math
@@ -157,13 +157,13 @@ def _content(view: "View") -> str:
 def _list(source: Path | None, out: Path | None, component: list[str] | None, wanted: Shown) -> int:
     """List component types, those of the user last."""
     for option, given in (("SOURCE", source), ("--out", out)):
-        if given is not None:
-            raise InputError(
-                f"{option} {given}",
-                got="it beside --components",
-                expected="one of the two",
-                hint="klack show --components",
-            )
+        refuse_if(
+            given is not None,
+            f"{option} {given}",
+            got="it beside --components",
+            expected="one of the two",
+            hint="klack show --components",
+        )
 
     from klack.analyses.json_results import command_json
     from klack.network.catalogue import component_classes

@@ -6,7 +6,7 @@ from klack.assembling.bodies import build_bodies
 from klack.assembling.yielding import tell_elastic
 from klack.case.schema import Case
 from klack.contact.friction import Friction
-from klack.errors import AccuracyWarning, InputError
+from klack.errors import AccuracyWarning, refuse_if
 from klack.exchange.calculix_deck import CalculixImpact, CalculixSettings, default_penalty
 from klack.machine.progress import Progress
 from klack.units import format_si
@@ -24,34 +24,34 @@ def calculix_impact(case: Case, progress: Progress) -> CalculixImpact:
     AccuracyWarning
         Of a guide, an upper stop, friction (another law), materials that yield and worn faces.
     """
-    if case.dimension != 3:
-        raise InputError(
-            f"{case.path or 'case'}: bodies",
-            got="axisymmetric bodies",
-            expected="solids: CalculiX would turn axisymmetric elements into wedges of "
-            "one layer, with a different contact problem",
-            hint="use 'model: swept' (with layers) or 'model: solid' in both geometries.",
-        )
+    refuse_if(
+        case.dimension != 3,
+        f"{case.path or 'case'}: bodies",
+        got="axisymmetric bodies",
+        expected="solids: CalculiX would turn axisymmetric elements into wedges of "
+        "one layer, with a different contact problem",
+        hint="use 'model: swept' (with layers) or 'model: solid' in both geometries.",
+    )
     case.require_ends("a deck")
     case.require_pair("a deck")
     case.require_straight("a deck")
     forms = ("crown", "waviness", "tilt", "roughness")
     form = next((key for key in forms if getattr(case.contact, key)), None)
-    if form is not None:
-        raise InputError(
-            f"{case.path or 'case'}: contact.{form}",
-            got="a form or roughness of the faces, which the meshes do not contain",
-            expected="faces as drawn: a deck contains only the meshes",
-            hint="draw the crown as an arc or the tilt as a placement, and remove the key.",
-        )
+    refuse_if(
+        form is not None,
+        f"{case.path or 'case'}: contact.{form}",
+        got="a form or roughness of the faces, which the meshes do not contain",
+        expected="faces as drawn: a deck contains only the meshes",
+        hint="draw the crown as an arc or the tilt as a placement, and remove the key.",
+    )
     layered = next((name for name, body in case.bodies.items() if body.layers), None)
-    if layered is not None:
-        raise InputError(
-            f"{case.path or 'case'}: bodies.{layered}.layers",
-            got="a layer between two parts, which the meshes do not contain",
-            expected="glued parts: a deck contains only the meshes",
-            hint="draw the layer as a thin part with a material of its own, and remove the key.",
-        )
+    refuse_if(
+        layered is not None,
+        f"{case.path or 'case'}: bodies.{layered}.layers",
+        got="a layer between two parts, which the meshes do not contain",
+        expected="glued parts: a deck contains only the meshes",
+        hint="draw the layer as a thin part with a material of its own, and remove the key.",
+    )
     left_out = [name for name in ("guide", "opposite") if getattr(case, name) is not None]
     if left_out:
         warnings.warn(

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from klack.assembling.placement import first_touch_of_meshes
 from klack.bodies.elasticity.body import ElasticBody
 from klack.contact.pairing import axial_distance, face_thickness
-from klack.errors import InputError, require_positive
+from klack.errors import InputError, refuse_if, require_positive
 from klack.materials.material import Material
 from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import FaceTable, Mesh, Surface
@@ -173,13 +173,13 @@ def _distance(impact: CalculixImpact) -> float:
     """
     sides = (impact.upper.mesh, impact.upper_surface, impact.lower.mesh, impact.lower_surface)
     distance = axial_distance(*sides)
-    if not np.isfinite(distance):
-        raise InputError(
-            f"contact of '{impact.upper_surface.name}' with '{impact.lower_surface.name}'",
-            got="no line along z that meets both surfaces",
-            expected="surfaces that face each other along the axis of motion z",
-            hint="check which faces are named in contact.between.",
-        )
+    refuse_if(
+        not np.isfinite(distance),
+        f"contact of '{impact.upper_surface.name}' with '{impact.lower_surface.name}'",
+        got="no line along z that meets both surfaces",
+        expected="surfaces that face each other along the axis of motion z",
+        hint="check which faces are named in contact.between.",
+    )
     return min(distance, first_touch_of_meshes(*sides, tolerance=0.0).clearance)
 
 
@@ -221,21 +221,21 @@ def deck_lines(impact: CalculixImpact, settings: CalculixSettings) -> Iterator[s
 
 def _require_solids(impact: CalculixImpact) -> None:
     for body in (impact.upper, impact.lower):
-        if body.dimension != 3:
-            raise InputError(
-                f"body '{body.name}'",
-                got="a body of revolution",
-                expected="a solid: CalculiX turns axisymmetric elements into wedges of "
-                "one layer, with a different contact problem",
-                hint="use 'model: swept' (with layers) or 'model: solid' in the geometry.",
-            )
-    if len(impact.upper.fixed):
-        raise InputError(
-            f"body '{impact.upper.name}'",
-            got="an upper body that is held",
-            expected="an upper body that is free to move in -z",
-            hint="remove its supports from the case, or swap the bodies.",
+        refuse_if(
+            body.dimension != 3,
+            f"body '{body.name}'",
+            got="a body of revolution",
+            expected="a solid: CalculiX turns axisymmetric elements into wedges of "
+            "one layer, with a different contact problem",
+            hint="use 'model: swept' (with layers) or 'model: solid' in the geometry.",
         )
+    refuse_if(
+        len(impact.upper.fixed),
+        f"body '{impact.upper.name}'",
+        got="an upper body that is held",
+        expected="an upper body that is free to move in -z",
+        hint="remove its supports from the case, or swap the bodies.",
+    )
 
 
 def _heading(impact: CalculixImpact, settings: CalculixSettings, shift: float) -> Iterator[str]:

@@ -18,7 +18,7 @@ from klack.case.schema import Case
 from klack.case.spatial_consistency import require_axial
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import find_meetings, find_roles
-from klack.errors import AccuracyWarning, InputError
+from klack.errors import AccuracyWarning, InputError, refuse_if
 from klack.exchange.modal_model import ModalModel, Provenance, body_model, choose_body, pair_model
 from klack.machine.progress import Progress, silent
 from klack.mechanics.flexible_body import FlexibleBody
@@ -156,13 +156,13 @@ def _of_valve(case: ValveCase, progress: Progress, threads: int | None, alone: b
     valve = build_valve(case, progress, threads=threads)
     provenance = _provenance(case, {name: body.mesh for name, body in valve.bodies.items()})
     bodies, step = tuple(valve.reduced.values()), case.run.fine_step
-    if not bodies:
-        raise InputError(
-            f"{case.path or 'case'}: network.components",
-            got="rigid bodies only",
-            expected="at least one flexible-body",
-            hint="describe its shape in bodies and name it in a flexible-body.",
-        )
+    refuse_if(
+        not bodies,
+        f"{case.path or 'case'}: network.components",
+        got="rigid bodies only",
+        expected="at least one flexible-body",
+        hint="describe its shape in bodies and name it in a flexible-body.",
+    )
     if alone:
         return CaseModels(bodies=bodies, pair=None, provenance=provenance, step=step)
     rows = valve.network.rows()
@@ -197,13 +197,13 @@ def _of_valve(case: ValveCase, progress: Progress, threads: int | None, alone: b
         )
         films.append(row.film)
         names.append(row.component)
-    if not contacts:
-        raise InputError(
-            f"{case.path or 'case'}: network.components",
-            got="no end stop",
-            expected="at least one component of type end-stop",
-            hint="export only the bodies: --part body.",
-        )
+    refuse_if(
+        not contacts,
+        f"{case.path or 'case'}: network.components",
+        got="no end stop",
+        expected="at least one component of type end-stop",
+        hint="export only the bodies: --part body.",
+    )
     used = [
         body
         for body in valve.reduced.values()

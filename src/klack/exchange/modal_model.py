@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.contact.yielding_law import YieldingLaw
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.input.problem import nearest, one_of
 from klack.network.protocols import InterfaceLaw
 from klack.network.rows import FilmRow
@@ -361,13 +361,13 @@ def _motion(
 
 
 def _without_memory(contact: ContactPair) -> InterfaceLaw:
-    if isinstance(contact.law, YieldingLaw):
-        raise InputError(
-            f"contact {contact.body_a}.{contact.port_a}",
-            got="a law of faces that yield",
-            expected="a law without memory",
-            hint="export the bodies without a yield stress.",
-        )
+    refuse_if(
+        isinstance(contact.law, YieldingLaw),
+        f"contact {contact.body_a}.{contact.port_a}",
+        got="a law of faces that yield",
+        expected="a law without memory",
+        hint="export the bodies without a yield stress.",
+    )
     return contact.law
 
 

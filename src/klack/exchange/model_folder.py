@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.exchange.modal_model import ModalModel
 from klack.exchange.results.table import identifiers
 from klack.files.whole import whole_files
@@ -30,28 +30,28 @@ def model_folder(models: Sequence[ModalModel], folder: Path) -> Iterator[Path]:
         Made where missing; files of the same name are replaced.
     """
     for name, count in Counter(model.name.lower() for model in models).items():
-        if count > 1:
-            raise InputError(
-                str(folder),
-                got=f"{count} models with the name '{name}'",
-                expected="distinct names",
-                hint="rename a body of the case.",
-            )
+        refuse_if(
+            count > 1,
+            str(folder),
+            got=f"{count} models with the name '{name}'",
+            expected="distinct names",
+            hint="rename a body of the case.",
+        )
     for model in models:
-        if len(model.name) > LONGEST:
-            raise InputError(
-                str(folder),
-                got=f"the model name '{model.name}' of {len(model.name)} characters",
-                expected=f"at most {LONGEST}, for MATLAB to accept it with a suffix",
-                hint="give the case or the body a shorter name.",
-            )
-        if model.mode_count == 0:
-            raise InputError(
-                f"model '{model.name}'",
-                got="no modes",
-                expected="a body that can move",
-                hint="a rigid wall needs no model: leave it out.",
-            )
+        refuse_if(
+            len(model.name) > LONGEST,
+            str(folder),
+            got=f"the model name '{model.name}' of {len(model.name)} characters",
+            expected=f"at most {LONGEST}, for MATLAB to accept it with a suffix",
+            hint="give the case or the body a shorter name.",
+        )
+        refuse_if(
+            model.mode_count == 0,
+            f"model '{model.name}'",
+            got="no modes",
+            expected="a body that can move",
+            hint="a rigid wall needs no model: leave it out.",
+        )
     with whole_files(folder) as stage:
         yield stage
 

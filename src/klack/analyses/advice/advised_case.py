@@ -15,7 +15,7 @@ from klack.case.key_path import written_at
 from klack.case.rewriting import merged, moved_files, plain_data, with_values
 from klack.case.schema import Case
 from klack.case.valve import ValveCase
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.input.problem import Key
 from klack.machine.progress import Progress, silent
 from klack.units import FREQUENCY, LENGTH, TIME, format_si, parse_quantity
@@ -60,13 +60,13 @@ def advise_case(
 
 def _refuse_options(*given: tuple[str, object]) -> None:
     for option, value in given:
-        if value is not None:
-            raise InputError(
-                option,
-                got=f"{value} for the case of a whole valve",
-                expected="no such option: a stroke is judged by its first impacts",
-                hint="use it for a case of two bodies, e.g. klack advise demo-valve-axisymmetric.",
-            )
+        refuse_if(
+            value is not None,
+            option,
+            got=f"{value} for the case of a whole valve",
+            expected="no such option: a stroke is judged by its first impacts",
+            hint="use it for a case of two bodies, e.g. klack advise demo-valve-axisymmetric.",
+        )
 
 
 _WIDTH = 96

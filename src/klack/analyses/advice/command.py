@@ -6,6 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from klack.errors import InputError, refuse_if
 from klack.terminal.options import WANTED, CaseArgument, Components, Wanted, imported
 from klack.terminal.progress import show_progress
 
@@ -108,8 +109,6 @@ def advise(
 
 
 def _within(option: str, text: str, value: float, most: float, example: str) -> float:
-    from klack.errors import InputError
-
     if 0.0 < value <= most:
         return value
     unit = example.split()[1]
@@ -123,8 +122,6 @@ def _within(option: str, text: str, value: float, most: float, example: str) -> 
 
 
 def _decibel(text: str) -> float:
-    from klack.errors import InputError
-
     number = text.strip().removesuffix("dB").strip()
     try:
         return float(number)
@@ -135,25 +132,23 @@ def _decibel(text: str) -> float:
 
 
 def _require_new_file(path: Path | None) -> None:
-    from klack.errors import InputError
-
     if path is None:
         return
-    if path.exists():
-        raise InputError(
-            f"--write {path}",
-            got="a file that exists",
-            expected="the name of a new file",
-            hint="choose another name; the case itself is never changed.",
-        )
+    refuse_if(
+        path.exists(),
+        f"--write {path}",
+        got="a file that exists",
+        expected="the name of a new file",
+        hint="choose another name; the case itself is never changed.",
+    )
     folder = path.absolute().parent
-    if not folder.is_dir() or not os.access(folder, os.W_OK):
-        raise InputError(
-            f"--write {path}",
-            got="a folder that does not exist or is not writable",
-            expected="a file in an existing folder",
-            hint="create the folder first.",
-        )
+    refuse_if(
+        not folder.is_dir() or not os.access(folder, os.W_OK),
+        f"--write {path}",
+        got="a folder that does not exist or is not writable",
+        expected="a file in an existing folder",
+        hint="create the folder first.",
+    )
 
 
 def _write_whole(path: Path, text: str) -> None:

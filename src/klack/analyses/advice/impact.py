@@ -46,7 +46,7 @@ from klack.case.schema import Case
 from klack.contact.history import ImpactHistory
 from klack.contact.restitution import measure_impact
 from klack.contact.statics import size_over_half_width
-from klack.errors import InputError, KlackError
+from klack.errors import InputError, KlackError, refuse_if
 from klack.input.problem import Key
 from klack.machine.progress import Progress, silent
 from klack.machine.stages import collected_warnings
@@ -208,14 +208,14 @@ def advise_impact(
 
 def _level(case: Case, asked: AdviceLevel | None) -> AdviceLevel:
     if asked is not None:
-        if asked not in ("reduced", "interface"):
-            raise InputError(
-                "--level",
-                got=f"'{asked}'",
-                expected="reduced or interface",
-                hint="the full order has the meshes of both, and measuring its step would take "
-                "too long: advise the interface level.",
-            )
+        refuse_if(
+            asked not in ("reduced", "interface"),
+            "--level",
+            got=f"'{asked}'",
+            expected="reduced or interface",
+            hint="the full order has the meshes of both, and measuring its step would take "
+            "too long: advise the interface level.",
+        )
         return asked
     centred = case.motion.placement.is_centred
     only = all(name in ("interface", "full") for name in case.run.levels)
@@ -280,15 +280,15 @@ def _require_one_pulse(base: _Base, history: ImpactHistory) -> None:
             expected="a time that covers the impact and the rebound",
             hint="increase run.duration until klack impact prints a restitution.",
         )
-    if measures.sub_contacts > 1:
-        raise InputError(
-            f"{base.case.path or 'case'}: level {base.level}",
-            got=f"an impact of {measures.sub_contacts} contacts: the force rings on the modes",
-            expected="one contact, whose peak and history converge",
-            hint="for faces that meet all at once, only impulse, restitution and the plateau of "
-            "the full order converge: compare klack impact --level full on two meshes; "
-            "otherwise use correction: consistent, or --level interface.",
-        )
+    refuse_if(
+        measures.sub_contacts > 1,
+        f"{base.case.path or 'case'}: level {base.level}",
+        got=f"an impact of {measures.sub_contacts} contacts: the force rings on the modes",
+        expected="one contact, whose peak and history converge",
+        hint="for faces that meet all at once, only impulse, restitution and the plateau of "
+        "the full order converge: compare klack impact --level full on two meshes; "
+        "otherwise use correction: consistent, or --level interface.",
+    )
 
 
 def _modes_and_step(

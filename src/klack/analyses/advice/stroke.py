@@ -26,7 +26,7 @@ from klack.case.levels import Variant
 from klack.case.placed_errors import tells_place
 from klack.case.spatial_consistency import require_axial
 from klack.case.valve import ValveCase
-from klack.errors import InputError, KlackError
+from klack.errors import KlackError, refuse_if
 from klack.machine.progress import Progress, silent
 from klack.machine.stages import collected_warnings
 from klack.simulation.step_sizes import step_sizes
@@ -114,13 +114,13 @@ def advise_stroke(
         progress("first impacts", 0.0)
         now = first_impacts(valve)
     runs = 1
-    if not now:
-        raise InputError(
-            f"{case.path or 'case'}: run.duration",
-            got="no impact within it",
-            expected="a run that reaches a stop",
-            hint="check the lift with klack stroke, and increase run.duration.",
-        )
+    refuse_if(
+        not now,
+        f"{case.path or 'case'}: run.duration",
+        got="no impact within it",
+        expected="a run that reaches a stop",
+        hint="check the lift with klack stroke, and increase run.duration.",
+    )
     case = _shortened(case, now)
     with collected_warnings():
         log = list(notes)

@@ -6,6 +6,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from klack.analyses.ending import Ending
+from klack.errors import require_positive
 from klack.terminal.options import (
     WANTED_RESULT,
     CaseArgument,
@@ -48,8 +49,6 @@ def calibrate(
 ) -> int:
     """Fit parameters of a valve to measured strokes, with their uncertainty."""
     from dataclasses import replace
-
-    from klack.errors import require_positive
 
     require_files("--measurement", measurement)
     for option, number, unit in (("--strokes", strokes, "strokes"), ("--workers", workers, "")):

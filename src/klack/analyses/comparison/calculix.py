@@ -20,7 +20,7 @@ from klack.analyses.json_parts import (
 from klack.analyses.measures import Column, Measure, cells, heads
 from klack.contact.history import EnergyLedger, ImpactHistory
 from klack.contact.restitution import Deviation, ImpactMeasures, measure_impact
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.terminal.tables import TextTable
 
 __all__ = [
@@ -148,13 +148,13 @@ _COMPARISON = JsonForm(
 
 def level_of(study: ImpactStudy, name: str) -> LevelResult:
     """Level of a study of two bodies by name; InputError if it is missing."""
-    if study.is_row:
-        raise InputError(
-            f"result of case '{study.case}'",
-            got="an impact of three bodies in a row",
-            expected="an impact of two bodies, for which sensors and a CalculiX deck exist",
-            hint="compare a stroke of the three bodies with its measurement.",
-        )
+    refuse_if(
+        study.is_row,
+        f"result of case '{study.case}'",
+        got="an impact of three bodies in a row",
+        expected="an impact of two bodies, for which sensors and a CalculiX deck exist",
+        hint="compare a stroke of the three bodies with its measurement.",
+    )
     if name not in study.levels:
         raise InputError(
             f"result of case '{study.case}'",

@@ -14,7 +14,7 @@ from klack.analyses.comparison.impacts_record import ComparedPulse, MeasuredImpa
 from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.record import case_fields, run_fields
 from klack.bodies.gauges.gauge import GaugeKind, GaugeRecord
-from klack.errors import AccuracyWarning, InputError
+from klack.errors import AccuracyWarning, InputError, refuse_if
 from klack.machine.progress import Progress, silent
 from klack.machine.stages import StageClock, collected_warnings
 from klack.measurement.files.opening import open_recording
@@ -117,13 +117,13 @@ def compare_impact(
 def gauge_of(study: ImpactStudy, level: str, output: str | None) -> GaugeRecord:
     """Output of a level by name; the only one by default."""
     gauges = {record.name: record for record in level_of(study, level).gauges}
-    if not gauges:
-        raise InputError(
-            f"result of case '{study.case}', level '{level}'",
-            got="no outputs",
-            expected="an output at the position of the measuring sensor",
-            hint="add the section 'outputs' to the case, and run klack impact again.",
-        )
+    refuse_if(
+        not gauges,
+        f"result of case '{study.case}', level '{level}'",
+        got="no outputs",
+        expected="an output at the position of the measuring sensor",
+        hint="add the section 'outputs' to the case, and run klack impact again.",
+    )
     if output is None and len(gauges) == 1:
         return next(iter(gauges.values()))
     if output not in gauges:
@@ -177,13 +177,13 @@ def _on_axis(record: _Record, pulse: ComparedPulse, time: Floats) -> Floats:
 def _read(path: Path, kind: GaugeKind, channel: str | None, absolute: bool) -> _Record:
     with open_recording(path) as recording:
         info = _channel(recording, channel)
-        if absolute and info.unapplied:
-            raise InputError(
-                f"{path.name}: {info.name}",
-                got=f"a scale that klack does not know: {info.unapplied}",
-                expected="values in the unit of the channel",
-                hint="without --known-speed a factor is fitted.",
-            )
+        refuse_if(
+            absolute and info.unapplied,
+            f"{path.name}: {info.name}",
+            got=f"a scale that klack does not know: {info.unapplied}",
+            expected="values in the unit of the channel",
+            hint="without --known-speed a factor is fitted.",
+        )
         factor = _factor(path, info, kind)
         recording.time_base(info.name)  # refuses times that do not rise, with their row
         time, values = recording.read(info.name)

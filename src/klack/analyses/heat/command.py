@@ -6,6 +6,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from klack.analyses.ending import Ending
+from klack.errors import refuse_if, require_positive
 from klack.terminal.options import WANTED_RESULT, CaseArgument, Components, WantedResult, imported
 from klack.terminal.progress import show_progress
 
@@ -44,18 +45,17 @@ def heat(
     wanted: WantedResult = WANTED_RESULT,
 ) -> int:
     """Follow how strokes warm up a valve, and how their delays and impacts change with it."""
-    from klack.errors import InputError, require_positive
     from klack.units import TIME, parse_quantity, parse_temperature
 
     texts = [text.strip() for text in (soak or "").split(",")]
     temperatures = [parse_temperature(text, "--soak") for text in texts] if soak is not None else []
-    if temperatures and duration is not None:
-        raise InputError(
-            "--duration",
-            got="a duration together with --soak",
-            expected="one of them",
-            hint="--soak computes single strokes at constant temperatures.",
-        )
+    refuse_if(
+        temperatures and duration is not None,
+        "--duration",
+        got="a duration together with --soak",
+        expected="one of them",
+        hint="--soak computes single strokes at constant temperatures.",
+    )
     with show_progress(wanted.quiet):
         from klack.case.any_case import load_valve_case
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 
 from klack.analyses.impact.record import SectionPicture
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.mesh.families import FAMILIES, ElementFamily
 from klack.mesh.mesh import Mesh
 
@@ -72,13 +72,13 @@ def section_picture(mesh: Mesh, displacement: Floats, time: float, body: str) ->
         If ``displacement`` does not fit the mesh, or the plane misses the body.
     """
     values = np.asarray(displacement, dtype=np.float64)
-    if values.shape != (mesh.dof_count,):
-        raise InputError(
-            f"section of body '{body}': displacement",
-            got=f"an array of shape {values.shape}",
-            expected=f"({mesh.dof_count},) for {mesh.node_count} nodes",
-            hint="give the displacement of all degrees of freedom, also the fixed ones.",
-        )
+    refuse_if(
+        values.shape != (mesh.dof_count,),
+        f"section of body '{body}': displacement",
+        got=f"an array of shape {values.shape}",
+        expected=f"({mesh.dof_count},) for {mesh.node_count} nodes",
+        hint="give the displacement of all degrees of freedom, also the fixed ones.",
+    )
     values = values.reshape(mesh.node_count, mesh.dimension)
     cut = _flat_section if mesh.dimension == 2 else _solid_section
     points, moved, triangles, edges = cut(mesh, values, body)
@@ -148,13 +148,13 @@ def _solid_section(mesh: Mesh, values: Floats, body: str) -> tuple[Floats, Float
         outer.append(block_outer)
     points, triangles, edges = _cut(table, np.concatenate(tets), np.concatenate(outer))
     points, triangles, edges = _clip(points, triangles, edges)
-    if not len(triangles):
-        raise InputError(
-            f"section of body '{body}'",
-            got="no element that the half plane y = 0, x > 0 passes through",
-            expected="a body around the z axis",
-            hint="move the axis of the body onto the z axis.",
-        )
+    refuse_if(
+        not len(triangles),
+        f"section of body '{body}'",
+        got="no element that the half plane y = 0, x > 0 passes through",
+        expected="a body around the z axis",
+        hint="move the axis of the body onto the z axis.",
+    )
     return _compact(points[:, :2], points[:, 3:6], triangles, edges)
 
 

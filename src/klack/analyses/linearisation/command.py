@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from klack.analyses.ending import Ending
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.terminal.options import WANTED_RESULT, CaseArgument, Components, WantedResult, imported
 from klack.terminal.progress import show_progress
 
@@ -128,13 +128,13 @@ def linearise(
 
     def hertz(text: str, option: str) -> float:
         value = parse_quantity(text, FREQUENCY, option)
-        if not 0.0 < value < 1e9:
-            raise InputError(
-                option,
-                got=text,
-                expected="more than 0 Hz, and less than 1 GHz",
-                hint='write e.g. "5 kHz".',
-            )
+        refuse_if(
+            not 0.0 < value < 1e9,
+            option,
+            got=text,
+            expected="more than 0 Hz, and less than 1 GHz",
+            hint='write e.g. "5 kHz".',
+        )
         return value
 
     ends = None

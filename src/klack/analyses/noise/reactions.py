@@ -30,7 +30,7 @@ from klack.arrays import Matrix, Vector
 from klack.bodies.reduction.structure import Structure
 from klack.case.bodies import SurfaceName
 from klack.case.noise import CaseNoise, NoisePassage
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.input.problem import one_of
 from klack.signals.sampled import TimeSeries
 from klack.simulation.network_result import NetworkResult
@@ -197,21 +197,21 @@ def acting_forces(
 def _require_forces(variant: StrokeVariant) -> None:
     acting, moving = variant.acting, variant.moving
     known = {part.body for part in acting if part.component == FLUID}
-    if not acting or any(body.in_fluid and body.body not in known for body in moving):
-        raise InputError(
-            "noise.mounts",
-            got="a result of an earlier version, without the positions of its forces",
-            expected="a result with these positions",
-            hint="run klack stroke again, then klack noise.",
-        )
+    refuse_if(
+        not acting or any(body.in_fluid and body.body not in known for body in moving),
+        "noise.mounts",
+        got="a result of an earlier version, without the positions of its forces",
+        expected="a result with these positions",
+        hint="run klack stroke again, then klack noise.",
+    )
     driven = [body.body for body in moving if body.driven]
-    if driven:
-        raise InputError(
-            "noise.mounts",
-            got=f"the prescribed motion of {one_of(driven)}, whose drive has no reaction",
-            expected="bodies moved by forces",
-            hint="leave out 'mounts' for this case.",
-        )
+    refuse_if(
+        driven,
+        "noise.mounts",
+        got=f"the prescribed motion of {one_of(driven)}, whose drive has no reaction",
+        expected="bodies moved by forces",
+        hint="leave out 'mounts' for this case.",
+    )
 
 
 def _force_of(result: NetworkResult, part: ActingForce) -> Vector:
@@ -268,15 +268,15 @@ def _passage_force(result: NetworkResult, item: FluidPassage, own: NoisePassage)
     missing = "" if area > 0.0 else "area" if item.density > 0.0 or not item.flows else "density"
     if item.flows and item.density <= 0.0:
         missing = "density"
-    if missing:
-        raise InputError(
-            f"noise.passages.{item.component}",
-            got=f"no {missing} of its mouth",
-            expected="the cross-section of the fluid there, and a liquid",
-            hint=f"add {item.component}: {{area: 1 mm^2}}."
-            if missing == "area"
-            else "direction: across leaves it out.",
-        )
+    refuse_if(
+        missing,
+        f"noise.passages.{item.component}",
+        got=f"no {missing} of its mouth",
+        expected="the cross-section of the fluid there, and a liquid",
+        hint=f"add {item.component}: {{area: 1 mm^2}}."
+        if missing == "area"
+        else "direction: across leaves it out.",
+    )
     force = np.zeros(result.time.size)
     flow = sum((result.channels[name].values for name in item.flows), np.zeros(force.size))
     for end, sign in ((0, -1.0), (1, 1.0)):

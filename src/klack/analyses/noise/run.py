@@ -48,7 +48,7 @@ from klack.analyses.noise.record import (
 )
 from klack.analyses.noise.source import NoiseSource, SourceStop
 from klack.analyses.record import run_fields
-from klack.errors import ConvergenceError, InputError
+from klack.errors import ConvergenceError, InputError, refuse_if
 from klack.input.problem import one_of
 from klack.machine.cache.result_cache import result_cache
 from klack.machine.progress import Progress, silent
@@ -130,13 +130,13 @@ def noise_design(source: NoiseSource) -> NoiseDesign:
 
 
 def _design_names(sources: Sequence[NoiseSource], names: Sequence[str]) -> tuple[str, ...]:
-    if not sources:
-        raise InputError(
-            "noise",
-            got="no result",
-            expected="at least one impact or stroke",
-            hint="run one first, for example klack.run_stroke(case).",
-        )
+    refuse_if(
+        not sources,
+        "noise",
+        got="no result",
+        expected="at least one impact or stroke",
+        hint="run one first, for example klack.run_stroke(case).",
+    )
     if not names:
         plain = [f"{source.case} {source.run}" for source in sources]
         before = [plain[:i].count(name) for i, name in enumerate(plain)]
@@ -324,13 +324,13 @@ def _outside(elements: Mapping[str, SurfaceRadiation]) -> str:
 
 
 def _material(source: NoiseSource, name: str) -> Material:
-    if name not in source.materials:
-        raise InputError(
-            f"case {source.case}: noise.plate.material",
-            got=f"'{name}'",
-            expected=f"one of the materials of the case: {one_of(source.materials)}",
-            hint="add it to 'materials'.",
-        )
+    refuse_if(
+        name not in source.materials,
+        f"case {source.case}: noise.plate.material",
+        got=f"'{name}'",
+        expected=f"one of the materials of the case: {one_of(source.materials)}",
+        hint="add it to 'materials'.",
+    )
     given = source.materials[name]
     return Material(name=name, young=given.young, poisson=given.poisson, density=given.density)
 

@@ -35,7 +35,7 @@ from klack.case.levels import LEVELS, VARIANTS
 from klack.case.noise import CaseNoise
 from klack.case.schema import Case
 from klack.case.valve import ValveCase
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.input.problem import CaseProblem, nearest, one_of
 from klack.machine.progress import Progress, silent
 from klack.signals.sampled import TimeSeries
@@ -187,13 +187,13 @@ def impact_sources(
     The structure is that of the reduced level, whichever level the force comes from.  The section
     ``noise`` and the materials are those of the text of the study, or of ``case``.
     """
-    if study.is_row:
-        raise InputError(
-            "noise",
-            got="an impact of three bodies in a row",
-            expected="an impact of two bodies, or a stroke",
-            hint="run the three bodies as a stroke: klack stroke, then klack noise.",
-        )
+    refuse_if(
+        study.is_row,
+        "noise",
+        got="an impact of three bodies in a row",
+        expected="an impact of two bodies, or a stroke",
+        hint="run the three bodies as a stroke: klack stroke, then klack noise.",
+    )
     _require_structures(study)
     wanted = tuple(levels) or (study.reference,)
     failed = [f"The impact is incomplete: {note}" for note in failure_notes(study.failures)]
@@ -415,24 +415,23 @@ def _yield_notes(result: LevelResult) -> tuple[str, ...]:
 
 def _require_structures(study: ImpactStudy | StrokeStudy) -> None:
     held = [body.name for body in study.bodies if body.support != "free"]
-    if held and not study.structures:
-        raise InputError(
-            f"result of case {study.case}",
-            got=f"no modes and surfaces of {one_of(held)}, as written by an earlier version of "
-            "klack",
-            expected="a result with modes and surfaces",
-            hint="run the case again, then klack noise.",
-        )
+    refuse_if(
+        held and not study.structures,
+        f"result of case {study.case}",
+        got=f"no modes and surfaces of {one_of(held)}, as written by an earlier version of klack",
+        expected="a result with modes and surfaces",
+        hint="run the case again, then klack noise.",
+    )
 
 
 def _require_stops(case: str, variant: StrokeVariant) -> None:
-    if not variant.result.interfaces:
-        raise InputError(
-            f"result of case {case}",
-            got=f"no end stop in '{variant.name}'",
-            expected="a valve whose needle hits a stop",
-            hint="add an end-stop to the network: the noise comes from its force.",
-        )
+    refuse_if(
+        not variant.result.interfaces,
+        f"result of case {case}",
+        got=f"no end stop in '{variant.name}'",
+        expected="a valve whose needle hits a stop",
+        hint="add an end-stop to the network: the noise comes from its force.",
+    )
 
 
 def _require(what: str, name: str, held: Mapping[str, object], why: str = "") -> None:

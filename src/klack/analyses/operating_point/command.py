@@ -5,7 +5,7 @@ from pathlib import Path
 
 from klack.analyses.ending import Ending
 from klack.analyses.operating_point.asked import SteadyAsked
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.terminal.options import Components, WantedResult, imported
 from klack.terminal.progress import show_progress
 
@@ -35,13 +35,13 @@ def show_operating_points(
         tree = read_case_tree(path, imported(component))
         case = tree.case()
     wanted = [name for item in variants for name in item.split(",") if name]
-    if len(wanted) > 1:
-        raise InputError(
-            "--variant",
-            got=f"{len(wanted)} variants together with --steady",
-            expected="one",
-            hint="compute the operating point of each variant with a separate command.",
-        )
+    refuse_if(
+        len(wanted) > 1,
+        "--variant",
+        got=f"{len(wanted)} variants together with --steady",
+        expected="one",
+        hint="compute the operating point of each variant with a separate command.",
+    )
     base = Conditions(
         current=stated_drive(at_rest.current or (), "--current", CURRENT),
         voltage=stated_drive(at_rest.voltage or (), "--voltage", VOLTAGE),

@@ -12,7 +12,7 @@ from klack.case.any_case import CaseTree
 from klack.case.key_path import Quantity, quantity_at, split_path
 from klack.case.points import with_changes
 from klack.case.valve import ValveCase
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.input.problem import CaseProblem, Key, nearest, one_of
 from klack.magnetics.constant_drive import Coil, coils_of
 from klack.network.network import Network
@@ -59,13 +59,13 @@ class Conditions:
 
     def _current(self, name: str, coil: Coil, usual: float) -> float:
         given = [of[key] for of in (self.current, self.voltage) for key in (name, "") if key in of]
-        if len(given) > 1:
-            raise InputError(
-                f"drive of '{name}'",
-                got="more than one statement",
-                expected="one current or one voltage for each coil",
-                hint=f'write --current "{name}=3 A", or a voltage, but not both.',
-            )
+        refuse_if(
+            len(given) > 1,
+            f"drive of '{name}'",
+            got="more than one statement",
+            expected="one current or one voltage for each coil",
+            hint=f'write --current "{name}=3 A", or a voltage, but not both.',
+        )
         for of, factor in ((self.current, 1.0), (self.voltage, 1.0 / coil.resistance)):
             for key in (name, ""):
                 if key in of:
@@ -102,13 +102,13 @@ def stated_drive(texts: Sequence[str], option: str, kind: Kind) -> dict[str, flo
     found: dict[str, float] = {}
     for text in texts:
         name, _, value = text.rpartition("=")
-        if name.strip() in found:
-            raise InputError(
-                option,
-                got=f"'{text}' after another value for the same coil",
-                expected="one value for each coil",
-                hint=f'write {option} "coil={kind.example}" once for each.',
-            )
+        refuse_if(
+            name.strip() in found,
+            option,
+            got=f"'{text}' after another value for the same coil",
+            expected="one value for each coil",
+            hint=f'write {option} "coil={kind.example}" once for each.',
+        )
         found[name.strip()] = parse_quantity(value.strip(), kind, option)
     return found
 

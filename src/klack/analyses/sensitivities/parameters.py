@@ -12,7 +12,7 @@ from klack.case.key_path import quantity_at, split_path
 from klack.case.points import PointValue
 from klack.case.study_source import StudySource
 from klack.case.valve import ValveCase
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.input.problem import CaseProblem, Key, nearest, one_of
 from klack.studies.designs import Normal, Range, Spread
 from klack.units import RATIO, Kind
@@ -140,13 +140,13 @@ def slope_space(case: AnyCase, source: StudySource | None, names: Sequence[str] 
     chosen = list(dict.fromkeys(names)) or [
         name for name, item in found.items() if _reason(case, item, space.linked) is None
     ]
-    if not chosen:
-        raise InputError(
-            _WHERE,
-            got="no numerical parameter of the network",
-            expected="keys of the case with a number and unit",
-            hint="--parameter network.components.spring.preload, or a section 'study'.",
-        )
+    refuse_if(
+        not chosen,
+        _WHERE,
+        got="no numerical parameter of the network",
+        expected="keys of the case with a number and unit",
+        hint="--parameter network.components.spring.preload, or a section 'study'.",
+    )
     varied = tuple(found.get(name) or _key(case, name, list(found)) for name in chosen)
     for key in varied:
         if (reason := _reason(case, key, space.linked)) is not None:

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from klack.analyses.ending import Ending
+from klack.errors import InputError, require_nonnegative, require_positive
 from klack.terminal.options import WANTED_RESULT, CaseArgument, Components, WantedResult, imported
 from klack.terminal.progress import show_progress
 
@@ -58,8 +59,6 @@ def shots(
     wanted: WantedResult = WANTED_RESULT,
 ) -> int:
     """Drop or actuate the valve many times: is the highest rebound the one of a centred impact?"""  # noqa: D400
-    from klack.errors import require_nonnegative, require_positive
-
     if count is not None:
         require_positive("--shots", count, "shots")
     if seed is not None:
@@ -133,8 +132,6 @@ def _strokes(
 
 
 def _refuse_variants(variants: list[str] | None) -> None:
-    from klack.errors import InputError
-
     if variants:
         raise InputError(
             "--variant",

@@ -7,6 +7,7 @@ from cyclopts import Parameter
 
 from klack.analyses.ending import Ending
 from klack.analyses.operating_point.asked import STEADY, SteadyAsked
+from klack.errors import InputError, require_positive
 from klack.network.accuracy import Accuracy
 from klack.terminal.options import (
     WANTED_RESULT,
@@ -160,7 +161,6 @@ def _checked_case(
     from pydantic import ValidationError
 
     from klack.case.valve_sections import StrokeRun
-    from klack.errors import InputError
 
     try:
         run = StrokeRun(**(dict(case.run) | changes))
@@ -176,7 +176,6 @@ def _checked_case(
 
 
 def _time(option: str, text: str) -> float:
-    from klack.errors import require_positive
     from klack.units import TIME, parse_quantity
 
     value = parse_quantity(text, TIME, option)

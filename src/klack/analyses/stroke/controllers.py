@@ -5,7 +5,7 @@ from pathlib import Path
 
 from klack.case.valve import ValveCase
 from klack.control.controlled import Controlled
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.input.problem import nearest, one_of
 from klack.mechanics.fmu_controller import FmuController, controlled_by_fmu
 
@@ -17,14 +17,14 @@ def controller_files(given: Sequence[str]) -> dict[str, Path]:
     files: dict[str, Path] = {}
     for text in given:
         name, sign, file = text.partition("=")
-        if not (name and sign and file) or name in files:
-            raise InputError(
-                "--controller",
-                got=f"'{text}'"
-                + (", the second controller of that component" if name in files else ""),
-                expected="NAME=FILE.fmu, once for each controlled component of the case",
-                hint="for example: --controller driver=controller.fmu",
-            )
+        refuse_if(
+            not (name and sign and file) or name in files,
+            "--controller",
+            got=f"'{text}'"
+            + (", the second controller of that component" if name in files else ""),
+            expected="NAME=FILE.fmu, once for each controlled component of the case",
+            hint="for example: --controller driver=controller.fmu",
+        )
         files[name] = Path(file)
     return files
 

@@ -17,7 +17,7 @@ from klack.analyses.study.computing import Agenda, PointWorkers, Tally
 from klack.analyses.study.processes import Answer, PointOrder, SentCase, answered, died_row
 from klack.analyses.workers import Failure, unwrapped
 from klack.case.any_case import AnyCase, CaseTree
-from klack.errors import ConvergenceError, InputError, MissingExtraError
+from klack.errors import ConvergenceError, InputError, MissingExtraError, refuse_if
 from klack.machine.progress import Progress, remark
 
 if TYPE_CHECKING:
@@ -133,13 +133,13 @@ class DaskTasks:
 
         places = self._places.pop(future)
         error = future.exception() if future.status == "error" else None
-        if isinstance(error, ImportError | AttributeError):
-            raise InputError(
-                "dask",
-                got=f"a worker that cannot load the data sent to it ({error})",
-                expected=f"klack {klack.__version__} in the environment of every worker",
-                hint="start the workers in the same environment as this command.",
-            )
+        refuse_if(
+            isinstance(error, ImportError | AttributeError),
+            "dask",
+            got=f"a worker that cannot load the data sent to it ({error})",
+            expected=f"klack {klack.__version__} in the environment of every worker",
+            hint="start the workers in the same environment as this command.",
+        )
         if error is not None and not isinstance(error, KilledWorker):
             raise error
         self._case = self._send_case()

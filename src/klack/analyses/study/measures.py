@@ -233,13 +233,13 @@ def shot_measure(name: str) -> ChosenMeasure | None:
             f"{statistic.name} of the shots",
             lambda found: statistic.of(getattr(found.shots, of)),
         )
-    if of in _RESULTS and not key:
-        raise InputError(
-            "measures",
-            got=f"'{name}', which has a value for every shot",
-            expected=f"a statistic after it: {one_of(_STATISTICS)}",
-            hint=f"write {name}.mean, or {SHOTS}.{_CENTRIC}.{of} of the centred shot.",
-        )
+    refuse_if(
+        of in _RESULTS and not key,
+        "measures",
+        got=f"'{name}', which has a value for every shot",
+        expected=f"a statistic after it: {one_of(_STATISTICS)}",
+        hint=f"write {name}.mean, or {SHOTS}.{_CENTRIC}.{of} of the centred shot.",
+    )
     return None
 
 
@@ -369,13 +369,13 @@ def _impact_measure(case: Case, name: str) -> ChosenMeasure | None:
         return shot_measure(name)
     noise = _OF_NOISE.get(name)
     own = name.rpartition(".")[2]
-    if noise is None and own in _OF_LEVELS:
-        raise InputError(
-            "measures",
-            got=f"'{name}', the name of a measure of a stroke",
-            expected="a measure of an impact, which has one contact",
-            hint=f"write {own}.",
-        )
+    refuse_if(
+        noise is None and own in _OF_LEVELS,
+        "measures",
+        got=f"'{name}', the name of a measure of a stroke",
+        expected="a measure of an impact, which has one contact",
+        hint=f"write {own}.",
+    )
     return noise
 
 

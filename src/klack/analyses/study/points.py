@@ -536,24 +536,24 @@ def _rows_of_file(
     table = list(csv.reader(StringIO(text_of(file))))
     names = [item.name for item in varied]
     head = [cell.strip() for cell in table[0]] if table else []
-    if sorted(head) != sorted(names):
-        raise InputError(
-            f"{file}:1",
-            got=f"a header of: {one_of(head)}",
-            expected=f"one column for each parameter that varies: {one_of(names)}",
-            hint="write the names as in the study.",
-        )
+    refuse_if(
+        sorted(head) != sorted(names),
+        f"{file}:1",
+        got=f"a header of: {one_of(head)}",
+        expected=f"one column for each parameter that varies: {one_of(names)}",
+        hint="write the names as in the study.",
+    )
     rows = []
     for number, cells in enumerate(table[1:], 2):
         if not any(cell.strip() for cell in cells):
             continue
-        if len(cells) != len(head):
-            raise InputError(
-                f"{file}:{number}",
-                got=f"{len(cells)} values",
-                expected=f"{len(head)}, one for each name in the header",
-                hint="use a comma between values and a decimal point in numbers.",
-            )
+        refuse_if(
+            len(cells) != len(head),
+            f"{file}:{number}",
+            got=f"{len(cells)} values",
+            expected=f"{len(head)}, one for each name in the header",
+            hint="use a comma between values and a decimal point in numbers.",
+        )
         texts = dict(zip(head, (cell.strip() for cell in cells), strict=True))
         at = f"{file}:{number}"
         rows.append([_cell(f"{at}: {item.name}", texts[item.name], item) for item in varied])

@@ -12,7 +12,7 @@ from klack.case.any_case import AnyCase, CaseTree
 from klack.case.points import GivenPoints
 from klack.case.schema import Case
 from klack.case.valve import ValveCase
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.machine.progress import Progress, silent
 
 __all__ = ["require_way", "run_points"]
@@ -62,20 +62,20 @@ def run_points(
 
 def require_way(case: AnyCase, variant: str | None, level: str | None) -> None:
     """Refuse a level of a stroke, and a variant of an impact."""
-    if variant is not None and isinstance(case, Case):
-        raise InputError(
-            "variant",
-            got=f"'{variant}', for an impact of two bodies",
-            expected="a level; only strokes have variants",
-            hint='write level="interface", or leave the variant out.',
-        )
-    if level is not None and isinstance(case, ValveCase):
-        raise InputError(
-            "level",
-            got=f"'{level}', for a stroke of a whole valve",
-            expected="a variant; only impacts have levels",
-            hint='write variant="dry", or leave the level out.',
-        )
+    refuse_if(
+        variant is not None and isinstance(case, Case),
+        "variant",
+        got=f"'{variant}', for an impact of two bodies",
+        expected="a level; only strokes have variants",
+        hint='write level="interface", or leave the variant out.',
+    )
+    refuse_if(
+        level is not None and isinstance(case, ValveCase),
+        "level",
+        got=f"'{level}', for a stroke of a whole valve",
+        expected="a variant; only impacts have levels",
+        hint='write variant="dry", or leave the level out.',
+    )
 
 
 def _row_table(asked: AskedPoints, found: Sequence[PointRow | None]) -> PointTable:

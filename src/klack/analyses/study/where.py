@@ -11,7 +11,7 @@ from klack.analyses.study.computing import (
 )
 from klack.analyses.study.processes import PROCESS_SIZE, ProcessWorkers
 from klack.case.any_case import AnyCase, CaseTree
-from klack.errors import InputError, refuse_if
+from klack.errors import refuse_if
 from klack.machine.cores import available_cores
 from klack.machine.memory import available_memory
 from klack.machine.progress import Progress
@@ -52,13 +52,13 @@ class Where:
     def __post_init__(self) -> None:
         """Check what was asked for."""
         for name, value in (("threads", self.threads), ("workers", self.workers)):
-            if value is not None and (isinstance(value, bool) or value < 1):
-                raise InputError(
-                    name,
-                    got=str(value),
-                    expected="1 or more",
-                    hint="leave the number out to use all cores.",
-                )
+            refuse_if(
+                value is not None and (isinstance(value, bool) or value < 1),
+                name,
+                got=str(value),
+                expected="1 or more",
+                hint="leave the number out to use all cores.",
+            )
         given = {"threads": self.threads, "workers": self.workers, "dask": self.dask}
         names = [name for name, value in given.items() if value is not None]
         refuse_if(

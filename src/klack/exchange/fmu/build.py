@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from klack.contact.step_constants import LANES, NO_LAW, shared_constants
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.exchange.fmu.compiler import PLATFORMS, compile_library, require_compilers, this_platform
 from klack.exchange.fmu.documentation import documentation_files
 from klack.exchange.fmu.model_description import (
@@ -199,13 +199,13 @@ def build_fmu(
         Of :data:`klack.exchange.fmu.compiler.PLATFORMS`; default: of this program.  An importing
         program may compile the sources inside.
     """
-    if fmi not in SOURCE_FILES:
-        raise InputError(
-            "build_fmu: fmi",
-            got=f"{fmi}",
-            expected="2 or 3",
-            hint="more programs read version 2.",
-        )
+    refuse_if(
+        fmi not in SOURCE_FILES,
+        "build_fmu: fmi",
+        got=f"{fmi}",
+        expected="2 or 3",
+        hint="more programs read version 2.",
+    )
     wanted = (this_platform(),) if platforms is None else tuple(dict.fromkeys(platforms))
     require_compilers(wanted)
     guid = _guid(model, fmi)

@@ -21,7 +21,7 @@ from klack.assembling.valve import build_valve_bodies, valve_parts
 from klack.bodies.elasticity.body import ElasticBody
 from klack.bodies.elasticity.stress import StressField, von_mises
 from klack.case.valve import ValveCase
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.exchange.results.table import file_stems
 from klack.exchange.results.vtk_series import stress_grid
 from klack.exchange.results.vtu import SeriesFile, VtuGrid, grid_piece, write_grid, write_pvd
@@ -176,10 +176,13 @@ def write_spatial_series(
     frames
         At most, evenly among the recorded instants; two at least.
     """
-    if frames < 2:
-        raise InputError(
-            "--frames", got=f"{frames}", expected="at least 2", hint="50 give a smooth animation."
-        )
+    refuse_if(
+        frames < 2,
+        "--frames",
+        got=f"{frames}",
+        expected="at least 2",
+        hint="50 give a smooth animation.",
+    )
     _require_solids(case)
     run = _run(study, variant)
     record, modes = _recorded(run, impact)
@@ -212,14 +215,14 @@ def write_spatial_series(
 
 def _require_solids(case: ValveCase) -> None:
     for name, body in case.bodies.items():
-        if body.geometry.dimension == 2:
-            raise InputError(
-                f"{case.path or 'case'}: bodies.{name}",
-                got="a half section, whose motion in Fourier orders has no grid",
-                expected="bodies of three dimensions",
-                hint="the report has the line load of the impact; for grids use 'model: swept' "
-                "with 'layers: 18' for all bodies.",
-            )
+        refuse_if(
+            body.geometry.dimension == 2,
+            f"{case.path or 'case'}: bodies.{name}",
+            got="a half section, whose motion in Fourier orders has no grid",
+            expected="bodies of three dimensions",
+            hint="the report has the line load of the impact; for grids use 'model: swept' "
+            "with 'layers: 18' for all bodies.",
+        )
 
 
 def _run(study: StrokeStudy, variant: str | None) -> StrokeVariant:

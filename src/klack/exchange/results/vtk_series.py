@@ -20,7 +20,7 @@ from klack.bodies.elasticity.body import ElasticBody
 from klack.bodies.elasticity.stress import StressField, von_mises
 from klack.case.schema import Case
 from klack.case.valve import ValveCase
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.exchange.results.table import file_stems
 from klack.exchange.results.vtu import SeriesFile, VtuGrid, write_pvd
 from klack.files.whole import whole_files
@@ -53,13 +53,13 @@ def write_impact_series(
     frames
         Evenly over ``run.duration``, at most one per step; two at least.
     """
-    if frames < 2:
-        raise InputError(
-            "write_impact_series: frames",
-            got=f"{frames}",
-            expected="at least 2",
-            hint="50 give a smooth animation.",
-        )
+    refuse_if(
+        frames < 2,
+        "write_impact_series: frames",
+        got=f"{frames}",
+        expected="at least 2",
+        hint="50 give a smooth animation.",
+    )
     case.require_levels([level])
     case.require_on_axis("a series of fields")
     problem = build_problem(case, progress, threads=threads)
