@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from math import inf, isfinite
+from pathlib import Path
 from time import perf_counter
 from typing import Any, NamedTuple
 
@@ -33,13 +34,15 @@ from klack.analyses.stroke.times import all_lift_times
 from klack.assembling.body_summary import BodySummary, summarise_body
 from klack.assembling.bolts import struck_bolts
 from klack.assembling.valve import Valve, build_valve
+from klack.case.any_case import read_valve_case
 from klack.case.levels import Variant
 from klack.case.placed_errors import tells_place
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles, find_roles
 from klack.contact.rubbing_law import RubbingLaw
 from klack.contact.yielding_law import YieldingLaw
-from klack.errors import AccuracyWarning, ConvergenceError, InputError
+from klack.control.controlled import Controlled
+from klack.errors import AccuracyWarning, ConvergenceError, InputError, KlackError
 from klack.machine.cache.result_cache import result_cache
 from klack.machine.progress import Progress, SoFar, StageProgress, drawn, silent
 from klack.machine.stages import StageClock, collected_warnings, show, trial
@@ -76,6 +79,8 @@ _HALVINGS = 3  # of all steps: errors of first order are an eighth then, those o
 _MOST_HALVINGS = 6  # of short runs
 _SHORT_RUN = 100_000  # steps
 _FALLING_RUN = 400_000  # where changes fall: the next takes 1 s
+_OF_THE_VALVE = ("bodies", "materials", "stops", "reduction", "lumped", "motion", "guide", "guides")
+_NAMED = 3  # keys in a sentence
 _NEAR = 0.3  # share of what is asked that the spacing of records may be off by: 1 us is 1.28 us
 
 
@@ -113,7 +118,7 @@ def run_stroke(
         run_fields(begin, clock),
         bodies=body_summaries(valve),
         stops=stops,
-        warnings=(*missing, *stroke_notes(case, results, roles, notes)),
+        warnings=(*missing, *_other_case(case, after), *stroke_notes(case, results, roles, notes)),
         schematic=schematic_svg(case.network.network()),
     )
     if failure is not None:
@@ -283,6 +288,38 @@ def _begin(case: ValveCase, after: StrokeStudy | None, name: Variant) -> Network
             hint="run that variant from the start first.",
         )
     return after.variants[name].result
+
+
+def _other_case(case: ValveCase, after: StrokeStudy | None) -> Iterator[str]:
+    """A doubt where a run goes on in another valve than the one that it continues."""
+    if after is None:
+        return
+    parts = case.network.components
+    own = {type(part) for part in parts.values() if not type(part).__module__.startswith("klack.")}
+    try:
+        before = read_valve_case(after.case_text, case.path or Path("case.yaml"), tuple(own))
+    except KlackError:  # of other files, or of components that are not here
+        return
+    old = before.network.components
+    differ = [
+        f"network.components.{name}"
+        for name in dict.fromkeys((*old, *parts))
+        if old.get(name) != parts.get(name) and not isinstance(parts.get(name), Controlled)
+    ]
+    differ += [
+        f"network.{key}"
+        for key in ("fluid", "gas", "ambient", "connections")
+        if getattr(before.network, key) != getattr(case.network, key)
+    ]
+    differ += [key for key in _OF_THE_VALVE if getattr(before, key) != getattr(case, key)]
+    if differ:
+        more = f" and {len(differ) - _NAMED} more" if len(differ) > _NAMED else ""
+        yield (
+            f"the run goes on in another valve: {', '.join(differ[:_NAMED])}{more} differ from the "
+            "case of the result that it continues, whose state is taken as it is: speeds, gaps and "
+            "forces may jump there. Try: the same case for another duration; what changes "
+            "during a stroke belongs into tables over time."
+        )
 
 
 def _runs(

@@ -110,6 +110,7 @@ def all_lift_times(
                 gaps={
                     stop: result.channels[f"{stop} gap"].values for side in stops for stop in side
                 },
+                goes_on=result.start is None,
             )
         )
     return tuple(found)
@@ -124,11 +125,13 @@ def lift_times(
     ends: tuple[float, float],
     stops: tuple[tuple[str, ...], tuple[str, ...]],
     gaps: Mapping[str, Vector] | None = None,
+    goes_on: bool = False,
 ) -> LiftTimes:
     """Times of one body: the first stroke that passes 90 % of its lift, else the longest one.
 
     A stroke begins where 10 % of the lift from the end at rest are passed, and ends where the body
-    comes back below them; between two records the displacement is a straight line.
+    comes back below them; between two records the displacement is a straight line.  In a run that
+    goes on from another one, the stroke that is under way at its start comes before longer ones.
 
     Parameters
     ----------
@@ -141,6 +144,8 @@ def lift_times(
         That end the lift on either side, first the one that stands.
     gaps (n,) [m]
         Of stops, where several end the lift.
+    goes_on
+        Whether the run begins where another one has ended.
     """
     closed, opened = ends
     free = not (isfinite(closed) and isfinite(opened))
@@ -160,8 +165,8 @@ def lift_times(
     moved = float(np.max(1.0 - share if is_open else share))
     if not free and _LEAST <= moved < _MOVED:  # a relief valve that its stop never ends
         free = True
-        way = moved * (high - low)
-        low, high = (high - way, high) if is_open else (low, low + way)
+        used = moved * (high - low)
+        low, high = (high - used, high) if is_open else (low, low + used)
         share = (displacement - low) / (high - low)
     rest, far = stops[::-1] if is_open else stops
 
@@ -169,7 +174,8 @@ def lift_times(
         others = [gaps[stop] for stop in row if gaps and stop != event.stop]
         return all(np.interp(event.time, time, gap) <= 0.0 for gap in others)
 
-    away, back = _stroke(time, 1.0 - share if is_open else share, events, (rest, far), closes)
+    way = 1.0 - share if is_open else share
+    away, back = _stroke(time, way, events, (rest, far), closes, goes_on=goes_on)
     if is_open:  # passed 10 % from the open end: 90 % of the lift
         away, back = _mirrored(away), _mirrored(back)
     return LiftTimes(
@@ -188,6 +194,8 @@ def _stroke(
     events: Sequence[ImpactEvent],
     ends: tuple[tuple[str, ...], tuple[str, ...]],
     closes: Closes,
+    *,
+    goes_on: bool,
 ) -> tuple[Passage, Passage]:
     """Away from the end at rest, and back; ``ends`` are the stops there and at the other end."""
     rest, far = ends
@@ -198,7 +206,8 @@ def _stroke(
         return Passage(stop="".join(far[:1])), Passage(stop="".join(rest[:1]))
     peaks = [float(share[a:b].max()) for a, b in strokes]
     whole = [i for i, peak in enumerate(peaks) if peak >= 1.0 - _MOVED]
-    first, end = strokes[whole[0] if whole else int(np.argmax(peaks))]
+    under_way = goes_on and strokes[0][0] == 0
+    first, end = strokes[whole[0] if whole else 0 if under_way else int(np.argmax(peaks))]
     inside = share[first:end]
     top = first + int(np.argmax(inside >= 1.0 - _MOVED) if whole else np.argmax(inside))
 
