@@ -1,5 +1,6 @@
 """Case files: truth = the numbers written in the file, and the line where a mistake was put."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -331,11 +332,26 @@ def test_long_lists_lose_their_middle_and_no_half_words():
     assert len(error.hint) < 1220
 
 
-def test_further_mistakes_are_counted():
+def test_further_mistakes_are_counted_and_have_places():
     text = changed("0.5 m/s", "0.5").replace("1.2 mm", "1.2 bar").replace("210 GPa", "210")
 
     assert "materials.steel.young" in str(complaint(text))
-    assert str(complaint(text)).endswith("(2 more problems in this file.)")
+    last = str(complaint(text)).splitlines()[-1]
+    lines = [text[: text.index(word)].count("\n") + 1 for word in ("1.2 bar", "speed: 0.5")]
+    found = [int(line) for line in re.findall(r":(\d+): ", last)]
+    assert last.startswith("(2 more problems: valve.yaml:")
+    assert found == lines
+
+
+@pytest.mark.parametrize(("count", "end"), [(1, "every key."), (2, ".coil.poles[1])")])
+def test_a_section_that_fails_for_what_is_in_it_is_no_problem_of_its_own(count: int, end: str):
+    """A list of poles without their edge fields is not too short as well."""
+    text = find_case("free-travel").read_text(encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        read_any_case(text.replace(", fringing: plane", "", count), Path("valve.yaml"))
+
+    assert ".coil.poles[0]: got no key 'fringing'" in str(caught.value)
+    assert str(caught.value).endswith(end)
 
 
 @pytest.mark.slow

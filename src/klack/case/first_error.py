@@ -16,9 +16,8 @@ __all__ = ["first_error"]
 
 
 def first_error(case: type[Section], error: ValidationError, found: ExpandedCase) -> InputError:
-    """Convert the first error of pydantic, count the others."""
-    details = error.errors(include_url=False)
-    first, more = details[0], len(details) - 1
+    """Convert the first error of pydantic, count the others and give the places of some."""
+    first, *others = error.errors(include_url=False)
     problem = _problem(first, found.data, case)
     key = _existing(found.data, first["loc"]) + problem.key
     hint = problem.hint
@@ -29,13 +28,26 @@ def first_error(case: type[Section], error: ValidationError, found: ExpandedCase
         if (path := _elsewhere(found.data, name, ())) and path[:-1] != key:
             line = found.origin(path).where(on_key=True).removesuffix(f": {key_text(path)}")
             hint = f"'{name}' is in '{key_text(path[:-1])}' ({line}): check its indentation."
-    if more:
-        hint += f"\n({more} more {'problem' if more == 1 else 'problems'} in this file.)"
+    if more := _further([_existing(found.data, one["loc"]) for one in (first, *others)], found):
+        hint += f"\n({more})"
     got, written = problem.got, found.expressions.get(key)
     if written and written.text not in got:
         got += f", from '{written.text}'"
     where = found.origin(key).where(on_key=problem.on_key)
     return InputError(where, got=got, expected=problem.expected, hint=hint)
+
+
+def _further(keys: Sequence[Key], found: ExpandedCase) -> str:
+    """Number and places of problems after the first, without sections that fail for a part."""
+    whole = [
+        key for key in keys[1:] if all(key == other or key != other[: len(key)] for other in keys)
+    ]
+    if not whole:
+        return ""
+    places = [found.origin(key).where() for key in dict.fromkeys(whole)]
+    end = ", ..." if len(places) > _MOST_PLACES else ""
+    problems = "problem" if len(whole) == 1 else "problems"
+    return f"{len(whole)} more {problems}: {', '.join(places[:_MOST_PLACES])}{end}"
 
 
 def _elsewhere(data: Any, name: str, path: Key) -> Key:
