@@ -51,8 +51,7 @@ def restitution_rows() -> list[Row]:
     """Deviation of the restitution of the first impact, over noise seeds."""
     from klack.measurement.channels import LiftSensor
     from klack.measurement.lift_sensor import sense
-    from klack.measurement.set_measures import measure_set
-    from klack.measurement.stroke_measures import MeasuredStroke, StrokeSet
+    from klack.measurement.set_measures import measure_strokes
 
     sensor = LiftSensor(bandwidth=50e3)
     rows = []
@@ -62,15 +61,12 @@ def restitution_rows() -> list[Row]:
         deviations = []
         for seed in (100, 101, 102):
             random = np.random.default_rng(seed)
-            strokes = tuple(
-                MeasuredStroke(
-                    name=str(k), values={"lift": shown + random.normal(0.0, 1e-6, time.size)}
-                )
-                for k in range(16)
+            lifts = [shown + random.normal(0.0, 1e-6, time.size) for _ in range(16)]
+            read = measure_strokes(time, lifts, seat=0.0, opening=np.nan, sensor=sensor)
+            hits = [stroke.first("seat") for stroke in read]
+            deviations.append(
+                [np.nan if hit is None else hit.restitution - restitution for hit in hits]
             )
-            records = StrokeSet(source="synthetic", time=time, strokes=strokes)
-            found = measure_set(records, seat=0.0, opening=np.nan, sensor=sensor)
-            deviations.append(found.column("seat", "restitution").values - restitution)
         name = f"restitution {restitution}, {speed} m/s, {pull:g} m/s^2, 1 MS/s"
         means = np.abs(np.nanmean(deviations, axis=1))
         rows.append(Row(f"{name}: worst mean of a set", float(means.max()), "-", 0.005))

@@ -76,7 +76,7 @@ class FittedStroke:
 
     record: _Record
     touches: tuple[Touch, ...]
-    fits: tuple[_Ends | None, ...]
+    fits: list[_Ends | None]
     notes: tuple[str, ...]
 
 
@@ -87,7 +87,6 @@ def measure_stroke(
     seat: float | None = None,
     opening: float | None = None,
     sensor: LiftSensor | None = None,
-    shapes: Mapping[Stop, FlightShape] | None = None,
 ) -> StrokeMeasures:
     """Read impacts, speeds, restitution, rebound heights and periods off one lift.
 
@@ -105,13 +104,8 @@ def measure_stroke(
         stop that does not exist.
     sensor
         Its sensitivity and offset are taken out, its low pass is undone in the fits.
-    shapes
-        By stop, from other strokes of the same valve
-        (:func:`klack.measurement.set_measures.measure_set`).
     """
-    return read_flights(
-        fit_flights(time, lift, seat=seat, opening=opening, sensor=sensor), shapes or {}
-    )
+    return read_flights(fit_flights(time, lift, seat=seat, opening=opening, sensor=sensor))
 
 
 def fit_flights(
@@ -131,16 +125,20 @@ def fit_flights(
         fits = _fit_all(record, touches)
     factor = correlation_factor(tuple(f.flight.residuals for f in fits if f is not None))
     record = replace(record, correlation=factor, noise=_noise(fits))
-    return FittedStroke(
-        record=record, touches=touches, fits=tuple(_fit_all(record, touches)), notes=notes
-    )
+    return FittedStroke(record=record, touches=touches, fits=_fit_all(record, touches), notes=notes)
 
 
-def read_flights(fitted: FittedStroke, shapes: Mapping[Stop, FlightShape]) -> StrokeMeasures:
-    """Second half of :func:`measure_stroke`: flights on each stop together."""
+def read_flights(
+    fitted: FittedStroke, shapes: Mapping[Stop, FlightShape] | None = None
+) -> StrokeMeasures:
+    """Second half of :func:`measure_stroke`: flights on each stop together.
+
+    ``shapes`` by stop, from other strokes of the same valve
+    (:func:`klack.measurement.set_measures.measure_strokes`).
+    """
     record, touches = fitted.record, fitted.touches
-    trains = _joined(record, touches, list(fitted.fits), shapes)
-    noise = _noise(list(fitted.fits))
+    trains = _joined(record, touches, fitted.fits, shapes or {})
+    noise = _noise(fitted.fits)
     return StrokeMeasures(
         impacts=_impacts(record, touches, trains),
         seat_level=record.levels.get("seat", _NAN),

@@ -136,10 +136,6 @@ class StrokeMeasures:
         """First impact on a stop; None if there is none."""
         return next(iter(self.on(stop)), None)
 
-    def bounces(self, stop: Stop) -> int:
-        """Times that the needle left a stop, higher than :attr:`least_height`."""
-        return sum(impact.rebound_speed != 0.0 for impact in self.on(stop))
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeasuredStroke:

@@ -8,8 +8,7 @@ from klack.measurement.channels import LiftSensor
 from klack.measurement.differentiation import velocity_of
 from klack.measurement.impacts import measure_stroke
 from klack.measurement.lift_sensor import sense
-from klack.measurement.set_measures import expected_maximum, measure_set
-from klack.measurement.stroke_measures import MeasuredStroke, StrokeSet
+from klack.measurement.set_measures import expected_maximum, measure_strokes
 from klack.verification.check import Check, ComparedCurve, check
 from klack.verification.one_dimension import BouncingDrop
 
@@ -140,21 +139,15 @@ def _flights() -> list[Check]:
 
 def _noisy() -> list[Check]:
     records = [_record(NOISE, seed) for seed in range(RECORDS)]
-    strokes = tuple(
-        MeasuredStroke(name=str(k), values={"lift": lift}) for k, (_, lift) in enumerate(records)
-    )
-    measures = measure_set(
-        StrokeSet(source="exact drops", time=records[0][0], strokes=strokes),
-        opening=float("nan"),
-        sensor=SENSOR,
-    )
-    column = measures.column("seat", "restitution")
+    lifts = [lift for _, lift in records]
+    read = measure_strokes(records[0][0], lifts, opening=float("nan"), sensor=SENSOR)
+    values = np.array([stroke.on("seat")[0].restitution for stroke in read])
     source = f"{RECORDS} exact drops with 1 um of noise behind 50 kHz, 500 kS/s"
     return [
         check(
             "restitution from noisy records, mean [-]",
             expected=0.6,
-            computed=float(np.mean(column.values)),
+            computed=float(np.mean(values)),
             tolerance=0.005,
             source=source,
             absolute=True,
@@ -162,7 +155,7 @@ def _noisy() -> list[Check]:
         check(
             "restitution from noisy records, median error of one [-]",
             expected=0.0,
-            computed=float(np.median(np.abs(column.values - 0.6))),
+            computed=float(np.median(np.abs(values - 0.6))),
             tolerance=0.005,
             source=source,
             absolute=True,

@@ -33,7 +33,7 @@ from klack.measurement.differentiation import velocity_of
 from klack.measurement.impacts import measure_stroke
 from klack.measurement.lift_sensor import recorded_stroke, trigger_instant
 from klack.measurement.loading import load_stroke_set
-from klack.measurement.set_measures import first_impact_column, highest_rebound
+from klack.measurement.set_measures import highest_rebound
 from klack.measurement.stroke_measures import MeasuredImpact, Stop, StrokeMeasures, StrokeSet
 from klack.units import format_si
 
@@ -286,7 +286,7 @@ def _rms(values: Floats) -> float:
 
 
 def _scatter(records: Floats, median: Floats) -> float:
-    return _rms(records - median) if len(records) > 1 else float("nan")
+    return _rms(records - median) if len(records) > 1 else nan
 
 
 # --------------------------------------------------------------------------- impacts
@@ -312,10 +312,13 @@ def _highest(names: Sequence[str], readings: Sequence[_Reading]) -> tuple[Highes
     for stop in _STOPS:
         hits = [reading.on(stop) for reading in readings]
         firsts = [hit[0] if hit else None for hit in hits]
-        column = first_impact_column(stop, "rebound_height", firsts)
-        if column.known.size < _FEWEST_SHOTS:
+        values, errors = (
+            np.array([getattr(hit, name) if hit else nan for hit in firsts])
+            for name in ("rebound_height", "rebound_height_se")
+        )
+        if np.count_nonzero(np.isfinite(values)) < _FEWEST_SHOTS:
             continue
-        best = highest_rebound(column)
+        best = highest_rebound(values, errors)
         bounces = [sum(hit.rebound_height > 0.0 for hit in of_stroke) for of_stroke in hits]
         shot = firsts[best.index]
         assert shot is not None  # its rebound is the highest
@@ -369,16 +372,15 @@ def compare_numbers(
 ) -> Compared:
     """One computed number beside that of several strokes; nan are left out."""
     ours = [value for value in readings if isfinite(value)]
-    computed = float(np.median(ours)) if ours else float("nan")
+    computed = float(np.median(ours)) if ours else nan
     both = np.array([(v, e) for v, e in zip(values, errors, strict=True) if isfinite(v)])
     if not both.size:
-        nan = float("nan")
         return Compared(computed=computed, measured=nan, scatter=nan, error=nan, count=0)
     known, error = both[:, 0], float(np.median(both[:, 1]))
     return Compared(
         computed=computed,
         measured=float(np.median(known)),
-        scatter=float(np.std(known, ddof=1)) if known.size > 1 else float("nan"),
+        scatter=float(np.std(known, ddof=1)) if known.size > 1 else nan,
         error=error,
         count=int(known.size),
     )
