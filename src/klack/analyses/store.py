@@ -95,13 +95,13 @@ def _steadily(folder: Path, read: Callable[[Path], Found]) -> Found:
 
 def _load(path: Path, form: RecordFormat, largest: int) -> Any:
     attributes = _open(path)
-    if attributes.get("format") != form.name:
-        raise InputError(
-            f"result {path}",
-            got=f"a Zarr store with format {attributes.get('format')!r}",
-            expected=f"{form.name!r}",
-            hint=f"give the folder of a result written by `{form.command}`.",
-        )
+    refuse_if(
+        attributes.get("format") != form.name,
+        f"result {path}",
+        got=f"a Zarr store with format {attributes.get('format')!r}",
+        expected=f"{form.name!r}",
+        hint=f"give the folder of a result written by `{form.command}`.",
+    )
     version = attributes.get("format_version")
     refuse_if(
         version != form.version,

@@ -183,13 +183,13 @@ class CaseMaterial(NamedSection):
             self._refuse_with(("hardening",), "no yield stress", "give 'yield' or 'hardness'")
         limit = LARGEST_YIELD * self.young
         given = self.yield_stress or (self.hardness.yield_stress if self.hardness else 0.0)
-        if given > limit:
-            raise CaseProblem(
-                ("yield",) if self.hardness is None else ("hardness",),
-                got=f"a yield stress of {given / 1e6:.4g} MPa",
-                expected=f"at most a fiftieth of Young's modulus, {limit / 1e6:.4g} MPa",
-                hint="check the unit; hardened steel has 2000 MPa.",
-            )
+        refuse_key_if(
+            given > limit,
+            ("yield",) if self.hardness is None else ("hardness",),
+            got=f"a yield stress of {given / 1e6:.4g} MPa",
+            expected=f"at most a fiftieth of Young's modulus, {limit / 1e6:.4g} MPa",
+            hint="check the unit; hardened steel has 2000 MPa.",
+        )
         return self
 
     @property
@@ -359,13 +359,13 @@ class CaseBody(Section):
             return None
         pairs = value.items() if isinstance(value, Mapping) else [((), value)]
         for key, name in pairs:
-            if not isinstance(name, str):
-                raise CaseProblem(
-                    (key,) if isinstance(key, str) else (),
-                    got=f"'{name}'",
-                    expected="the name of a material, or a mapping solid: material",
-                    hint="define the properties in 'materials' and give the name here.",
-                )
+            refuse_key_if(
+                not isinstance(name, str),
+                (key,) if isinstance(key, str) else (),
+                got=f"'{name}'",
+                expected="the name of a material, or a mapping solid: material",
+                hint="define the properties in 'materials' and give the name here.",
+            )
         return dict(value) if isinstance(value, Mapping) else value
 
     @model_validator(mode="after")

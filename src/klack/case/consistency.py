@@ -289,13 +289,13 @@ def check_surface(case: CaseFile, key: Key, surface: SurfaceName) -> None:
 
 def _check_roles(case: ImpactSections) -> None:
     moving, stop = case.contact.between
-    if moving.body == stop.body:
-        raise CaseProblem(
-            ("contact", "between"),
-            got=f"{moving} and {stop}, two surfaces of one body",
-            expected="surfaces of two bodies",
-            hint=f"name a surface of {one_of(n for n in case.bodies if n != moving.body)}.",
-        )
+    refuse_key_if(
+        moving.body == stop.body,
+        ("contact", "between"),
+        got=f"{moving} and {stop}, two surfaces of one body",
+        expected="surfaces of two bodies",
+        hint=f"name a surface of {one_of(n for n in case.bodies if n != moving.body)}.",
+    )
     refuse_key_if(
         case.moving_body.fixed,
         ("bodies", moving.body, "fixed"),
@@ -386,13 +386,13 @@ def _check_opposite(case: ImpactSections) -> None:
         check_surface(case, ("opposite", "between", i), surface)
     stop, moving = case.opposite.between
     between = [surface.body for surface in case.contact.between]
-    if moving.body != between[0] or stop.body in between:
-        raise CaseProblem(
-            ("opposite", "between"),
-            got=f"{stop} and {moving}",
-            expected=f"a surface of the third body, then one of '{between[0]}', which moves",
-            hint="the upper stop is a separate body.",
-        )
+    refuse_key_if(
+        moving.body != between[0] or stop.body in between,
+        ("opposite", "between"),
+        got=f"{stop} and {moving}",
+        expected=f"a surface of the third body, then one of '{between[0]}', which moves",
+        hint="the upper stop is a separate body.",
+    )
     refuse_key_if(
         case.bodies[stop.body].geometry.dimension != case.dimension,
         ("bodies", stop.body, "geometry", "model"),
@@ -499,18 +499,18 @@ def _check_beside_backing(case: ImpactSections) -> None:
         (("reduction", "shifts"), case.reduction.shifts, "shifts"),
     ]
     for key, is_there, what in asked:
-        if is_there:
-            raise CaseProblem(
-                key,
-                got=f"{what}, and a body behind the struck body",
-                expected="one impact along the axis at 'levels: [reduced]', of smooth faces as "
-                "drawn and with consistent laws",
-                hint="write 'run: {levels: [reduced]}'."
-                if what == "other levels"
-                else f"remove '{key[-1]}', or 'backing' and the third body; klack stroke also "
-                "supports three bodies (how-to/seat-insert).",
-                on_key=True,
-            )
+        refuse_key_if(
+            is_there,
+            key,
+            got=f"{what}, and a body behind the struck body",
+            expected="one impact along the axis at 'levels: [reduced]', of smooth faces as "
+            "drawn and with consistent laws",
+            hint="write 'run: {levels: [reduced]}'."
+            if what == "other levels"
+            else f"remove '{key[-1]}', or 'backing' and the third body; klack stroke also "
+            "supports three bodies (how-to/seat-insert).",
+            on_key=True,
+        )
 
 
 def _check_roughness(case: ImpactSections) -> None:
@@ -526,14 +526,14 @@ def _check_roughness(case: ImpactSections) -> None:
         (("opposite",), case.opposite is not None, "an upper stop"),
     ]
     for key, is_there, what in others:
-        if is_there:
-            raise CaseProblem(
-                ("contact", "roughness"),
-                got=f"rough faces and {what} ({'.'.join(map(str, key))})",
-                expected="only one of them: no level combines a layer of asperities with that",
-                hint="remove one of them; contact.crown can be combined with everything.",
-                on_key=True,
-            )
+        refuse_key_if(
+            is_there,
+            ("contact", "roughness"),
+            got=f"rough faces and {what} ({'.'.join(map(str, key))})",
+            expected="only one of them: no level combines a layer of asperities with that",
+            hint="remove one of them; contact.crown can be combined with everything.",
+            on_key=True,
+        )
 
 
 def _check_solid_only(case: ImpactSections) -> None:
@@ -576,14 +576,14 @@ def _check_off_axis(case: ImpactSections) -> None:
         (("outputs",), bool(case.outputs), "sensors, whose angle is not known,"),
     ]
     for key, is_there, what in asked:
-        if is_there:
-            raise CaseProblem(
-                key,
-                got=f"{what} of axisymmetric bodies off-axis (motion)",
-                expected="faces without roughness, and no sensors",
-                hint=f"remove '{key[-1]}', or take 'model: swept' with 'layers: 18' for both.",
-                on_key=True,
-            )
+        refuse_key_if(
+            is_there,
+            key,
+            got=f"{what} of axisymmetric bodies off-axis (motion)",
+            expected="faces without roughness, and no sensors",
+            hint=f"remove '{key[-1]}', or take 'model: swept' with 'layers: 18' for both.",
+            on_key=True,
+        )
 
 
 def _check_oblique(case: ImpactSections) -> None:
@@ -668,13 +668,13 @@ def _check_nodes(case: ImpactSections) -> None:
         between = [surface.body for surface in case.contact.between]
         require_known(key, name, between, "body", on_key=True)
         axes = ("r", "z") if case.bodies[name].geometry.dimension == 2 else ("x", "y", "z")
-        if len(place) != len(axes):
-            raise CaseProblem(
-                key,
-                got=f"{len(place)} coordinates",
-                expected=f"[{', '.join(axes)}] of '{name}'",
-                hint="give coordinates as in the drawing.",
-            )
+        refuse_key_if(
+            len(place) != len(axes),
+            key,
+            got=f"{len(place)} coordinates",
+            expected=f"[{', '.join(axes)}] of '{name}'",
+            hint="give coordinates as in the drawing.",
+        )
 
 
 def _check_guide(case: ImpactSections) -> None:
@@ -690,14 +690,14 @@ def _check_guide(case: ImpactSections) -> None:
     ends = [z for curve in curves for z in curve.at(np.linspace(0.0, 1.0, 65))[:, 1]]
     low, high = min(ends), max(ends)
     for i, height in enumerate(guide.heights):
-        if not low <= height <= high:
-            raise CaseProblem(
-                ("guide", "heights", i),
-                got=f"a height of {format_si(height, 'm')}",
-                expected=f"a height on '{guide.surface}': {format_si(low, 'm')} to "
-                f"{format_si(high, 'm')}",
-                hint="heights are z coordinates in the drawing of the moving body.",
-            )
+        refuse_key_if(
+            not low <= height <= high,
+            ("guide", "heights", i),
+            got=f"a height of {format_si(height, 'm')}",
+            expected=f"a height on '{guide.surface}': {format_si(low, 'm')} to "
+            f"{format_si(high, 'm')}",
+            hint="heights are z coordinates in the drawing of the moving body.",
+        )
 
 
 def _check_shots(case: ImpactSections) -> None:
@@ -747,25 +747,24 @@ def _check_drawn_friction(case: ImpactSections) -> None:
     drawn = case.shots.contact_friction if case.shots is not None else None
     if drawn is None or faces.is_constant:
         return
-    if faces.kinetic == 0.0:
-        raise CaseProblem(
-            ("shots", "contact_friction"),
-            got=f"drawn friction with contact.static_friction {faces.static:g} and contact.friction"
-            " 0",
-            expected="contact.friction above 0: the static coefficient keeps its ratio to it",
-            hint="give contact.friction, or remove contact.static_friction.",
-            on_key=True,
-        )
+    refuse_key_if(
+        faces.kinetic == 0.0,
+        ("shots", "contact_friction"),
+        got=f"drawn friction with contact.static_friction {faces.static:g} and contact.friction 0",
+        expected="contact.friction above 0: the static coefficient keeps its ratio to it",
+        hint="give contact.friction, or remove contact.static_friction.",
+        on_key=True,
+    )
     ratio = faces.static / faces.kinetic
-    if ratio * drawn.largest > MOST_FRICTION:
-        raise CaseProblem(
-            ("shots", "contact_friction"),
-            got=f"static coefficients up to {ratio * drawn.largest:.3g}, {ratio:.3g} times the "
-            "drawn one as in 'contact'",
-            expected=f"at most {MOST_FRICTION:g} in every shot",
-            hint="draw smaller coefficients, or remove contact.static_friction.",
-            on_key=True,
-        )
+    refuse_key_if(
+        ratio * drawn.largest > MOST_FRICTION,
+        ("shots", "contact_friction"),
+        got=f"static coefficients up to {ratio * drawn.largest:.3g}, {ratio:.3g} times the "
+        "drawn one as in 'contact'",
+        expected=f"at most {MOST_FRICTION:g} in every shot",
+        hint="draw smaller coefficients, or remove contact.static_friction.",
+        on_key=True,
+    )
 
 
 def _moving(case: ImpactSections | ValveSections) -> str:
@@ -901,28 +900,28 @@ def _check_machine(case: ImpactSections | ValveSections, noise: CaseNoise) -> No
         hint="add 'inertia: [Ixx, Iyy, Izz]' in kg m^2.",
     )
     for name, place in (noise.indicators or {}).items():
-        if isinstance(place, tuple) == (receiver.file is not None) or name in (noise.mounts or {}):
-            raise CaseProblem(
-                ("noise", "indicators", name),
-                got="a place" if isinstance(place, tuple) else f"the node '{place}'",
-                expected="a node of the file, in addition to the mounts"
-                if receiver.file is not None
-                else "the position [x, y, z] of a sensor from the first mount, in addition to "
-                "the mounts",
-                hint="give it a name other than that of a mount; for a model write [10 mm, 0 mm, "
-                "0 mm].",
-            )
+        refuse_key_if(
+            isinstance(place, tuple) == (receiver.file is not None) or name in (noise.mounts or {}),
+            ("noise", "indicators", name),
+            got="a place" if isinstance(place, tuple) else f"the node '{place}'",
+            expected="a node of the file, in addition to the mounts"
+            if receiver.file is not None
+            else "the position [x, y, z] of a sensor from the first mount, in addition to "
+            "the mounts",
+            hint="give it a name other than that of a mount; for a model write [10 mm, 0 mm, "
+            "0 mm].",
+        )
     measured = receiver.file is not None or receiver.pressures is not None
     for ear, place in (noise.ears or {}).items():
-        if isinstance(place, tuple) == measured or (receiver.is_plate is None and not measured):
-            raise CaseProblem(
-                ("noise", "ears", ear),
-                got="a place" if isinstance(place, tuple) else f"the node '{place}'",
-                expected="a node with a pressure in the file"
-                if measured
-                else "the position [x, y, z] of an ear above a plate, or a file of pressures",
-                hint="write the node of the microphone."
-                if measured
-                else "write [0 m, 0 m, 1 m] for 1 m on the normal of a plate, or add "
-                "receiver.pressures.",
-            )
+        refuse_key_if(
+            isinstance(place, tuple) == measured or (receiver.is_plate is None and not measured),
+            ("noise", "ears", ear),
+            got="a place" if isinstance(place, tuple) else f"the node '{place}'",
+            expected="a node with a pressure in the file"
+            if measured
+            else "the position [x, y, z] of an ear above a plate, or a file of pressures",
+            hint="write the node of the microphone."
+            if measured
+            else "write [0 m, 0 m, 1 m] for 1 m on the normal of a plate, or add "
+            "receiver.pressures.",
+        )

@@ -10,7 +10,7 @@ import scipy
 from pydantic import PlainValidator, ValidationInfo, WithJsonSchema
 
 from klack.errors import InputError
-from klack.input.problem import CaseProblem, nearest, one_of
+from klack.input.problem import CaseProblem, nearest, one_of, refuse_key_if
 from klack.units import ANGLE, FORCE, LENGTH, RATIO, Kind, format_si, parse_quantity
 
 __all__ = [
@@ -118,13 +118,13 @@ def _read(value: Any, info: ValidationInfo, *, kind: Kind) -> Distribution:
         return value
     if not isinstance(value, Mapping):
         return Distribution("fixed", _size(value, info, kind, ()))
-    if len(value) != 1:
-        raise CaseProblem(
-            (),
-            got=f"a mapping with the keys: {one_of(map(str, value))}",
-            expected=f"a value, or exactly one of: {one_of(_NUMBERS)}",
-            hint=f"write {{uniform: [{kind.example}, {kind.example}]}}.",
-        )
+    refuse_key_if(
+        len(value) != 1,
+        (),
+        got=f"a mapping with the keys: {one_of(map(str, value))}",
+        expected=f"a value, or exactly one of: {one_of(_NUMBERS)}",
+        hint=f"write {{uniform: [{kind.example}, {kind.example}]}}.",
+    )
     name, numbers = next(iter(value.items()))
     if name not in _NUMBERS:
         raise CaseProblem(
@@ -143,13 +143,13 @@ def _read(value: Any, info: ValidationInfo, *, kind: Kind) -> Distribution:
     first, second = (_size(x, info, kind, (name, i)) for i, x in enumerate(numbers))
     if name == "normal":
         return Distribution("normal", first, second)
-    if second < first:
-        raise CaseProblem(
-            (name,),
-            got=f"from {format_si(first, kind.unit)} to {format_si(second, kind.unit)}",
-            expected="the lowest value first",
-            hint="swap them.",
-        )
+    refuse_key_if(
+        second < first,
+        (name,),
+        got=f"from {format_si(first, kind.unit)} to {format_si(second, kind.unit)}",
+        expected="the lowest value first",
+        hint="swap them.",
+    )
     return Distribution("uniform", first, second)
 
 
@@ -169,13 +169,13 @@ def _size(value: Any, info: ValidationInfo, kind: Kind, key: tuple[str | int, ..
         number = float(value) if info.context is None and plain else parse_quantity(value, kind)
     except InputError as error:
         raise CaseProblem(key, got=error.got, expected=error.expected, hint=error.hint) from None
-    if not number >= 0.0:
-        raise CaseProblem(
-            key,
-            got=format_si(number, kind.unit),
-            expected="0 or more",
-            hint="directions are drawn over the whole circle; give magnitudes here.",
-        )
+    refuse_key_if(
+        not number >= 0.0,
+        key,
+        got=format_si(number, kind.unit),
+        expected="0 or more",
+        hint="directions are drawn over the whole circle; give magnitudes here.",
+    )
     return number
 
 

@@ -6,7 +6,7 @@ from klack.case.key_path import Quantity, quantity_at, split_path
 from klack.case.measurement import CalibrationParameter
 from klack.case.valve_sections import ValveSections
 from klack.errors import InputError
-from klack.input.problem import CaseProblem, Key, nearest, one_of
+from klack.input.problem import CaseProblem, Key, nearest, one_of, refuse_key_if
 from klack.units import Kind, format_si
 
 __all__ = ["FreeParameter", "free_parameters"]
@@ -90,30 +90,30 @@ def _resolved(case: ValveSections, name: str, item: CalibrationParameter) -> Fre
             ) from None
     first = places[0]
     for i, place in enumerate(places[1:], 1):
-        if place.kind != first.kind or place.value != first.value:
-            raise CaseProblem(
-                (*where, "key", i),
-                got=f"{place} = {format_si(place.value, place.kind.unit)}",
-                expected=f"the same as {first} = {format_si(first.value, first.kind.unit)}",
-                hint="keys of one parameter share one value; make them two parameters.",
-            )
+        refuse_key_if(
+            place.kind != first.kind or place.value != first.value,
+            (*where, "key", i),
+            got=f"{place} = {format_si(place.value, place.kind.unit)}",
+            expected=f"the same as {first} = {format_si(first.value, first.kind.unit)}",
+            hint="keys of one parameter share one value; make them two parameters.",
+        )
     bounds = {side: _bound(places, where, side, getattr(item, side)) for side in ("lower", "upper")}
     lower, upper = bounds["lower"], bounds["upper"]
     unit = first.kind.unit
-    if not lower < upper:
-        raise CaseProblem(
-            (*where, "upper"),
-            got=format_si(upper, unit),
-            expected=f"more than the lower bound, {format_si(lower, unit)}",
-            hint="swap them, or check the units.",
-        )
-    if not lower <= first.value <= upper:
-        raise CaseProblem(
-            where,
-            got=f"bounds from {format_si(lower, unit)} to {format_si(upper, unit)}",
-            expected=f"bounds around {format_si(first.value, unit)}, the value in the case",
-            hint="the search begins at the value of the case: change the value or the bounds.",
-        )
+    refuse_key_if(
+        not lower < upper,
+        (*where, "upper"),
+        got=format_si(upper, unit),
+        expected=f"more than the lower bound, {format_si(lower, unit)}",
+        hint="swap them, or check the units.",
+    )
+    refuse_key_if(
+        not lower <= first.value <= upper,
+        where,
+        got=f"bounds from {format_si(lower, unit)} to {format_si(upper, unit)}",
+        expected=f"bounds around {format_si(first.value, unit)}, the value in the case",
+        hint="the search begins at the value of the case: change the value or the bounds.",
+    )
     return FreeParameter(name, tuple(places), lower, upper, first.value)
 
 

@@ -126,14 +126,13 @@ class ProfileGeometry(Section):
     def _drawable(self) -> Self:
         for name, part in self.parts.items():
             for key, point in part.points():
-                if not all(LENGTH.holds(x * self.unit) for x in point):
-                    raise CaseProblem(
-                        ("parts", name, *key),
-                        got=f"the point {list(point)} in a unit of {self.unit:g} m",
-                        expected=f"coordinates of 0, or of {LENGTH.smallest:g} to "
-                        f"{LENGTH.largest:g} m",
-                        hint="check the unit of the profile and the powers of ten.",
-                    )
+                refuse_key_if(
+                    not all(LENGTH.holds(x * self.unit) for x in point),
+                    ("parts", name, *key),
+                    got=f"the point {list(point)} in a unit of {self.unit:g} m",
+                    expected=f"coordinates of 0, or of {LENGTH.smallest:g} to {LENGTH.largest:g} m",
+                    hint="check the unit of the profile and the powers of ten.",
+                )
             try:
                 part.profile(self.unit)
             except InputError as error:
@@ -246,13 +245,13 @@ class Geometry(Section):
             expected="model: axisymmetric, swept or solid",
             hint="start with axisymmetric; swept for bodies held in sectors.",
         )
-        if self.model is not None and self.model not in allowed:
-            raise CaseProblem(
-                ("model",),
-                got=f"model {self.model} for a {kind}",
-                expected=f"one of: {', '.join(allowed)}",
-                hint="a profile can be turned into any of the three models.",
-            )
+        refuse_key_if(
+            self.model is not None and self.model not in allowed,
+            ("model",),
+            got=f"model {self.model} for a {kind}",
+            expected=f"one of: {', '.join(allowed)}",
+            hint="a profile can be turned into any of the three models.",
+        )
         if self.model == "swept" and self.layers is None:
             hint = "use 18: contact of turned parts needs only a few layers."
             raise CaseProblem((), got="a swept body without layers", expected="layers", hint=hint)
@@ -312,13 +311,13 @@ class MeshSettings(Section):
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
-        if self.contact is not None and self.contact.size > self.size:
-            raise CaseProblem(
-                ("contact", "size"),
-                got="a contact size above the general size",
-                expected=f"{format_si(self.size, 'm')} or less",
-                hint="the contact needs the smallest elements.",
-            )
+        refuse_key_if(
+            self.contact is not None and self.contact.size > self.size,
+            ("contact", "size"),
+            got="a contact size above the general size",
+            expected=f"{format_si(self.size, 'm')} or less",
+            hint="the contact needs the smallest elements.",
+        )
         return self
 
 
@@ -331,13 +330,13 @@ class Sectors(Section):
 
     @model_validator(mode="after")
     def _fit(self) -> Self:
-        if self.count * self.width > tau * (1 + 1e-12):
-            raise CaseProblem(
-                ("width",),
-                got=f"{self.count} sectors of {self.width * 360 / tau:g} deg",
-                expected="360 deg or less in total",
-                hint="leave 'sectors' out to hold the whole surface.",
-            )
+        refuse_key_if(
+            self.count * self.width > tau * (1 + 1e-12),
+            ("width",),
+            got=f"{self.count} sectors of {self.width * 360 / tau:g} deg",
+            expected="360 deg or less in total",
+            hint="leave 'sectors' out to hold the whole surface.",
+        )
         return self
 
 

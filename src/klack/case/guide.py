@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from klack.case.bodies import BodySurface
-from klack.input.problem import CaseProblem
+from klack.input.problem import refuse_key_if
 from klack.input.section import Name, Section
 from klack.units import Angle, DampingCoefficient, Length, Ratio, Stiffness, format_si
 
@@ -72,13 +72,13 @@ class CaseGuide(Section):
     @model_validator(mode="after")
     def _rising(self) -> Self:
         for i, (below, above) in enumerate(zip(self.heights, self.heights[1:], strict=False)):
-            if not below < above:
-                raise CaseProblem(
-                    ("heights", i + 1),
-                    got=f"{format_si(above, 'm')} after {format_si(below, 'm')}",
-                    expected="heights that rise",
-                    hint="name each guiding edge once, lowest first.",
-                )
+            refuse_key_if(
+                not below < above,
+                ("heights", i + 1),
+                got=f"{format_si(above, 'm')} after {format_si(below, 'm')}",
+                expected="heights that rise",
+                hint="name each guiding edge once, lowest first.",
+            )
         return self
 
     def largest_eccentricity(self, height: float) -> float:

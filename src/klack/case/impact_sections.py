@@ -129,13 +129,13 @@ class CaseBacking(Section):
 
     @model_validator(mode="after")
     def _closed_where_clamped(self) -> Self:
-        if self.clamp is not None and self.gap > 0.0:
-            raise CaseProblem(
-                ("gap",),
-                got=f"a gap of {format_si(self.gap, 'm')} below a body that a clamp presses down",
-                expected="0 m: the clamp closes it before the impact",
-                hint="remove 'gap', or 'clamp'.",
-            )
+        refuse_key_if(
+            self.clamp is not None and self.gap > 0.0,
+            ("gap",),
+            got=f"a gap of {format_si(self.gap, 'm')} below a body that a clamp presses down",
+            expected="0 m: the clamp closes it before the impact",
+            hint="remove 'gap', or 'clamp'.",
+        )
         return self
 
     @property
@@ -337,21 +337,21 @@ class CaseWorn(Section):
             hint="klack impact with run.run_in writes both into worn.yaml.",
         )
         for i, (below, above) in enumerate(zip(self.radius, self.radius[1:], strict=False)):
-            if not 0.0 <= below < above:
-                raise CaseProblem(
-                    ("radius", i + 1),
-                    got=f"{format_si(above, 'm')} after {format_si(below, 'm')}",
-                    expected="ascending radii from 0",
-                    hint="sort them, each with its opening.",
-                )
-        if max(self.opening) - min(self.opening) > _MOST_WORN * self.radius[-1]:
-            raise CaseProblem(
-                ("opening",),
-                got=f"a set of {format_si(max(self.opening) - min(self.opening), 'm', 3)} at "
-                f"{format_si(self.radius[-1], 'm', 3)} from the axis",
-                expected=f"at most {_MOST_WORN:g} of the radius",
-                hint="check the units: a permanent set is usually 0.01 to 10 um.",
+            refuse_key_if(
+                not 0.0 <= below < above,
+                ("radius", i + 1),
+                got=f"{format_si(above, 'm')} after {format_si(below, 'm')}",
+                expected="ascending radii from 0",
+                hint="sort them, each with its opening.",
             )
+        refuse_key_if(
+            max(self.opening) - min(self.opening) > _MOST_WORN * self.radius[-1],
+            ("opening",),
+            got=f"a set of {format_si(max(self.opening) - min(self.opening), 'm', 3)} at "
+            f"{format_si(self.radius[-1], 'm', 3)} from the axis",
+            expected=f"at most {_MOST_WORN:g} of the radius",
+            hint="check the units: a permanent set is usually 0.01 to 10 um.",
+        )
         return self
 
     @property
@@ -588,13 +588,13 @@ class Run(Section):
         for name, most in _MOST_STEPS.items():
             step = getattr(self, name)
             used = _STEP_OF_LEVEL.get(name, self.levels[0]) in self.levels
-            if used and not 4 * step <= self.duration <= most * step:
-                raise CaseProblem(
-                    ("duration",),
-                    got=f"{self.duration / step:.4g} steps of {format_si(step, 's')} ({name})",
-                    expected=f"4 to {most} steps",
-                    hint="impacts of steel parts last 5 to 50 us; steps of 20 to 50 ns are usual.",
-                )
+            refuse_key_if(
+                used and not 4 * step <= self.duration <= most * step,
+                ("duration",),
+                got=f"{self.duration / step:.4g} steps of {format_si(step, 's')} ({name})",
+                expected=f"4 to {most} steps",
+                hint="impacts of steel parts last 5 to 50 us; steps of 20 to 50 ns are usual.",
+            )
         return self
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from klack.input.problem import CaseProblem
+from klack.input.problem import CaseProblem, refuse_key_if
 from klack.input.section import Section
 from klack.units import BedStiffness, Frequency, Length, Modulus, Ratio, format_si
 
@@ -115,24 +115,24 @@ class CaseLayer(_Numbers):
                     hint=problem.hint,
                 ) from problem
         at = [row.frequency for row in self.table]
-        if any(b <= a for a, b in pairwise(at)):
-            raise CaseProblem(
-                ("table",),
-                got="frequencies " + ", ".join(format_si(f, "Hz", 4) for f in at),
-                expected="rising ones",
-                hint="sort the rows, one for each frequency.",
-            )
+        refuse_key_if(
+            any(b <= a for a, b in pairwise(at)),
+            ("table",),
+            got="frequencies " + ", ".join(format_si(f, "Hz", 4) for f in at),
+            expected="rising ones",
+            hint="sort the rows, one for each frequency.",
+        )
         ends = f"{format_si(at[0], 'Hz', 4)} to {format_si(at[-1], 'Hz', 4)}"
-        if self.frequency is None or not at[0] <= self.frequency <= at[-1]:
-            raise CaseProblem(
-                () if self.frequency is None else ("frequency",),
-                got="a table without 'frequency'"
-                if self.frequency is None
-                else format_si(self.frequency, "Hz", 4),
-                expected=f"the frequency at which the stiffness is taken, {ends} as in the table",
-                hint="use the frequency of the modes that strain the layer most: klack inspect "
-                "and klack impact show them.",
-            )
+        refuse_key_if(
+            self.frequency is None or not at[0] <= self.frequency <= at[-1],
+            () if self.frequency is None else ("frequency",),
+            got="a table without 'frequency'"
+            if self.frequency is None
+            else format_si(self.frequency, "Hz", 4),
+            expected=f"the frequency at which the stiffness is taken, {ends} as in the table",
+            hint="use the frequency of the modes that strain the layer most: klack inspect "
+            "and klack impact show them.",
+        )
         return self
 
     @property

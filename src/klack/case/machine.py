@@ -5,7 +5,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
-from klack.input.problem import CaseProblem, Key, refuse_key_if
+from klack.input.problem import Key, refuse_key_if
 from klack.input.section import Count, InputPath, Name, Number, Section, Text
 from klack.input.unit_systems import UnitSystemName
 from klack.units import DampingCoefficient, Inertia, Length, Mass, Ratio, Stiffness
@@ -120,13 +120,13 @@ class NoiseRigidBody(Section):
     def _possible(self) -> Self:
         for i, value in enumerate(self.inertia or ()):
             rest = sum(self.inertia or ()) - value
-            if not 0.0 < value <= rest * (1.0 + 1e-9):
-                raise CaseProblem(
-                    ("inertia", i),
-                    got=f"{value:g} kg m^2 with a sum of {rest:g} kg m^2 of the others",
-                    expected="above 0, and none larger than the other two together",
-                    hint="a ball of mass m and radius r has 0.4 m r^2 about each axis.",
-                )
+            refuse_key_if(
+                not 0.0 < value <= rest * (1.0 + 1e-9),
+                ("inertia", i),
+                got=f"{value:g} kg m^2 with a sum of {rest:g} kg m^2 of the others",
+                expected="above 0, and none larger than the other two together",
+                hint="a ball of mass m and radius r has 0.4 m r^2 about each axis.",
+            )
         return self
 
 

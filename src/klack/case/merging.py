@@ -96,13 +96,13 @@ def argument_values(item: CaseInclude, number: int, scope: Scope, origin: Origin
     ``scope`` is that of the including file, ``origin`` that of the include.
     """
     if item.count is not None:
-        if COUNTER in scope:
-            raise InputError(
-                origin.where(("count",), on_key=True),
-                got=f"a count together with a parameter '{COUNTER}'",
-                expected=f"no such parameter: '{COUNTER}' counts the copies",
-                hint="rename the parameter.",
-            )
+        refuse_if(
+            COUNTER in scope,
+            origin.where(("count",), on_key=True),
+            got=f"a count together with a parameter '{COUNTER}'",
+            expected=f"no such parameter: '{COUNTER}' counts the copies",
+            hint="rename the parameter.",
+        )
         scope = {**scope, COUNTER: ParameterValue(float(number), NUMBER, str(number))}
     found = {}
     for name, text in item.arguments.items():
@@ -226,13 +226,13 @@ class Merging:
         for i, item in enumerate(includes):
             here = origin.below("include", i)
             name = part_name(folder, item.file, here.where(("file",)))
-            if name in above or len(above) >= DEEPEST:
-                raise InputError(
-                    here.where(("file",)),
-                    got=f"'{name}' inside {' inside '.join(above[::-1])}",
-                    expected=f"parts in at most {DEEPEST} levels that do not contain themselves",
-                    hint="remove this include.",
-                )
+            refuse_if(
+                name in above or len(above) >= DEEPEST,
+                here.where(("file",)),
+                got=f"'{name}' inside {' inside '.join(above[::-1])}",
+                expected=f"parts in at most {DEEPEST} levels that do not contain themselves",
+                hint="remove this include.",
+            )
             path = self.folder / name
             data, lines = parse(self.texts[name], path)
             part = self.checked(PartFile, data, Origin(path, lines))
@@ -240,13 +240,13 @@ class Merging:
                 if copy in found:
                     raise _taken(here, copy)
                 self._copies += 1
-                if self._copies > _MOST_COPIES:
-                    raise InputError(
-                        here.where(),
-                        got=f"more than {_MOST_COPIES} parts",
-                        expected=f"at most {_MOST_COPIES}, parts inside parts counted",
-                        hint="check 'count' here and in the included files.",
-                    )
+                refuse_if(
+                    self._copies > _MOST_COPIES,
+                    here.where(),
+                    got=f"more than {_MOST_COPIES} parts",
+                    expected=f"at most {_MOST_COPIES}, parts inside parts counted",
+                    hint="check 'count' here and in the included files.",
+                )
                 given = argument_values(item, number, scope, here)
                 for argument in given:
                     _require_parameter(argument, part, here, name)

@@ -7,7 +7,7 @@ from pydantic import Field, model_validator
 
 from klack.case.bodies import BodySurface, SurfaceName
 from klack.case.machine import Node, NoiseElement, NoiseReceiver, Place
-from klack.input.problem import CaseProblem, Key
+from klack.input.problem import Key, refuse_key_if
 from klack.input.section import Name, Section
 from klack.units import (
     Area,
@@ -214,13 +214,13 @@ class CaseNoise(Section):
 
     @model_validator(mode="after")
     def _distance(self) -> Self:
-        if self.distance < 0.05:
-            raise CaseProblem(
-                ("distance",),
-                got=f"{self.distance * 1e3:.3g} mm",
-                expected="5 cm or more",
-                hint="the estimate is for the far field; 1 m is usual.",
-            )
+        refuse_key_if(
+            self.distance < 0.05,
+            ("distance",),
+            got=f"{self.distance * 1e3:.3g} mm",
+            expected="5 cm or more",
+            hint="the estimate is for the far field; 1 m is usual.",
+        )
         return self
 
 

@@ -6,7 +6,7 @@ from typing import Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from klack.bodies.gauges.gauge import GaugeKind
-from klack.input.problem import CaseProblem, refuse_key_if
+from klack.input.problem import refuse_key_if
 from klack.input.section import Count, Name, Number, Section
 from klack.signals.low_pass import LowPass
 from klack.units import Frequency, Length
@@ -65,13 +65,13 @@ class CaseOutput(Section):
     @field_validator("direction", mode="after")
     @classmethod
     def _points_somewhere(cls, value: str | tuple[float, ...]) -> str | tuple[float, ...]:
-        if not isinstance(value, str) and (len(value) not in (2, 3) or not any(value)):
-            raise CaseProblem(
-                (),
-                got=f"{list(value)}",
-                expected="a name, or a vector of two numbers [r, z] or three [x, y, z], not zero",
-                hint="direction: z is along the axis.",
-            )
+        refuse_key_if(
+            not isinstance(value, str) and (len(value) not in (2, 3) or not any(value)),
+            (),
+            got=f"{list(value)}",
+            expected="a name, or a vector of two numbers [r, z] or three [x, y, z], not zero",
+            hint="direction: z is along the axis.",
+        )
         return value
 
     @model_validator(mode="after")
@@ -132,17 +132,17 @@ def check_outputs(
             hint=f"remove outputs, or '{other}'.",
             on_key=True,
         )
-        if len(output.at) != dimension:
-            raise CaseProblem(
-                ("outputs", i, "at"),
-                got=f"{len(output.at)} coordinates",
-                expected=f"[{', '.join(axes)}] of '{output.body}'",
-                hint="give coordinates as in the drawing.",
-            )
-        if not fits:
-            raise CaseProblem(
-                ("outputs", i, "direction"),
-                got=f"{output.direction}",
-                expected=f"one of: {', '.join(known)}, or {dimension} numbers",
-                hint=f"'{output.body}' has the coordinates {', '.join(axes)}.",
-            )
+        refuse_key_if(
+            len(output.at) != dimension,
+            ("outputs", i, "at"),
+            got=f"{len(output.at)} coordinates",
+            expected=f"[{', '.join(axes)}] of '{output.body}'",
+            hint="give coordinates as in the drawing.",
+        )
+        refuse_key_if(
+            not fits,
+            ("outputs", i, "direction"),
+            got=f"{output.direction}",
+            expected=f"one of: {', '.join(known)}, or {dimension} numbers",
+            hint=f"'{output.body}' has the coordinates {', '.join(axes)}.",
+        )

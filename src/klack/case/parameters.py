@@ -11,7 +11,7 @@ from pydantic.fields import FieldInfo
 from klack.case.case_text import LARGEST_NUMBER
 from klack.case.expressions.dimension import ANYTHING, NUMBER, Dimension, dimension_of
 from klack.case.expressions.expression import RESERVED, Expression, ordered
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.input.problem import Key
 from klack.input.section import Computed
 from klack.units import KINDS, RATE, RATIO, Kind, format_si, typed
@@ -180,13 +180,13 @@ def evaluated(text: str, scope: Scope, where: str) -> tuple[Computed | float | i
     value, dimension = found.value, found.dimension
     if not (dimension.number and len(dimension.turns) == 1):
         return Computed(value, dimension, text.strip()), found.sources
-    if abs(value) > LARGEST_NUMBER:
-        raise InputError(
-            where,
-            got=f"'{text.strip()}', which is {value:.4g}",
-            expected="a number of magnitude below 1e15",
-            hint="check the power of ten.",
-        )
+    refuse_if(
+        abs(value) > LARGEST_NUMBER,
+        where,
+        got=f"'{text.strip()}', which is {value:.4g}",
+        expected="a number of magnitude below 1e15",
+        hint="check the power of ten.",
+    )
     return (int(value) if value.is_integer() else value), found.sources
 
 

@@ -94,13 +94,13 @@ def part_name(folder: str, file: str, where: str) -> str:
             parts = parts[:-1]
         else:
             parts.append(part)
-    if bad or not parts or len(file) > 300:
-        raise InputError(
-            where,
-            got=f"'{file[:100]}'",
-            expected="a file in the folder of the case or below, by its relative name with slashes",
-            hint="copy the part there: parts/injector.yaml.",
-        )
+    refuse_if(
+        bad or not parts or len(file) > 300,
+        where,
+        got=f"'{file[:100]}'",
+        expected="a file in the folder of the case or below, by its relative name with slashes",
+        hint="copy the part there: parts/injector.yaml.",
+    )
     return "/".join(parts)
 
 
@@ -220,14 +220,14 @@ def _read(found: _Found, name: str, where: str) -> str:
             hint="check the spelling and the folder.",
         ) from None
     found.size += len(text.encode())
-    if found.size > LARGEST_CASE or len(found.texts) >= _MOST_FILES:
-        raise InputError(
-            where,
-            got="included files of more than "
-            f"{LARGEST_CASE / 1e6:g} MB, or more than {_MOST_FILES} of them",
-            expected="a case that is small with all its parts",
-            hint="use one part several times, with 'count' and 'with'.",
-        )
+    refuse_if(
+        found.size > LARGEST_CASE or len(found.texts) >= _MOST_FILES,
+        where,
+        got="included files of more than "
+        f"{LARGEST_CASE / 1e6:g} MB, or more than {_MOST_FILES} of them",
+        expected="a case that is small with all its parts",
+        hint="use one part several times, with 'count' and 'with'.",
+    )
     return text
 
 

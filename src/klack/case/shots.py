@@ -93,13 +93,13 @@ class Shots(Section):
 
     @model_validator(mode="after")
     def _steps(self) -> Self:
-        if not 100 * self.step <= self.duration <= _MOST_STEPS * self.step:
-            raise CaseProblem(
-                ("duration",),
-                got=f"{self.duration / self.step:.4g} steps of {format_si(self.step, 's')}",
-                expected=f"100 to {_MOST_STEPS} steps",
-                hint="a few milliseconds in steps of 40 ns cover the bounces of a small valve.",
-            )
+        refuse_key_if(
+            not 100 * self.step <= self.duration <= _MOST_STEPS * self.step,
+            ("duration",),
+            got=f"{self.duration / self.step:.4g} steps of {format_si(self.step, 's')}",
+            expected=f"100 to {_MOST_STEPS} steps",
+            hint="a few milliseconds in steps of 40 ns cover the bounces of a small valve.",
+        )
         return self
 
 

@@ -45,17 +45,17 @@ def check_off_axis(case: ValveSections, needle: str) -> None:
         if case.guide is None or not isfinite(part.room):
             continue
         reach = max(case.guide.largest_eccentricity(z) for z in part.heights)
-        if reach >= part.room:
-            raise CaseProblem(
-                key,
-                got=f"{format_si(part.room, 'm')} of clearance around the armature, whose axis "
-                f"can move aside by {format_si(reach, 'm')} there in the guide",
-                expected="more clearance than the play in the guide: otherwise the armature would "
-                "touch the iron",
-                hint="enlarge the clearance of the ring, or reduce guide.clearance; check height, "
-                "eccentricity and their units.",
-                on_key=True,
-            )
+        refuse_key_if(
+            reach >= part.room,
+            key,
+            got=f"{format_si(part.room, 'm')} of clearance around the armature, whose axis "
+            f"can move aside by {format_si(reach, 'm')} there in the guide",
+            expected="more clearance than the play in the guide: otherwise the armature would "
+            "touch the iron",
+            hint="enlarge the clearance of the ring, or reduce guide.clearance; check height, "
+            "eccentricity and their units.",
+            on_key=True,
+        )
 
 
 def _parts(case: ValveSections) -> Iterator[tuple[Key, str, OffAxisPart]]:
@@ -205,14 +205,13 @@ def _check_ends(case: ValveSections, meetings: Mapping[str, Meeting], roles: Val
     for name, met in meetings.items():
         at = [side[0] for side in (met.upper, met.lower) if side is not None]
         used.update(at)
-        if not set(at) & set(free) or len(set(at)) < 2:
-            raise CaseProblem(
-                ("network", "components", name),
-                got=f"the end stop '{name}' between {' and '.join(map(repr, at)) or 'nothing'}",
-                expected="two bodies of the case, one of them moving, with motion: "
-                "three-dimensional",
-                hint="remove the end stop, or draw the struck part as a body with 'fixed'.",
-            )
+        refuse_key_if(
+            not set(at) & set(free) or len(set(at)) < 2,
+            ("network", "components", name),
+            got=f"the end stop '{name}' between {' and '.join(map(repr, at)) or 'nothing'}",
+            expected="two bodies of the case, one of them moving, with motion: three-dimensional",
+            hint="remove the end stop, or draw the struck part as a body with 'fixed'.",
+        )
     for name in _drawn(case):
         refuse_key_if(
             name not in used,

@@ -304,13 +304,13 @@ def check_thermal(case: ValveSections) -> None:
     )
     for key, node in _named_nodes(thermal):
         require_known(("thermal", *key), node, nodes, "heat-capacity or fixed-temperature")
-    if thermal.period < case.run.duration * (1.0 - 1e-12):
-        raise CaseProblem(
-            ("thermal", "period"),
-            got=format_si(thermal.period, "s"),
-            expected=f"run.duration or more, {format_si(case.run.duration, 's')}",
-            hint="a stroke must end before the next one begins; shorten run.duration.",
-        )
+    refuse_key_if(
+        thermal.period < case.run.duration * (1.0 - 1e-12),
+        ("thermal", "period"),
+        got=format_si(thermal.period, "s"),
+        expected=f"run.duration or more, {format_si(case.run.duration, 's')}",
+        hint="a stroke must end before the next one begins; shorten run.duration.",
+    )
     _check_heat(thermal, parts)
     refuse_key_if(
         thermal.fluid is not None and case.network.fluid is None,

@@ -21,7 +21,7 @@ from klack.case.shots import StrokeShots
 from klack.case.study import CaseStudy
 from klack.case.thermal import CaseThermal
 from klack.contact.friction import MOST_FRICTION
-from klack.input.problem import CaseProblem
+from klack.input.problem import refuse_key_if
 from klack.input.section import Count, Name, Section, Text
 from klack.network.accuracy import Accuracy, fine_step
 from klack.network.declaration import NetworkSection
@@ -158,13 +158,13 @@ class StrokeRun(Section):
             ("step", self.fine_step, _MOST_STEPS, "steps"),
             ("record", self.record, _MOST_RECORDS, "records"),
         ):
-            if not 10 * spacing <= self.duration <= most * spacing:
-                raise CaseProblem(
-                    (key,),
-                    got=f"{self.duration / spacing:.4g} {what} of {format_si(spacing, 's')}",
-                    expected=f"10 to {most} {what}",
-                    hint="strokes of small valves last 2 to 20 ms; a step of 20 ns is usual.",
-                )
+            refuse_key_if(
+                not 10 * spacing <= self.duration <= most * spacing,
+                (key,),
+                got=f"{self.duration / spacing:.4g} {what} of {format_si(spacing, 's')}",
+                expected=f"10 to {most} {what}",
+                hint="strokes of small valves last 2 to 20 ms; a step of 20 ns is usual.",
+            )
         return self
 
     @property

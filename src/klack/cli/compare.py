@@ -208,25 +208,25 @@ def _low_pass_in(case: Path, study: "ImpactStudy", sensor: _Sensor) -> "LowPass 
 
     name = gauge_of(study, sensor.level, sensor.output).name
     outputs = {item.name: item for item in load_case(case).outputs}
-    if name not in outputs:
-        raise InputError(
-            f"--case {case}",
-            got=f"no output '{name}'",
-            expected=f"an output of the same name, one of: {', '.join(outputs) or 'none'}",
-            hint="its low pass is used; leave --case out for that of the result.",
-        )
+    refuse_if(
+        name not in outputs,
+        f"--case {case}",
+        got=f"no output '{name}'",
+        expected=f"an output of the same name, one of: {', '.join(outputs) or 'none'}",
+        hint="its low pass is used; leave --case out for that of the result.",
+    )
     low_pass = outputs[name].low_pass
     return None if low_pass is None else low_pass.filter
 
 
 def _require_file(text: str, path: Path, expected: str) -> None:
-    if not path.is_file():
-        raise InputError(
-            f"--measurement {text}",
-            got="a folder" if path.is_dir() else "no such file",
-            expected=expected,
-            hint="check spelling and folder.",
-        )
+    refuse_if(
+        not path.is_file(),
+        f"--measurement {text}",
+        got="a folder" if path.is_dir() else "no such file",
+        expected=expected,
+        hint="check spelling and folder.",
+    )
 
 
 def _files(given: Sequence[str], usual: str) -> Mapping[str, list[Path]]:
@@ -239,13 +239,13 @@ def _files(given: Sequence[str], usual: str) -> Mapping[str, list[Path]]:
         if not sign or variant not in VARIANTS:
             variant, name = usual, text
         path = Path(name)
-        if not path.is_file():
-            raise InputError(
-                f"--measurement {text}",
-                got="a folder" if path.is_dir() else "no such file",
-                expected="a recording, as FILE or VARIANT=FILE",
-                hint=f"variants are {', '.join(VARIANTS)}; check spelling and folder.",
-            )
+        refuse_if(
+            not path.is_file(),
+            f"--measurement {text}",
+            got="a folder" if path.is_dir() else "no such file",
+            expected="a recording, as FILE or VARIANT=FILE",
+            hint=f"variants are {', '.join(VARIANTS)}; check spelling and folder.",
+        )
         files.setdefault(variant, []).append(path)
     return files
 

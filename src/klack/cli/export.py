@@ -257,14 +257,14 @@ def _tell(case: str, made: Written, to: str, wanted: Wanted) -> None:
 
 
 def _export_stored(source: Path, to: str, out: Path | None, wanted: Wanted) -> tuple[str, Written]:
-    if to not in _RESULTS:
-        raise InputError(
-            str(source),
-            got=f"a stored result with --to {to}",
-            expected=f"--to {', '.join(_RESULTS)} for a result",
-            hint="models, decks and fields come from the case: give the case file or its name; "
-            "vtk of a stroke in three dimensions takes --impact.",
-        )
+    refuse_if(
+        to not in _RESULTS,
+        str(source),
+        got=f"a stored result with --to {to}",
+        expected=f"--to {', '.join(_RESULTS)} for a result",
+        hint="models, decks and fields come from the case: give the case file or its name; "
+        "vtk of a stroke in three dimensions takes --impact.",
+    )
     from klack.analyses.catalogue import load_result
     from klack.analyses.incomplete import missing_in
 

@@ -179,13 +179,13 @@ def _list(source: Path | None, out: Path | None, component: list[str] | None, wa
 def _ending(out: Path | None) -> str:
     """Ending of the file, which says what is drawn."""
     ending = _PAGE if out is None else out.suffix.lower()
-    if ending not in _ENDINGS:
-        raise InputError(
-            f"--out {out}",
-            got=f"the ending '{ending}'" if ending else "a name without an ending",
-            expected=" or ".join(_ENDINGS),
-            hint=f"--out {Path(str(out)).with_suffix(_PAGE).name}",
-        )
+    refuse_if(
+        ending not in _ENDINGS,
+        f"--out {out}",
+        got=f"the ending '{ending}'" if ending else "a name without an ending",
+        expected=" or ".join(_ENDINGS),
+        hint=f"--out {Path(str(out)).with_suffix(_PAGE).name}",
+    )
     return ending
 
 

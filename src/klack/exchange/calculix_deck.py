@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from klack.assembling.placement import first_touch_of_meshes
 from klack.bodies.elasticity.body import ElasticBody
 from klack.contact.pairing import axial_distance, face_thickness
-from klack.errors import InputError, refuse_if, require_positive
+from klack.errors import refuse_if, require_positive
 from klack.materials.material import Material
 from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import FaceTable, Mesh, Surface
@@ -108,13 +108,13 @@ class CalculixSettings:
     def __post_init__(self) -> None:
         require_positive("CalculiX: step", self.step, "s")
         require_positive("CalculiX: penalty", self.penalty, "Pa/m")
-        if not self.duration >= self.step:
-            raise InputError(
-                "CalculiX: duration",
-                got=f"{self.duration:g} s",
-                expected=f"the time of one step ({self.step:g} s) or more",
-                hint="check the units; an impact of steel parts lasts 5 to 50 us.",
-            )
+        refuse_if(
+            not self.duration >= self.step,
+            "CalculiX: duration",
+            got=f"{self.duration:g} s",
+            expected=f"the time of one step ({self.step:g} s) or more",
+            hint="check the units; an impact of steel parts lasts 5 to 50 us.",
+        )
 
 
 def default_penalty(impact: CalculixImpact) -> float:
@@ -155,13 +155,13 @@ def start_of_flight(impact: CalculixImpact, step: float) -> tuple[float, float]:
         return least - distance, impact.speed
     back = max(least - distance, 0.0)
     square = impact.speed**2 - 2.0 * impact.closing_force / impact.upper.mass * back
-    if not square > 0:
-        raise InputError(
-            "CalculiX: step",
-            got=f"{step:g} s: the speed is too low for two steps of flight",
-            expected="a step much shorter than the time in which the force stops the body",
-            hint="take a shorter step.",
-        )
+    refuse_if(
+        not square > 0,
+        "CalculiX: step",
+        got=f"{step:g} s: the speed is too low for two steps of flight",
+        expected="a step much shorter than the time in which the force stops the body",
+        hint="take a shorter step.",
+    )
     return back, sqrt(square)
 
 

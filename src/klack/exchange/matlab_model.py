@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 
 from klack.contact.step_constants import shared_constants
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.exchange.modal_model import ModalModel, ModelContact
 from klack.exchange.model_folder import model_folder, named_apart
 from klack.exchange.results.table import octave_text
@@ -177,10 +177,10 @@ def _cells(words: Sequence[str]) -> np.ndarray[Any, Any]:
 
 def _require_size(model: ModalModel, content: dict[str, Any]) -> None:
     size = sum(getattr(value, "nbytes", 0) for value in content.values())
-    if size > _LARGEST:
-        raise InputError(
-            f"model '{model.name}'",
-            got=f"{size / 2**30:.1f} GiB",
-            expected="less than 2 GiB, the limit of MATLAB files of version 5",
-            hint="keep fewer modes.",
-        )
+    refuse_if(
+        size > _LARGEST,
+        f"model '{model.name}'",
+        got=f"{size / 2**30:.1f} GiB",
+        expected="less than 2 GiB, the limit of MATLAB files of version 5",
+        hint="keep fewer modes.",
+    )

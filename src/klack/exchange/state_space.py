@@ -20,7 +20,7 @@ from scipy.sparse import csc_array, diags_array
 
 from klack.contact.laws import HertzLaw, HuntCrossley, LinearLaw, TableLaw
 from klack.contact.step_constants import RELAXATION
-from klack.errors import InputError, optional_package
+from klack.errors import InputError, optional_package, refuse_if
 from klack.exchange.modal_model import ModalModel, ModelContact
 
 if TYPE_CHECKING:
@@ -265,10 +265,10 @@ def _with_residual(model: ModalModel, D: NDArray[np.float64]) -> NDArray[np.floa
 
 def _require_size(model: ModalModel) -> None:
     states = 2 * model.mode_count
-    if states**2 * 8 > _LARGEST:
-        raise InputError(
-            f"model '{model.name}'",
-            got=f"{states} states: a dense A of {states**2 * 8 / 2**30:.1f} GiB",
-            expected="less than 2 GiB, the limit of MATLAB files of version 5",
-            hint="keep fewer modes: frequencies above 2 MHz are irrelevant for an impact.",
-        )
+    refuse_if(
+        states**2 * 8 > _LARGEST,
+        f"model '{model.name}'",
+        got=f"{states} states: a dense A of {states**2 * 8 / 2**30:.1f} GiB",
+        expected="less than 2 GiB, the limit of MATLAB files of version 5",
+        hint="keep fewer modes: frequencies above 2 MHz are irrelevant for an impact.",
+    )

@@ -272,14 +272,13 @@ def _dofs(pair: BodyPair) -> int:
 
 def _require_one_pulse(base: _Base, history: ImpactHistory) -> None:
     measures = measure_impact(history)
-    if not np.isfinite(measures.restitution):
-        raise InputError(
-            f"{base.case.path or 'case'}: run.duration",
-            got=f"{format_si(base.case.run.duration, 's')}, within which the bodies do not "
-            f"separate",
-            expected="a time that covers the impact and the rebound",
-            hint="increase run.duration until klack impact prints a restitution.",
-        )
+    refuse_if(
+        not np.isfinite(measures.restitution),
+        f"{base.case.path or 'case'}: run.duration",
+        got=f"{format_si(base.case.run.duration, 's')}, within which the bodies do not separate",
+        expected="a time that covers the impact and the rebound",
+        hint="increase run.duration until klack impact prints a restitution.",
+    )
     refuse_if(
         measures.sub_contacts > 1,
         f"{base.case.path or 'case'}: level {base.level}",

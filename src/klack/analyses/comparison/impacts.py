@@ -231,11 +231,11 @@ def _factor(path: Path, info: ChannelInfo, kind: GaugeKind) -> float:
     if kind != "strain":
         return unit_factor(info.unit, _KINDS[kind], where).factor
     unit = plain_unit(info.unit)
-    if unit not in _STRAINS:
-        raise InputError(
-            where,
-            got=f"the unit '{info.unit}'",
-            expected=f"a unit of a strain: {', '.join(_STRAINS)}",
-            hint="check that it is the right channel; the voltage of a bridge needs its factor.",
-        )
+    refuse_if(
+        unit not in _STRAINS,
+        where,
+        got=f"the unit '{info.unit}'",
+        expected=f"a unit of a strain: {', '.join(_STRAINS)}",
+        hint="check that it is the right channel; the voltage of a bridge needs its factor.",
+    )
     return _STRAINS[unit]

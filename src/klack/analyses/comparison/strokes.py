@@ -25,7 +25,7 @@ from klack.analyses.comparison.record import (
 from klack.analyses.record import case_fields, run_fields
 from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
 from klack.case.measurement import CaseMeasurement
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.machine.progress import Progress, silent
 from klack.machine.stages import StageClock, collected_warnings
 from klack.measurement.channels import LIFT_ALONE, LiftSensor, Trigger
@@ -98,14 +98,13 @@ def compare_strokes(
 
 
 def _variant(study: StrokeStudy, name: str) -> StrokeVariant:
-    if name not in study.variants:
-        raise InputError(
-            f"--measurement {name}=...",
-            got=f"a result without the variant '{name}'",
-            expected=f"one of: {', '.join(study.variants)}",
-            hint=f"run `klack stroke {study.case} --variant {name}` first, or name another "
-            f"variant.",
-        )
+    refuse_if(
+        name not in study.variants,
+        f"--measurement {name}=...",
+        got=f"a result without the variant '{name}'",
+        expected=f"one of: {', '.join(study.variants)}",
+        hint=f"run `klack stroke {study.case} --variant {name}` first, or name another variant.",
+    )
     return study.variants[name]
 
 
@@ -172,14 +171,14 @@ def require_same_way(source: str, computed: Floats, measured: Floats) -> None:
     if float(np.ptp(computed)) == 0.0 or float(np.ptp(measured)) == 0.0:
         return
     together = float(np.corrcoef(computed, measured)[0, 1])
-    if together < _AGAINST:
-        raise InputError(
-            f"{source}: lift",
-            got=f"a lift that moves against the computed one (correlation {together:.2f})",
-            expected="a lift that grows as the valve opens",
-            hint="if the sign of the sensor is reversed, state it in the case: measurement: "
-            "{channels: {lift: {name: NAME, scale: -1}}}.",
-        )
+    refuse_if(
+        together < _AGAINST,
+        f"{source}: lift",
+        got=f"a lift that moves against the computed one (correlation {together:.2f})",
+        expected="a lift that grows as the valve opens",
+        hint="if the sign of the sensor is reversed, state it in the case: measurement: "
+        "{channels: {lift: {name: NAME, scale: -1}}}.",
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -31,7 +31,7 @@ from klack.contact.mortar import ContactSpace, tangent_rows
 from klack.contact.pressure_limit import PressureLimit
 from klack.contact.restitution import ImpactMeasures, measure_impact
 from klack.contact.statics import ReachError, extended_compliance
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.mesh.mesh import Mesh, Surface
 from klack.transient.guide import guide_of_shaft
 from klack.transient.interface_arrays import Guide
@@ -374,14 +374,14 @@ def build_guide(
     )
     aside = np.linalg.norm(guide.offset, axis=1)
     k = int(np.argmax(aside))
-    if aside[k] > asked.clearance * (1.0 + _IN_THE_WALL):
-        raise InputError(
-            f"{problem.case.path or 'case'}: guide",
-            got=f"a shaft {format_si(float(aside[k]), 'm')} off-axis in its bore at z = "
-            f"{format_si(float(guide.heights[k]), 'm')}",
-            expected=f"at most the clearance, {format_si(asked.clearance, 'm')}",
-            hint="reduce motion.placement, or enlarge guide.clearance.",
-        )
+    refuse_if(
+        aside[k] > asked.clearance * (1.0 + _IN_THE_WALL),
+        f"{problem.case.path or 'case'}: guide",
+        got=f"a shaft {format_si(float(aside[k]), 'm')} off-axis in its bore at z = "
+        f"{format_si(float(guide.heights[k]), 'm')}",
+        expected=f"at most the clearance, {format_si(asked.clearance, 'm')}",
+        hint="reduce motion.placement, or enlarge guide.clearance.",
+    )
     return guide
 
 

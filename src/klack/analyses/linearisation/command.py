@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from klack.analyses.ending import Ending
-from klack.errors import InputError, refuse_if
+from klack.errors import refuse_if
 from klack.terminal.options import WANTED_RESULT, CaseArgument, Components, WantedResult, imported
 from klack.terminal.progress import show_progress
 
@@ -140,13 +140,13 @@ def linearise(
     ends = None
     if frequencies is not None:
         low, high = (hertz(text, "--frequencies") for text in frequencies)
-        if low >= high:
-            raise InputError(
-                "--frequencies",
-                got=f"from {frequencies[0]} to {frequencies[1]}",
-                expected="a lower, then a higher frequency",
-                hint="exchange them.",
-            )
+        refuse_if(
+            low >= high,
+            "--frequencies",
+            got=f"from {frequencies[0]} to {frequencies[1]}",
+            expected="a lower, then a higher frequency",
+            hint="exchange them.",
+        )
         ends = low, high
     base = Conditions(
         current=stated_drive(current or (), "--current", CURRENT),

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from klack.analyses.linearisation.record import LoopMargins
 from klack.control.controlled import Controlled
 from klack.control.pid import PidController
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.hydraulics.gas.gas_source import GasSource
 from klack.input.problem import one_of
 from klack.network.network import Network
@@ -102,13 +102,13 @@ def _actuator(name: str, network: Network, rows: Rows) -> str:
 
 def _place(signals: Sequence[Signal], name: str, where: str) -> int:
     names = [plain_name(x.name) for x in signals]
-    if plain_name(name) not in names:
-        raise InputError(
-            where,
-            got=f"'{name}', which is not in the linear model",
-            expected=f"one of: {one_of([x.name for x in signals])}",
-            hint="give the sensor a displacement, velocity, pressure, flow or current.",
-        )
+    refuse_if(
+        plain_name(name) not in names,
+        where,
+        got=f"'{name}', which is not in the linear model",
+        expected=f"one of: {one_of([x.name for x in signals])}",
+        hint="give the sensor a displacement, velocity, pressure, flow or current.",
+    )
     return names.index(plain_name(name))
 
 

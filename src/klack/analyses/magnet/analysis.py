@@ -28,7 +28,7 @@ from klack.analyses.page import page_of
 from klack.analyses.record import CaseRecord, case_fields, run_fields
 from klack.analyses.store import RecordFormat
 from klack.case.placed_errors import tells_place
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.machine.progress import Progress, silent
 from klack.machine.stages import StageClock
 from klack.magnetics.drawn_magnet import FieldMap
@@ -165,13 +165,13 @@ def run_magnet(case: MagnetCase, *, progress: Progress = silent) -> MagnetRecord
         drawing.current, drawing.gap, mesh_size=drawing.mesh_size, progress=clock
     )
     strongest = float(np.max(np.abs(found.force)))
-    if strongest <= np.max(found.force_error):
-        raise InputError(
-            "magnet.moving",
-            got=f"a force of {format_si(strongest, 'N', 2)} at most, no more than its error",
-            expected="iron that is attracted by the coil",
-            hint="correct the position of iron or coil in the drawing.",
-        )
+    refuse_if(
+        strongest <= np.max(found.force_error),
+        "magnet.moving",
+        got=f"a force of {format_si(strongest, 'N', 2)} at most, no more than its error",
+        expected="iron that is attracted by the coil",
+        hint="correct the position of iron or coil in the drawing.",
+    )
     if np.all(found.force[-1] >= 0.0):
         other = "downward" if drawing.opens == "upward" else "upward"
         raise InputError(

@@ -9,7 +9,7 @@ from pydantic import Field, PrivateAttr, model_validator
 from klack.case.bodies import WrittenCase
 from klack.case.reader import find_case, parse, text_of, validated
 from klack.errors import InputError
-from klack.input.problem import CaseProblem, Key
+from klack.input.problem import CaseProblem, Key, refuse_key_if
 from klack.input.section import Name, Number, Section
 from klack.magnetics.drawn_magnet import DrawnMagnet, DrawnPart, section
 from klack.magnetics.iron_choice import IronChoice
@@ -110,13 +110,13 @@ class Drawing(Section):
 
     def _profile(self, key: Key, corners: Any, lower: float) -> Profile:
         for r, z in corners:
-            if not (LENGTH.holds(r * self.unit) and LENGTH.holds(z * self.unit)):
-                raise CaseProblem(
-                    key,
-                    got=f"the point [{r:g}, {z:g}] in a unit of {self.unit:g} m",
-                    expected=f"coordinates of 0, or of {LENGTH.smallest:g} to {LENGTH.largest:g} m",
-                    hint="check the unit and the powers of ten.",
-                )
+            refuse_key_if(
+                not (LENGTH.holds(r * self.unit) and LENGTH.holds(z * self.unit)),
+                key,
+                got=f"the point [{r:g}, {z:g}] in a unit of {self.unit:g} m",
+                expected=f"coordinates of 0, or of {LENGTH.smallest:g} to {LENGTH.largest:g} m",
+                hint="check the unit and the powers of ten.",
+            )
         try:
             # 15 digits: 0.3 mm must be the same number here as 0.0003 m elsewhere
             return section(

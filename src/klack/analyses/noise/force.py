@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from klack.acoustics.spectrum import force_series
 from klack.arrays import Floats, Index
 from klack.contact.history import ImpactHistory
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.machine.compiling.jit import njit
 from klack.machine.memory import in_words, require_memory
 from klack.signals.sampled import TimeSeries
@@ -53,15 +53,15 @@ def first_part(result: NetworkResult, most: int = _MOST_STEPS) -> tuple[NetworkR
     length, whole = format_si(most * result.step, "s"), float(result.time[-1] - result.time[0])
     end = float(result.time[count])
     events = tuple(event for event in result.events if event.time < end)
-    if not events and (result.events or not count):
-        raise InputError(
-            "noise of a stroke",
-            got=f"a run of {format_si(whole, 's')} with records of {format_si(spacing, 's')} and "
-            f"no impact in its first {length}",
-            expected=f"impacts within {length}, {most:,} fine steps",
-            hint="shorten the time before the first actuation, use a shorter record or a longer "
-            "step, or continue from a run that ends just before it (klack stroke --continue).",
-        )
+    refuse_if(
+        not events and (result.events or not count),
+        "noise of a stroke",
+        got=f"a run of {format_si(whole, 's')} with records of {format_si(spacing, 's')} and "
+        f"no impact in its first {length}",
+        expected=f"impacts within {length}, {most:,} fine steps",
+        hint="shorten the time before the first actuation, use a shorter record or a longer "
+        "step, or continue from a run that ends just before it (klack stroke --continue).",
+    )
     note = (
         f"Only the first {format_si(end - float(result.time[0]), 's')} of the run of "
         f"{format_si(whole, 's')} are evaluated, with {len(events)} of its {len(result.events)} "

@@ -42,7 +42,7 @@ from klack.bodies.reduction.structure import Structure
 from klack.case.bodies import CaseMaterial
 from klack.case.machine import NoiseMatrices, NoiseReceiver, NoiseVirtualPoint
 from klack.case.noise import CaseNoise
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.input.problem import one_of
 from klack.materials.material import Material
 from klack.units import format_si
@@ -193,13 +193,13 @@ def mounted(structures: Sequence[Structure], noise: CaseNoise, case: str) -> tup
             if found
             else "run the case again with these mounts, then klack noise.",
         )
-    if any(set(item.at_mounts[0].port_names) - set(item.port_names) for item in found):
-        raise InputError(
-            f"result of case {case}: noise.mounts",
-            got="bodies of an earlier version, without the positions of reactions",
-            expected="bodies with these positions",
-            hint="run the case again, then klack noise.",
-        )
+    refuse_if(
+        any(set(item.at_mounts[0].port_names) - set(item.port_names) for item in found),
+        f"result of case {case}: noise.mounts",
+        got="bodies of an earlier version, without the positions of reactions",
+        expected="bodies with these positions",
+        hint="run the case again, then klack noise.",
+    )
     joined = {found[0].name}
     mounts = {item.name: set(item.at_mounts[0].mounts) for item in found}
     for _ in found:
@@ -328,14 +328,14 @@ def _of_matrices(given: NoiseMatrices, points: tuple[InterfacePoint, ...]) -> tu
                 hint="name a row of the file.",
             )
         row = place - 1 if isinstance(wanted, int) else place
-        if row in rows.values():
-            raise InputError(
-                f"noise.receiver.matrices.rows.{name}",
-                got=f"the row {wanted!r}, which belongs to another degree of freedom",
-                expected="a separate row for each degree of freedom",
-                hint="name the row of this motion, or leave it out and state its assumption in "
-                "receiver.missing.",
-            )
+        refuse_if(
+            row in rows.values(),
+            f"noise.receiver.matrices.rows.{name}",
+            got=f"the row {wanted!r}, which belongs to another degree of freedom",
+            expected="a separate row for each degree of freedom",
+            hint="name the row of this motion, or leave it out and state its assumption in "
+            "receiver.missing.",
+        )
         freedom = Freedom(mount, DIRECTIONS.index(direction) + 1)
         rows[freedom] = row
         scale.append(1.0 if freedom.is_rotation else given.units.length)
@@ -359,13 +359,13 @@ def _plate(
 ) -> tuple[Receiver, str]:
     drawn = given.is_plate
     assert drawn is not None
-    if drawn.material not in materials:
-        raise InputError(
-            "noise.receiver: material",
-            got=f"'{drawn.material}'",
-            expected=f"one of the materials of the case: {', '.join(materials)}",
-            hint="add it to 'materials'.",
-        )
+    refuse_if(
+        drawn.material not in materials,
+        "noise.receiver: material",
+        got=f"'{drawn.material}'",
+        expected=f"one of the materials of the case: {', '.join(materials)}",
+        hint="add it to 'materials'.",
+    )
     own = materials[drawn.material]
     sides = given.plate.sides if given.plate is not None else (1.0, 1.0)
     plate = Plate(

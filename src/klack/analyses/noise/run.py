@@ -143,13 +143,13 @@ def _design_names(sources: Sequence[NoiseSource], names: Sequence[str]) -> tuple
         return tuple(
             f"{name} {n + 1}" if n else name for name, n in zip(plain, before, strict=True)
         )
-    if len(names) != len(sources) or len(set(names)) != len(names):
-        raise InputError(
-            "noise: names",
-            got=", ".join(names),
-            expected=f"{len(sources)} different names, one for each design",
-            hint="a result with several variants or levels counts as one design for each of them.",
-        )
+    refuse_if(
+        len(names) != len(sources) or len(set(names)) != len(names),
+        "noise: names",
+        got=", ".join(names),
+        expected=f"{len(sources)} different names, one for each design",
+        hint="a result with several variants or levels counts as one design for each of them.",
+    )
     return tuple(names)
 
 

@@ -42,7 +42,7 @@ from klack.case.valve_roles import ValveRoles, find_roles
 from klack.contact.rubbing_law import RubbingLaw
 from klack.contact.yielding_law import YieldingLaw
 from klack.control.controlled import Controlled
-from klack.errors import AccuracyWarning, ConvergenceError, InputError, KlackError
+from klack.errors import AccuracyWarning, ConvergenceError, InputError, KlackError, refuse_if
 from klack.machine.cache.result_cache import result_cache
 from klack.machine.progress import Progress, SoFar, StageProgress, drawn, silent
 from klack.machine.stages import StageClock, collected_warnings, show, trial
@@ -273,20 +273,20 @@ def _begin(case: ValveCase, after: StrokeStudy | None, name: Variant) -> Network
     """Run that a variant continues, in its steps; None from rest."""
     if after is None:
         return None
-    if after.step != case.run.fine_step:  # the clock counts steps
-        raise InputError(
-            "step",
-            got=format_si(case.run.fine_step, "s"),
-            expected=f"{format_si(after.step, 's')}, the step of the result to continue from",
-            hint="keep the step, or run from the start.",
-        )
-    if name not in after.variants:
-        raise InputError(
-            "variant",
-            got=f"'{name}', which is not in the result to continue from",
-            expected=f"one of: {', '.join(after.variants)}",
-            hint="run that variant from the start first.",
-        )
+    refuse_if(
+        after.step != case.run.fine_step,  # the clock counts steps
+        "step",
+        got=format_si(case.run.fine_step, "s"),
+        expected=f"{format_si(after.step, 's')}, the step of the result to continue from",
+        hint="keep the step, or run from the start.",
+    )
+    refuse_if(
+        name not in after.variants,
+        "variant",
+        got=f"'{name}', which is not in the result to continue from",
+        expected=f"one of: {', '.join(after.variants)}",
+        hint="run that variant from the start first.",
+    )
     return after.variants[name].result
 
 

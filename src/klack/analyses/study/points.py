@@ -20,7 +20,7 @@ from klack.case.reader import text_of
 from klack.case.study import StudyParameter, Written
 from klack.case.study_source import StudySource
 from klack.errors import InputError, refuse_if
-from klack.input.problem import CaseProblem, Key, one_of
+from klack.input.problem import CaseProblem, Key, one_of, refuse_key_if
 from klack.studies.designs import (
     Listed,
     Normal,
@@ -167,13 +167,13 @@ def _parameter(case: AnyCase, source: StudySource, name: str, item: StudyParamet
 
 def _listed(item: StudyParameter, today: object) -> Listed:
     """Words and whole numbers have no range."""
-    if item.fixed is None and item.values is None:
-        raise CaseProblem(
-            (),
-            got="a range of a key that is not a quantity",
-            expected="{values: [...]}",
-            hint="list its values.",
-        )
+    refuse_key_if(
+        item.fixed is None and item.values is None,
+        (),
+        got="a range of a key that is not a quantity",
+        expected="{values: [...]}",
+        hint="list its values.",
+    )
     given = item.values if item.values is not None else (item.fixed,)
     whole = isinstance(today, int)
     return Listed(
@@ -186,14 +186,14 @@ def _listed(item: StudyParameter, today: object) -> Listed:
 
 
 def _own_word(source: StudySource, name: str, item: StudyParameter) -> Parameter:
-    if not name.isidentifier() or name in RESERVED:
-        raise CaseProblem(
-            (),
-            got=f"'{name}'",
-            expected="the path of a key (network.components.spring.preload), or a name of "
-            "letters, digits and _ for the expressions in 'linked'",
-            hint="write the path of the key from the top level of the case.",
-        )
+    refuse_key_if(
+        not name.isidentifier() or name in RESERVED,
+        (),
+        got=f"'{name}'",
+        expected="the path of a key (network.components.spring.preload), or a name of "
+        "letters, digits and _ for the expressions in 'linked'",
+        hint="write the path of the key from the top level of the case.",
+    )
     kind = _kind_of(item)
     return Parameter(name=name, kind=kind, spread=_spread(source, name, item, kind), today=None)
 
@@ -439,13 +439,13 @@ def linked_of(
         expression = expressions[name]
         meant = {word: words[word] for word in expression.names}
         dimension = expression.unit({word: kinds[whole].unit for word, whole in meant.items()})
-        if not dimension.fits(kinds[name].unit):
-            raise InputError(
-                source.where(("linked", name)),
-                got=f"'{expression.text}', which is {dimension}",
-                expected=f"{kinds[name].name} [{kinds[name].unit}]",
-                hint="for a constant with a unit, add a parameter such as {fixed: 0.2 mm}.",
-            )
+        refuse_if(
+            not dimension.fits(kinds[name].unit),
+            source.where(("linked", name)),
+            got=f"'{expression.text}', which is {dimension}",
+            expected=f"{kinds[name].name} [{kinds[name].unit}]",
+            hint="for a constant with a unit, add a parameter such as {fixed: 0.2 mm}.",
+        )
         found.append(
             Linked(
                 name=name,

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from klack.contact.step_constants import LANES, NO_LAW, shared_constants
-from klack.errors import InputError, refuse_if
+from klack.errors import refuse_if
 from klack.exchange.fmu.compiler import PLATFORMS, compile_library, require_compilers, this_platform
 from klack.exchange.fmu.documentation import documentation_files
 from klack.exchange.fmu.model_description import (
@@ -155,13 +155,13 @@ def _integers(name: str, values: ArrayLike) -> str:
 
 
 def _digits(name: str, value: float) -> str:
-    if not np.isfinite(value):
-        raise InputError(
-            f"export of a model: {name.removeprefix('klack_')}",
-            got=f"{value}",
-            expected="finite numbers",
-            hint="check the body or the law of this model.",
-        )
+    refuse_if(
+        not np.isfinite(value),
+        f"export of a model: {name.removeprefix('klack_')}",
+        got=f"{value}",
+        expected="finite numbers",
+        hint="check the body or the law of this model.",
+    )
     return f"{float(value):.17g}"
 
 

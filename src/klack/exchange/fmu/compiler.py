@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from klack.errors import ConvergenceError, InputError
+from klack.errors import ConvergenceError, InputError, refuse_if
 from klack.input.problem import one_of
 
 __all__ = ["PLATFORMS", "Target", "compile_library", "require_compilers", "this_platform"]
@@ -120,13 +120,13 @@ def compile_library(
 
 def _command(name: str) -> list[str]:
     """Start of the compiler's command line."""
-    if name not in PLATFORMS:
-        raise InputError(
-            "platforms of an FMU",
-            got=f"'{name}'",
-            expected=f"one of: {one_of(list(PLATFORMS))}",
-            hint="linux64 and win64 are usual.",
-        )
+    refuse_if(
+        name not in PLATFORMS,
+        "platforms of an FMU",
+        got=f"'{name}'",
+        expected=f"one of: {one_of(list(PLATFORMS))}",
+        hint="linux64 and win64 are usual.",
+    )
     target = PLATFORMS[name]
     programs = target.cross + (_LOCAL if name == this_platform() else ())
     for program in programs:

@@ -19,7 +19,7 @@ from klack.analyses.stroke_shots.record import (
     VariantShots,
 )
 from klack.analyses.study.record import StudyColumn, StudyRecord
-from klack.errors import InputError, optional_package
+from klack.errors import InputError, optional_package, refuse_if
 from klack.exchange.results.study_table import about_study, result_table
 from klack.exchange.results.table import ResultChannel, ResultRun, ResultScalar, identifiers
 from klack.signals.sampled import TimeSeries
@@ -299,13 +299,13 @@ def short_names(record: object) -> Mapping[str, str]:
 
 def _named(run: str | None, usual: str, known: Iterable[str]) -> str:
     name = usual if run is None else run
-    if name not in known:
-        raise InputError(
-            "to_xarray",
-            got=f"'{name}'",
-            expected=f"one of: {', '.join(known)}",
-            hint="name a level, a variant, a design, or a transfer function of this result.",
-        )
+    refuse_if(
+        name not in known,
+        "to_xarray",
+        got=f"'{name}'",
+        expected=f"one of: {', '.join(known)}",
+        hint="name a level, a variant, a design, or a transfer function of this result.",
+    )
     return name
 
 

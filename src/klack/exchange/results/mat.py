@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import scipy
 
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.exchange.results.table import ResultRun, ResultTable, identifiers, octave_text
 from klack.files.whole import whole_file
 
@@ -48,13 +48,13 @@ def write_mat(table: ResultTable, path: Path) -> Path:
 def _run(run: ResultRun, path: Path) -> dict[str, Any]:
     size = sum(axis.values.nbytes for axis in run.axes)
     size += sum(channel.values.nbytes for channel in run.channels)
-    if size > _LARGEST - 2**20:
-        raise InputError(
-            str(path),
-            got=f"{size / 2**30:.1f} GiB in run '{run.name}'",
-            expected="at most 2 GiB, the limit of MATLAB files of version 5",
-            hint="write netCDF, or record with a longer step.",
-        )
+    refuse_if(
+        size > _LARGEST - 2**20,
+        str(path),
+        got=f"{size / 2**30:.1f} GiB in run '{run.name}'",
+        expected="at most 2 GiB, the limit of MATLAB files of version 5",
+        hint="write netCDF, or record with a longer step.",
+    )
     axes = identifiers([axis.name for axis in run.axes], _OWN)
     drawn_over = dict(zip([axis.name for axis in run.axes], axes, strict=True))
     names = identifiers([channel.name for channel in run.channels], [*_OWN, *axes])

@@ -227,13 +227,13 @@ def _require_solids(case: ValveCase) -> None:
 
 def _run(study: StrokeStudy, variant: str | None) -> StrokeVariant:
     name = next(iter(study.variants)) if variant is None else variant
-    if name not in study.variants:
-        raise InputError(
-            "--variant",
-            got=f"'{name}'",
-            expected=f"one of: {', '.join(study.variants)}",
-            hint="the variants of this result.",
-        )
+    refuse_if(
+        name not in study.variants,
+        "--variant",
+        got=f"'{name}'",
+        expected=f"one of: {', '.join(study.variants)}",
+        hint="the variants of this result.",
+    )
     return study.variants[name]
 
 

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.exchange.modal_model import identifier
 
 __all__ = [
@@ -101,14 +101,14 @@ class ResultRun:
     def __post_init__(self) -> None:
         sizes = {axis.name: axis.values.size for axis in self.axes}
         for channel in self.channels:
-            if channel.values.shape != (sizes.get(channel.axis, -1),):
-                raise InputError(
-                    f"result '{self.name}': channel '{channel.name}'",
-                    got=f"values of shape {channel.values.shape} over '{channel.axis}'",
-                    expected=f"one value for each of the {sizes.get(channel.axis, 0)} points of "
-                    f"its axis",
-                    hint="the stored result is damaged; run the case again.",
-                )
+            refuse_if(
+                channel.values.shape != (sizes.get(channel.axis, -1),),
+                f"result '{self.name}': channel '{channel.name}'",
+                got=f"values of shape {channel.values.shape} over '{channel.axis}'",
+                expected=f"one value for each of the {sizes.get(channel.axis, 0)} points of "
+                f"its axis",
+                hint="the stored result is damaged; run the case again.",
+            )
 
     def along(self) -> Iterator[tuple[ResultAxis, tuple[ResultChannel, ...]]]:
         """Every axis with its channels."""
