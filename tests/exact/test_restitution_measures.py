@@ -39,6 +39,7 @@ from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
 from klack.contact.restitution import find_contacts, measure_impact
 from klack.errors import InputError
 from klack.mechanics.end_stop import EndStop
+from klack.mechanics.force import ConstantForce
 from klack.mechanics.lever import Lever
 from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.stop_law import LinearStopLaw
@@ -942,3 +943,22 @@ def test_impacts_of_a_pair_lose_what_contact_and_friction_of_its_faces_lose():
         "all of needle": 7.0,
         "all of armature": 6.0,
     }
+
+
+@pytest.mark.parametrize("gap", [0.0, 1e-9])
+@pytest.mark.parametrize("speed", [0.0, 0.5])
+def test_a_body_that_starts_in_touch_strikes_with_its_speed(gap, speed):
+    """Truth: a mass on a linear stop presses with v sqrt(k m); without a speed it rests there."""
+    law = LinearStopLaw(kind="linear", stiffness=1e8)
+    parts = {
+        "needle": RigidMass(mass=MASS, speed=speed, points=("tip",)),
+        "stop": EndStop(gap=gap, law=law),
+        "push": ConstantForce(force=1e-6),
+    }
+    joints = (("needle.tip", "stop.lower", "push.end"), ("stop.upper", "ground"))
+
+    found = simulate_network(Network(parts, joints).rows(), duration=60e-6, record=1e-6).events
+
+    peaks = [speed * (1e8 * MASS) ** 0.5] if speed else []
+    assert [event.peak_force for event in found] == pytest.approx(peaks, rel=5e-4)  # the promise
+    assert [event.approach_speed for event in found] == pytest.approx([speed] * len(peaks))

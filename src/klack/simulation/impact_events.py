@@ -29,6 +29,7 @@ __all__ = ["ROTATION", "ImpactFinder", "judged"]
 
 _PAUSE_STEPS = 100  # a film is not recorded while its force passes through zero: so many fine steps
 _PAUSE_SHARE = 0.04  # or this share of the time to rest, whichever is longer
+_STRIKES = 1e-6  # [m/s] closing speed at the start: less is rest
 _BEND = 0.25  # of what other forces do between two records: more from one to the next is a jump
 
 _KNOWN = 3.0  # of the records after a contact: none is needed
@@ -82,9 +83,9 @@ class ImpactFinder:
     Contacts that follow each other within the longest period of the two bodies are one impact, and
     so are contacts between which the centres of mass do not move apart.  For rigid bodies half the
     time of the shorter contact stands for that period.  A contact that is closed at the start is
-    no impact.  A film acts before the first touch and after the last one: the speeds are the
-    highest ones while it presses, and within two of these periods while it pulls.  An impact whose
-    last contact lasts until the bodies are at rest ends there.
+    no impact, unless a body has a speed towards it.  A film acts before the first touch and after
+    the last one: the speeds are the highest ones while it presses, and within two of these periods
+    while it pulls.  An impact whose last contact lasts until the bodies are at rest ends there.
 
     Where a step does not know the speed of the gap at its start, it follows between two records
     from the impulse of the interface itself, step by step (a film stops a body within less than
@@ -422,7 +423,8 @@ def _closed_step(
         s.closed, s.begin = 1.0, t
         s.steps = s.rests = 0.0
         s.contact_impulse, s.contact_peak, s.contact_peak_time = 0.0, -np.inf, t
-        s.from_start = 1.0 if t <= s.run_start + h else 0.0
+        at_start = t <= s.run_start + h and not closing > _STRIKES
+        s.from_start = 1.0 if at_start else 0.0
         s.touch = -closing
         if s.lead > 0.0:
             closing = max(closing, s.lead_fastest)
