@@ -140,8 +140,13 @@ def test_one_stroke_has_no_scatter(result, tmp_path, capsys):
     path = record(result, tmp_path / "strokes.csv", strokes=1)
     found = compared(result, "--measurement", str(path))
 
-    assert main(["compare", str(result), "--measurement", str(path), "--no-report"]) == 0
+    words = ["--measurement", str(path), "--out", str(tmp_path / "one")]
+    assert main(["compare", str(result), *words]) == 0
     assert ", wet: 1 stroke " in capsys.readouterr().out
+    page = (tmp_path / "one" / "report.html").read_text(encoding="utf-8")
+    assert "1 measured stroke (" in page
+    assert "1 stroke used" in page
+    assert "highest measured rebound: wet" not in page  # of one, none is the highest
     assert found["strokes"] == 1
     assert "times the reading error" in found["verdict"]
     assert "does not show the scatter between strokes" in found["verdict"]

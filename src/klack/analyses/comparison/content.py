@@ -135,7 +135,7 @@ def _variant_sections(variant: ComparedVariant) -> list[Section]:
     curves = tuple(tuple(map(typeset, row)) for row in curve_rows(variant))
     highest = tuple(tuple(map(typeset, row)) for row in highest_rows(variant))
     columns = tuple(map(typeset, HIGHEST_COLUMNS))
-    return [
+    found = [
         Section(
             title=f"The whole stroke: {variant.variant}",
             charts=(lift_chart(variant),),
@@ -150,12 +150,16 @@ def _variant_sections(variant: ComparedVariant) -> list[Section]:
             paragraphs=(f"The first {_MOST_IMPACTS} impacts on each stop.",),
             tables=(Table(columns=("impact", *IMPACT_COLUMNS[2:]), rows=rows),),
         ),
-        Section(
-            title=f"The highest measured rebound: {variant.variant}",
-            paragraphs=(_HIGHEST,),
-            tables=(Table(columns=columns, rows=highest),),
-        ),
     ]
+    if highest:
+        found.append(
+            Section(
+                title=f"The highest measured rebound: {variant.variant}",
+                paragraphs=(_HIGHEST,),
+                tables=(Table(columns=columns, rows=highest),),
+            )
+        )
+    return found
 
 
 def _one_column(variant: ComparedVariant, *, most: int) -> list[tuple[str, ...]]:
@@ -176,7 +180,7 @@ def _measured(study: MeasuredStrokeStudy) -> Section:
         facts.append(
             (
                 f"{variant.variant}",
-                f"{variant.source}: {count(variant.count)} strokes used, "
+                f"{variant.source}: {variant.counted()} used, "
                 f"{count(len(variant.rejected))} discarded",
             )
         )

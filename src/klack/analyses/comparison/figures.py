@@ -58,7 +58,7 @@ def lift_chart(variant: ComparedVariant) -> Chart:
             ),
         ),
         note=(
-            f"{variant.count} measured strokes ({variant.source}). Thin: all strokes; shaded: 5 "
+            f"{variant.counted('measured ')} ({variant.source}). Thin: all strokes; shaded: 5 "
             "to 95 % of the strokes at each time; below, the difference of the computed lift "
             "from the median, with the same band. The computed lift is shown as the sensor "
             "would show it; velocities are derived from both lifts with the same window (3 dB "
@@ -111,8 +111,7 @@ def side_by_side_chart(variants: Sequence[ComparedVariant]) -> Chart:
         title="Effect of the fluid, computed and measured",
         x=AxisSpec(label="time from the trigger", unit="ms", range=(low, high)),
         panels=panels,
-        note="; ".join(f"{v.variant}: {v.label}, {v.count} measured strokes" for v in variants)
-        + ".",
+        note="; ".join(f"{v.variant}: {v.label}, {v.counted('measured ')}" for v in variants) + ".",
     )
 
 

@@ -181,6 +181,10 @@ class ComparedVariant:
     impacts: tuple[ComparedImpact, ...]
     highest: tuple[HighestShot, ...] = ()
 
+    def counted(self, kind: str = "") -> str:
+        """``1 stroke``, ``6 measured strokes``."""
+        return f"{self.count} {kind}stroke{'s' if self.count != 1 else ''}"
+
     def first(self, stop: str) -> ComparedImpact | None:
         """First impact on a stop, if it was compared."""
         return next((hit for hit in self.impacts if hit.stop == stop and hit.number == 1), None)

@@ -113,8 +113,7 @@ _STUDY = JsonForm(
 def _told(study: MeasuredStrokeStudy) -> Iterator[TextTable | Notes | str]:
     for variant in study.variants.values():
         aside = f", {len(variant.rejected)} discarded" if variant.rejected else ""
-        strokes = "stroke" if variant.count == 1 else "strokes"
-        title = f"{study.title}, {variant.variant}: {variant.count} {strokes}{aside}"
+        title = f"{study.title}, {variant.variant}: {variant.counted()}{aside}"
         yield TextTable(title=title, columns=CURVE_COLUMNS, rows=curve_rows(variant))
         impacts = impact_rows(variant)
         yield TextTable(title="Impacts", columns=IMPACT_COLUMNS, rows=impacts, left=2)
@@ -143,7 +142,7 @@ def verdict(study: MeasuredStrokeStudy, variant: ComparedVariant) -> str:
     """Whether a variant agrees with its measurement, and what is worst."""
     words, worst = variant.worst()
     found = agreement(study, variant)
-    strokes = f"{variant.count} measured stroke{'s' if variant.count != 1 else ''}"
+    strokes = variant.counted("measured ")
     if found == "unknown":
         return (
             f"'{variant.variant}' against {strokes}: no scatter, no impact to compare; see the "
