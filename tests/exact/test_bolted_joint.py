@@ -299,7 +299,7 @@ def test_faces_and_ends_that_cannot_press_are_one_error(tmp_path):
         face.name = "other" if face.name == "joint" and face.center.x > 5 else face.name
     cases = (
         (nameless, ENDS, "a part of the flat face where 'low' and 'high' meet"),
-        (revolved_solids(plates()), ("head", "nut"), "'nut' is no outer face.*here: .*under"),
+        (bridge(), ("head", "nut"), "'nut' is no outer face.*here: .*foot"),
         (bridge(under=(4, 6)), ENDS, r"their middles are 2 mm apart across the bolts"),
         (bridge(foot_from=0), ENDS, "beside the face where they touch"),
     )

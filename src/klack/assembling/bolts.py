@@ -256,7 +256,7 @@ def _meshed_joint(
         return flat_solid_joint(mesh, name, ends), mesh
     profiles = dict(shape)
     joint = flat_joint(profiles, name, ends)
-    finer = {name: joint.length / ELEMENTS}
+    finer = {name: joint.length / (2 * ELEMENTS)}  # pressures are at corners only
     for end in sorted(ends):
         lengths = (c.length for p in profiles.values() for c in p.curves if c.name == end)
         finer[end] = sum(lengths) / _ACROSS

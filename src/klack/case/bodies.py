@@ -428,7 +428,7 @@ class CaseBody(Section):
     def _check_joints(self) -> None:
         """Reject fits and bolts of other geometries, and of edges of another shape."""
         shape = None if self.geometry.is_absent or self.matrices is not None else self.geometry
-        profile = shape and shape.profile
+        profile = None if shape is None else shape.profile
         kinds = {"fits": ("a press fit", self.fits), "bolts": ("bolts", self.bolts)}
         for key, (kind, given) in kinds.items():
             if given and not (shape and (profile or shape.step)):

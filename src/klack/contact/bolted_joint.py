@@ -26,7 +26,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array, vstack
+from scipy.sparse import coo_array, csr_array, diags_array, vstack
 
 from klack.bodies.elasticity.condensation import condensed_inverse
 from klack.bodies.elasticity.factorization import factorize
@@ -182,11 +182,12 @@ def _pushes(
     corners, at = np.unique(side.faces[:, : family.corners], return_inverse=True)
     at = at.reshape(len(side.faces), family.corners)
     weight = np.einsum("fq,qc,qi->fci", size, chi, N)
-    area = np.bincount(at.ravel(), weight.sum(axis=2).ravel(), minlength=len(corners))
     node = np.searchsorted(side.nodes[1], side.faces)[:, None, :]
     place = [np.broadcast_to(index, weight.shape).ravel() for index in (at[:, :, None], node)]
-    share = weight / area[at][:, :, None]
-    means = csr_array((share.ravel(), place), shape=(len(corners), len(side.nodes[1])))
+    shape = len(corners), len(side.nodes[1])
+    sums = csr_array(coo_array((weight.ravel(), (place[0], place[1])), shape=shape))
+    area = np.asarray(sums.sum(axis=1), dtype=np.float64)
+    means = csr_array(diags_array(1.0 / area) @ sums)
     normals = np.broadcast_to(normal, (len(side.nodes[1]), len(normal)))
     lower, upper = (along(mesh, nodes, normals) for nodes in side.nodes)
     points = mesh.points[side.nodes[1]]

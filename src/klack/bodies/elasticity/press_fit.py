@@ -47,7 +47,7 @@ __all__ = [
     "pressed_state",
 ]
 
-J = TypeVar("J", Joint, FlatJoint)
+J = TypeVar("J", bound=Joint | FlatJoint)
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
@@ -305,7 +305,8 @@ class PartedBody:
                 named = [np.isin(block.connectivity, s.nodes).all(axis=1) for _, s in own]
                 rest = FaceBlock(block.family, block.connectivity[~np.any(named, axis=0)])
                 _, x, _, normal = face_points(self.mesh, rest)
-                yield own[0][0], *(v.reshape(-1, self.mesh.dimension) for v in (x, normal))
+                d = self.mesh.dimension
+                yield own[0][0], x.reshape(-1, d), normal.reshape(-1, d)
 
     @property
     def sharp_corners(self) -> Floats:
