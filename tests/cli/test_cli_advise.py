@@ -231,4 +231,4 @@ def test_a_valve_has_no_band(capsys):
 def test_a_short_run_is_refused(path, capsys):
     path.write_text(CASE.replace("duration: 20 us", "duration: 3 us"))
     assert main(["advise", str(path)]) == 2
-    assert "do not separate before" in capsys.readouterr().err
+    assert "do not separate" in capsys.readouterr().err

@@ -118,7 +118,7 @@ def test_solids_from_step_are_refined_around_the_case(tmp_path, capsys):
     assert not growth["order_measured"]
     assert min(meshes["contact of pin and plate"]["factors_run"]) == pytest.approx(2 / 3)
     assert told["meshes_given"] == []
-    assert "they were made coarser" not in said
+    assert "they were coarsened" not in said
     again, expected = told["run_again"]["now"], told["expected_error"]["now"]
     assert 0 < again["force_history"] <= expected["force_history"]
     assert told["run_again"]["advised"]["force_history"] < again["force_history"]

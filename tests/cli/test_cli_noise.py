@@ -412,7 +412,7 @@ def test_large_elements_say_up_to_where_they_hold(impact, monkeypatch):
     """17 mm of outline in elements of 0.7 mm or up to half as much more, in slow air."""
     monkeypatch.setattr(outline, "_MOST", 24)
     design = sounding(impact, radiation="elements", sound_speed=60.0)
-    (note,) = [note for note in design.notes if "boundary elements hold" in note]
+    (note,) = [note for note in design.notes if "boundary elements are valid" in note]
     found = float(re.search(r"up to ([\d.]+) kHz", note)[1])
     assert 60.0 / 6.0 / (1.5 * 0.72) < found < 60.0 / 6.0 / 0.7
     assert design.settings.radiation == "elements"

@@ -303,7 +303,7 @@ def test_records_that_are_further_apart_than_asked_are_told(record, told):
     assert main(["stroke", "valve.yaml", "--variant", "dry", "--no-report", "--out", "out"]) == 0
     study = STROKE.load(Path("out"))
     time = study.variants["dry"].result.time
-    note = f"records are {1e6 * (time[1] - time[0]):.3g} us apart, where run.record is {record}"
+    note = f"records are {1e6 * (time[1] - time[0]):.3g} us apart instead of run.record: {record}"
     assert any(note in warning for warning in study.warnings) == told
 
 

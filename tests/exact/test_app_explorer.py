@@ -99,8 +99,8 @@ def test_what_speaks_against_a_level_goes_with_its_sound_and_into_comparisons(tm
     assert "klack advise CASE" not in steps  # which refuses an impact that is cut off
     ghost, now = Reader().compare(str(tmp_path / "whole"), str(tmp_path / "cut"))
 
-    assert any("so are spectrum and sound" in note for note in source.notes)
-    assert any("so are spectrum and sound" in doubt for doubt in now.doubts)
+    assert any("spectrum and sound are incomplete" in note for note in source.notes)
+    assert any("spectrum and sound are incomplete" in doubt for doubt in now.doubts)
     assert (ghost.run, now.run) == ("level lumped", "level reduced")
 
 

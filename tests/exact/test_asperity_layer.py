@@ -245,7 +245,7 @@ def test_yield_beside_roughness_is_left_out_and_said(tmp_path):
         ("roughness: {rms: 50 um, asperity_radius: 0.2 um}", "tenth of the radius"),
         ("roughness: {rms: 0.2 um}", "without 'asperity_radius'"),
         ("roughness: {}", "without 'rms'"),
-        ("roughness: {rms: 0.2 um, curve: [[1 um, 1 MPa]]}", "beside a measured 'curve'"),
+        ("roughness: {rms: 0.2 um, curve: [[1 um, 1 MPa]]}", "together with a measured 'curve'"),
         ("roughness: {curve: []}", "rise"),
         ("roughness: {curve: [[1 um, 2 MPa], [2 um, 1 MPa]]}", "rise"),
         ("roughness: {curve: [[1 um, 0 MPa]]}", "rise"),

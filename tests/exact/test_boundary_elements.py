@@ -113,7 +113,7 @@ def test_matrix_of_powers_is_symmetric_and_never_negative() -> None:
 
 def test_elements_too_large_for_the_wave_are_refused() -> None:
     mesh = sphere_meridian(12)
-    with pytest.raises(ConvergenceError, match=r"is left inside.*\n.*six or more to a wavelength"):
+    with pytest.raises(ConvergenceError, match=r"remains inside.*\n.*six or more to a wavelength"):
         radiation(mesh, 25.0, modes(mesh, 0))
     assert radiation(mesh, 1.0, modes(mesh, 0)).residual < LARGEST_RESIDUAL
 

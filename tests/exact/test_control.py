@@ -152,10 +152,10 @@ def test_a_second_run_of_the_same_rows_is_the_same():
             ),
             "below the upper one",
         ),
-        (lambda: Setpoint(time=(1.0, 0.0), value=(1.0, 2.0)), "falling times"),
+        (lambda: Setpoint(time=(1.0, 0.0), value=(1.0, 2.0)), "times that fall"),
         (lambda: Transition(to="b", above=1.0), "no sensor"),
         (lambda: Transition(to="b", sensor="x", above=1.0, below=2.0), "2 conditions"),
-        (lambda: Transition(to="b", sensor="x", after=1.0), "'after' alone"),
+        (lambda: Transition(to="b", sensor="x", after=1.0), "only 'after'"),
         (
             lambda: StateMachine(
                 kind="state-machine",

@@ -405,8 +405,8 @@ def test_the_length_of_the_column_counts_the_flow_of_the_notches():
     [
         (lambda: edge(notch("rectangular", depth=3e-6)), "between the clearance of 0.004 mm"),
         (lambda: edge(notch("rectangular", depth=4e-3)), "the radius of the spool, 3 mm"),
-        (lambda: edge(notch("triangular", count=40)), "notches of 40 mm in all"),
-        (lambda: edge(notch("hole", count=40)), "notches of 24 mm in all"),
+        (lambda: edge(notch("triangular", count=40)), "notches with a total width of 40 mm"),
+        (lambda: edge(notch("hole", count=40)), "notches with a total width of 24 mm"),
         (lambda: edge(notch("round"), width=3e-3), "at most the 3 mm of the edge"),
         (lambda: edge(notch("hole", length=0.5e-3)), "at least its diameter"),
         (lambda: edge(notch("hole", depth=1e-3)), "it goes through"),

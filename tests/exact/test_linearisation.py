@@ -287,7 +287,7 @@ class Magnet(Component):
 
 
 def test_a_component_in_python_is_one_clear_error():
-    with pytest.raises(InputError, match=r"components\.pull.*outside of compiled code"):
+    with pytest.raises(InputError, match=r"components\.pull.*outside compiled code"):
         linear(needle(pull=Magnet()), [["needle.tip", "spring.end", "pull.body"]])
 
 

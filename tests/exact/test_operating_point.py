@@ -298,13 +298,13 @@ def test_an_enclosed_volume_keeps_its_pressure_and_says_so():
 
     assert one(record, "inlet pressure") == pytest.approx(7e5, rel=1e-11)
     assert "'inlet'" in record.warnings[0]
-    assert "no open way" in record.warnings[0]
+    assert "no open path" in record.warnings[0]
 
 
 def test_a_flow_without_a_way_out_is_an_error():
     text = SHUT.replace("flow: 0 l/min", "flow: 1 l/min")
 
-    with pytest.raises(InputError, match=r"'inlet' with a flow that is forced in") as error:
+    with pytest.raises(InputError, match=r"'inlet' with a forced flow in") as error:
         points(written(text))
 
     assert "open the valve" in str(error.value)
@@ -473,7 +473,7 @@ def test_points_that_do_not_settle_are_marked():
     assert pressure is not None
     assert record.found.tolist() == [True, False, False]
     np.testing.assert_array_equal(np.isnan(pressure.values), [False, True, True])
-    assert "forced in" in record.failures[1]
+    assert "forced flow in" in record.failures[1]
     assert record.warnings[0].startswith("2 of 3 points were not found")
 
 

@@ -323,7 +323,7 @@ def test_faces_that_cannot_be_pressed_are_one_error(tmp_path):
     )
     sizing = MeshSizing(size=1e-3)
     materials = {"shaft": STEEL, "hub": STEEL}
-    for profiles, got in ((cone, "not one cylinder"), (stacked, "a flat face")):
+    for profiles, got in ((cone, "faces that do not form one cylinder"), (stacked, "a flat face")):
         with pytest.raises(InputError, match=rf"joint 'joint': got .*{got}"):
             pressed_solid(tmp_path, profiles, materials, {"joint": 1e-6}, sizing)
     with pytest.raises(InputError, match=r"joint 'seam': got a name of no face"):

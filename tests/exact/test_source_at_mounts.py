@@ -190,8 +190,8 @@ def test_reactions_that_are_left_out() -> None:
 
 
 BROKEN = {
-    "mounts: {flange: {surface: housing.top}}": "which nothing holds",
-    "mounts: {flange: {surface: housing.rim}, clip: {surface: housing.rim}}": "has already",
+    "mounts: {flange: {surface: housing.top}}": "which is not held",
+    "mounts: {flange: {surface: housing.rim}, clip: {surface: housing.rim}}": "belongs to mount",
     "mounts: {flange: {surface: housing.rim}}\n  reactions: {magnet: pole.top}": "magnet",
     "mounts: {flange: {surface: housing.rim}}\n  reactions: {spring: needle.tip}": "nothing holds",
     "reactions: {spring: pole.top}": "reactions without mounts",

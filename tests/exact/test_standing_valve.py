@@ -452,7 +452,7 @@ def test_force_on_the_plate_in_the_run_and_by_coupling(sheet: StrokeStudy) -> No
     assert found is not None
     record, _ = in_machine(found, source.speed)
     assert record.balance < 1e-9
-    assert any("hold on no other" in note for note in record.notes)
+    assert any("valid only on this machine" in note for note in record.notes)
     result = sheet.variants["dry-mounted"].result
     means = -result.channels["mounted-flange-z.body force"].values[1:]
     step = float(result.time[1] - result.time[0])

@@ -115,7 +115,7 @@ def test_sound_damps_modes_by_its_power_over_their_energy(sphere) -> None:
     heavy, light = (replace(mass, damping=np.array([zeta])) for zeta in (0.01, 0.001))
     assert not list(_radiation_notes(SimpleNamespace(structures=[heavy]), around))
     (note,) = _radiation_notes(SimpleNamespace(structures=[light]), around)
-    assert f"Sound takes {100 * plane / 0.002:.2g} %" in note
+    assert f"Sound radiation dissipates {100 * plane / 0.002:.2g} %" in note
 
 
 def test_motions_that_cross_do_not_radiate_together(sphere) -> None:

@@ -326,7 +326,7 @@ def test_a_bar_without_end_does_not_move_as_a_whole():
 @pytest.mark.parametrize(
     ("old", "new", "text"),
     [
-        ("levels: [full]", "levels: [reduced, full]", "the level full alone"),
+        ("levels: [full]", "levels: [reduced, full]", "only the level full"),
         ("non_reflecting: far", "non_reflecting: end", "another surface"),
         ("non_reflecting: far", "non_reflecting: tip", "surface of bar"),
         ("  striker:\n", "  striker:\n    non_reflecting: far\n", "the body that is hit"),
@@ -448,7 +448,7 @@ def test_a_plane_across_which_nothing_can_move_is_refused():
     held = ElasticBody(
         name="held", mesh=held.mesh, K=held.K, M=held.M, fixed=np.array([0, 1], dtype=np.int64)
     )
-    with pytest.raises(InputError, match="nothing can move across"):
+    with pytest.raises(InputError, match="cannot move across"):
         slide(Friction.coulomb(0.2), 5e-6, held, across=np.zeros(6))
     with pytest.raises(InputError, match="held sideways"):
         slide(Friction.coulomb(0.2), 5e-6, held)

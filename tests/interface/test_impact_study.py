@@ -342,7 +342,7 @@ WRONG = [
     ("peak_force,", "seat.peak_force,", "write peak_force."),
     ("peak_force,", "noise.loudnes,", "noise.loud"),
     ("peak_force,", "wall_time,", "one of"),
-    ("points: 2}", "points: 2}\n  variant: dry", "variants are of strokes"),
+    ("points: 2}", "points: 2}\n  variant: dry", "only strokes have variants"),
     ("points: 2}", "points: 2}\n  level: reducd", "reduced"),
     (f"{SPEED}: {{from: 0.3 m/s, to: 0.6 m/s}}", "run.levels.0: {values: [full]}", "one level"),
 ]
@@ -367,7 +367,7 @@ def test_a_level_of_a_valve_is_refused(tmp_path):
   measures: [opening_time]
   level: reduced
 """
-    with pytest.raises(InputError, match="levels are of impacts"):
+    with pytest.raises(InputError, match="only impacts have levels"):
         klack.run_study(small, write(tmp_path, text))
 
 
@@ -430,7 +430,7 @@ class TestDerivatives:
         assert "by differences of impacts" in " ".join(capsys.readouterr().out.split())
         assert json.loads(numbers.read_text())["method"] == "differences"
         for more, words in (
-            (["--variant", "dry"], "variants are of strokes"),
+            (["--variant", "dry"], "only strokes have variants"),
             (["--parameter", "contact.gap"], "a value of zero"),
             (["--measure", "seat.peak_force"], "write peak_force"),
             (["--level", "reduce"], "reduced"),

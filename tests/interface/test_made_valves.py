@@ -107,7 +107,7 @@ class TestMade:
         [
             (STUDY, "no scatter of manufactured valves"),
             (STUDY + ROBUST.replace("lift: 2", "lft: 2"), "'lift'"),
-            (STUDY + ROBUST.replace("lift: 2 um", f"{GAP}: 2 um"), "follows from parameters"),
+            (STUDY + ROBUST.replace("lift: 2 um", f"{GAP}: 2 um"), "depends on parameters"),
             (STUDY + ROBUST.replace("0.3 N", "0.3 mm"), "0.3 mm"),
             (STUDY + ROBUST.replace("0.3 N", "0 N"), "more than 0"),
             (STUDY + ROBUST.replace(MASS, "network.components.needle.masse"), "masse"),
@@ -178,7 +178,7 @@ class TestRobustSearch:
         failed = ~np.isfinite(columns(record)["opening_time (mean + 2 sd)"])
         assert failed.any()
         notes = [record.notes[i] for i in np.flatnonzero(failed)]
-        assert all("made valves have no measures" in note for note in notes)
+        assert all("manufactured valves have no measures" in note for note in notes)
         assert not record.optimum.kept[failed].any()
 
 

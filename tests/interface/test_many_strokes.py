@@ -287,9 +287,9 @@ class TestFailures:
     def test_a_variant_or_a_case_that_is_not_there_is_refused(self, small: klack.CaseOnHand):
         with pytest.raises(InputError, match="one of: wet"):
             klack.run_many(small, [], ["impacts"], variant="we")
-        with pytest.raises(InputError, match="levels are of impacts"):
+        with pytest.raises(InputError, match="only impacts have levels"):
             klack.run_many(small, [], ["impacts"], level="reduced")
-        with pytest.raises(InputError, match="variants are of strokes"):
+        with pytest.raises(InputError, match="only strokes have variants"):
             klack.run_many("two-rods", [], ["peak_force"], variant="dry")
         for threads in (0, True):
             with pytest.raises(InputError, match="1 or more"):

@@ -241,7 +241,7 @@ class Unsettled(Spring):
     """A spring that finds no start."""
 
     def add_rows(self, rows: Rows) -> None:
-        raise ConvergenceError("the fluxes do not settle.\nTry: another loop.")
+        raise ConvergenceError("the fluxes do not converge.\nTry: another loop.")
 
 
 def test_what_does_not_converge_at_the_start_names_its_component():

@@ -345,11 +345,11 @@ def test_what_begins_below_boiling_is_told(begin):
     with doubts() as told:
         simulate_network(line_between(0.999 * liquid, 5e5, begin=begin), duration=2e-6, step=20e-9)
 
-    (text,) = [one for one in told if "begins with vapour" in one]
+    (text,) = [one for one in told if "holds vapour" in one]
     assert text.startswith("'source': at the start the pressure leaves the range of liquid")
     assert "it boils at 0.0472 bar at 20 degC" in text
     with warnings.catch_warnings():
-        warnings.filterwarnings("error", ".*begins with vapour", AccuracyWarning)
+        warnings.filterwarnings("error", ".*holds vapour", AccuracyWarning)
         simulate_network(line_between(1.001 * liquid, 5e5, begin=begin), duration=2e-6, step=20e-9)
 
 
@@ -389,7 +389,7 @@ def test_a_line_far_from_its_pressure_says_both_speeds_and_the_error():
     assert "the line 'line' with the fluid of 1 bar" in text
     assert text.startswith("'line': at the start the pressure")
     slow, fast = (float(gassy.sound_speed(p)) for p in (1e5, 400e5))
-    assert f"{slow:.4g} m/s, those at 400 bar at {fast:.4g} m/s" in text
+    assert f"{slow:.4g} m/s, but waves at 400 bar run at {fast:.4g} m/s" in text
     assert f"up to {100 * (1 - slow / fast):.2g} % off" in text
 
 

@@ -188,7 +188,8 @@ def test_the_answer_comes_first(content: Content) -> None:
     rule = plain(content.sections[0].paragraphs[0])
     assert "No shot rebounds as high as the centred impact." in rule
     assert (
-        "correlates most with the eccentricity: it falls with it (rank correlation −1.00)" in rule
+        "the eccentricity has the strongest correlation with the rebound height, which "
+        "falls with it (rank correlation −1.00)" in rule
     )
 
 
@@ -221,7 +222,7 @@ def test_friction_of_the_faces_is_related_to_the_rebound(study: ShotsStudy) -> N
 
     first = shots_content(rubbing).sections[0]
 
-    assert "correlates most with the friction between the faces: it falls" in first.paragraphs[0]
+    assert "the friction between the faces has the strongest correlation" in first.paragraphs[0]
     assert first.charts[-1].name == "rebound-contact_friction"
 
 

@@ -202,7 +202,7 @@ class TestCommand:
             ("network.components.bores.count", "no number with a unit"),
             ("network.components.seat.gap", "a value of zero"),
             ("network.components.opening.law.stiffness", "klack study with a few values"),
-            ("network.ambient.temperature", "a table gets other points"),
+            ("network.ambient.temperature", "table points change"),
             ("run.step", "a setting of the run"),
         ],
     )
@@ -340,7 +340,7 @@ def test_derivatives_that_leave_the_motion_are_told():
 
     space = SimpleNamespace(varied=[SimpleNamespace(name=name, size=1.0) for name in "ab"])
     (told,) = _unbounded([Left()], space)
-    assert "From 1.2 ms on derivatives with b grow without bound" in told
+    assert "After 1.2 ms derivatives with respect to b grow without bound" in told
     assert "run.coarse: 16" in told
 
 

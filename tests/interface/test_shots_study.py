@@ -421,7 +421,7 @@ def test_a_search_finds_the_smallest_clearance_and_exports_it(needle, tmp_path, 
     out, file = tmp_path / "out", write(tmp_path, text)
     command = ["optimise", str(needle.tree.path), "--study", str(file), "--no-report"]
     assert main([*command, "--threads", "1", "--out", str(out)]) == 0
-    assert "the best one suits these draws" in " ".join(capsys.readouterr().out.split())
+    assert "to which the best point is adapted" in " ".join(capsys.readouterr().out.split())
     record = klack.load_result(out).record
     best = record.optimum.best
     clearance = next(item.values for item in record.parameters if item.name == CLEARANCE)

@@ -802,7 +802,7 @@ class TestOptimum:
             ("today - 1 %", "today - 1 mm", "a force"),
             ("{most: today - 1 %}", "{}", "no bound"),
             ("population: 20", "population: 5", "8 or more"),
-            ("most: today - 1 %", "most: 1 N", "No point keeps all bounds"),
+            ("most: today - 1 %", "most: 1 N", "No point meets all bounds"),
         ],
     )
     def test_what_cannot_be(self, tmp_path, capsys, old, new, words):

@@ -373,7 +373,7 @@ def test_coordinates_of_other_shapes_are_refused(study_series, case_series, tmp_
     changed = replace(record, modes=replace(record.modes, shape_marks=marks))
     result = replace(variant.result, spatial_impacts=(changed,))
     other = replace(study_series, variants={"dry": replace(variant, result=result)})
-    with pytest.raises(InputError, match="other shapes"):
+    with pytest.raises(InputError, match="shapes differ"):
         write_spatial_series(other, case_series, tmp_path, impact=1)
     assert not list(tmp_path.iterdir())
 

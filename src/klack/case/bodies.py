@@ -435,7 +435,7 @@ class CaseBody(Section):
                 raise CaseProblem(
                     (key,),
                     got=f"{kind} of a body that is neither drawn nor a STEP file",
-                    expected="geometry.profile or geometry.step with a part for either side of the "
+                    expected="geometry.profile or geometry.step with a part on each side of the "
                     "joint",
                     hint=f"draw the parts, or remove '{key}': the solids are then glued.",
                     on_key=True,

@@ -618,7 +618,7 @@ class ImpactSections(CaseFile):
         description="name: body; two, or with 'opposite' or 'backing' three."
     )
     contact: CaseContact = Field(description="Which surfaces meet.")
-    motion: Motion = Field(description="Approach of the moving body.")
+    motion: Motion = Field(description="Start of the moving body.")
     guide: CaseGuide | None = Field(default=None, description="Guide of the moving body.")
     opposite: CaseOpposite | None = Field(
         default=None, description="Upper stop, a third body, for bounces between both ends."

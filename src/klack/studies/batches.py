@@ -97,7 +97,7 @@ class Batches(ABC):
         return None if self._asked is None else self._asked.copy()
 
     def tell(self, objectives: ArrayLike, constraints: ArrayLike | None = None) -> None:
-        """Take the values of the points last asked for.
+        """Take the values of the points requested last.
 
         Parameters
         ----------
