@@ -64,7 +64,7 @@ def proposal(parts: Mapping[str, Part], model: str) -> Proposal:
     apart = [
         pair
         for pair, points in zones.items()
-        if len(points) and zone.query(points)[0].max() > _APART * side
+        if len(points) and np.max(zone.query(points)[0]) > _APART * side
     ]
     if apart:
         every = " and ".join(f"needle.{a} on housing.{b}" for a, b in [(above, below), *apart[:3]])

@@ -1043,7 +1043,9 @@ class _Balance:
     def instead_of_stated(self, p: Vector) -> list[str]:
         """Doubts about volumes with a way out that do not start at the pressure of the case."""
         handles, rows = self.network.node_order, self.network.rows
-        ways = {end for row in (*rows.branches, *rows.lines, *rows.waves) for end in (row.a, row.b)}
+        ways = {end for branch in rows.branches for end in (branch.a, branch.b)}
+        ways |= {end for line in rows.lines for end in (line.a, line.b)}
+        ways |= {end for wave in rows.waves for end in (wave.a, wave.b)}
         return [
             f"'{rows.nodes[handles[i]].component}' starts at {format_si(float(p[i]), 'Pa', 4)}, "
             f"not at the stated {format_si(float(self.at_first[i]), 'Pa', 4)}: nothing but its "
