@@ -42,7 +42,7 @@ from klack.case.reader import find_case
 from klack.case.rewriting import with_values
 from klack.case.schema import Case
 from klack.case.valve import ValveCase
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.input.problem import CaseProblem
 from klack.machine.progress import Progress, silent
 from klack.network.component import Component
@@ -320,13 +320,13 @@ class Result:
 
         charts = self._charts()
         name = next(iter(charts), "") if chart is None else chart
-        if name not in charts:
-            raise InputError(
-                "plot",
-                got=f"'{name}'" if name else "a result without charts",
-                expected=f"one of: {', '.join(charts)}" if charts else "a chart in its report",
-                hint="result.charts lists the names.",
-            )
+        refuse_if(
+            name not in charts,
+            "plot",
+            got=f"'{name}'" if name else "a result without charts",
+            expected=f"one of: {', '.join(charts)}" if charts else "a chart in its report",
+            hint="result.charts lists the names.",
+        )
         return shown_chart(charts[name])
 
     @property

@@ -15,7 +15,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, ValidationInfo, WithJsonSchema
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.input.section import Computed
 
 __all__ = [
@@ -454,10 +454,13 @@ def base_powers(unit: str) -> tuple[tuple[str, Fraction], ...]:
         raise InputError(
             "unit", got=f"the unknown unit '{unit}'", expected="an SI unit", hint=hint
         ) from None
-    if not coherent:
-        raise InputError(
-            "unit", got=f"'{unit}'", expected="a coherent SI unit (kg, m, s, A, K)", hint=hint
-        )
+    refuse_if(
+        not coherent,
+        "unit",
+        got=f"'{unit}'",
+        expected="a coherent SI unit (kg, m, s, A, K)",
+        hint=hint,
+    )
     powers = {
         _BASE[name]: Fraction(power).limit_denominator(12) for name, power in dimension.items()
     }

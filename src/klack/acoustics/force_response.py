@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.bodies.reduction.structure import Structure
-from klack.errors import InputError, refuse_if
+from klack.errors import refuse_if
 from klack.machine.compiling.jit import njit
 from klack.signals.sampled import TimeSeries
 from klack.simulation.propagator import damping_loss, modal_propagator
@@ -220,13 +220,13 @@ def _interval(sample: float | None, axis: TimeSeries) -> int:
     if sample is None:
         return 0
     every = round(sample / axis.step)
-    if every < 1 or abs(every * axis.step / sample - 1.0) > 1e-6:
-        raise InputError(
-            "modal_response: sample",
-            got=f"{sample:g} s for intervals of {axis.step:g} s",
-            expected="a multiple of the interval",
-            hint=f"for example {10 * axis.step:g} s.",
-        )
+    refuse_if(
+        every < 1 or abs(every * axis.step / sample - 1.0) > 1e-6,
+        "modal_response: sample",
+        got=f"{sample:g} s for intervals of {axis.step:g} s",
+        expected="a multiple of the interval",
+        hint=f"for example {10 * axis.step:g} s.",
+    )
     return every
 
 

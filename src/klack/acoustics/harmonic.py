@@ -21,7 +21,7 @@ from klack.acoustics.interface import laplace
 from klack.acoustics.mount import Mount, axial_freedom, moved_mass, support_mobility
 from klack.acoustics.plate import Plate
 from klack.bodies.reduction.structure import Structure
-from klack.errors import InputError
+from klack.errors import refuse_if
 
 __all__ = ["SUPPORT", "HarmonicResponse", "harmonic_response", "response_axis"]
 
@@ -100,11 +100,11 @@ def harmonic_response(
 def response_axis(frequency: NDArray[np.float64]) -> NDArray[np.float64]:
     """Check frequencies [Hz]: one row, none below zero."""
     f = np.asarray(frequency, dtype=float)
-    if f.ndim != 1 or not f.size or not np.all(f >= 0.0):
-        raise InputError(
-            "frequency",
-            got=f"an array of shape {f.shape}, lowest {np.min(f, initial=np.inf):g} Hz",
-            expected="one row of frequencies, none below 0 Hz",
-            hint="for example numpy.geomspace(20.0, 2e5, 2000).",
-        )
+    refuse_if(
+        f.ndim != 1 or not f.size or not np.all(f >= 0.0),
+        "frequency",
+        got=f"an array of shape {f.shape}, lowest {np.min(f, initial=np.inf):g} Hz",
+        expected="one row of frequencies, none below 0 Hz",
+        hint="for example numpy.geomspace(20.0, 2e5, 2000).",
+    )
     return f

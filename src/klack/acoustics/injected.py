@@ -18,7 +18,7 @@ import scipy
 
 from klack.acoustics.force_response import aligned_forces
 from klack.bodies.reduction.structure import Structure
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.machine.compiling.jit import njit
 from klack.signals.sampled import Spectrum, TimeSeries
 
@@ -42,13 +42,13 @@ def injected_density(
         Inverse of the time left to decay; default: a third of the narrowest half width ``zeta f``.
     """
     width = structure.damping * structure.omega / (2.0 * np.pi)
-    if not np.all(width > 0.0):
-        raise InputError(
-            f"injected energy of '{structure.name}' over frequency",
-            got=f"{int(np.sum(width <= 0.0))} modes without damping",
-            expected="damping in every mode",
-            hint=f"give bodies.{structure.name}.damping, or take the energy from modal_response.",
-        )
+    refuse_if(
+        not np.all(width > 0.0),
+        f"injected energy of '{structure.name}' over frequency",
+        got=f"{int(np.sum(width <= 0.0))} modes without damping",
+        expected="damping in every mode",
+        hint=f"give bodies.{structure.name}.damping, or take the energy from modal_response.",
+    )
     axis, values = aligned_forces(structure, forces)
     step, spacing = axis.step, resolution or float(width.min()) / _PER_HALF_WIDTH
     # room for the vibration to die away after the record: what is cut off comes back at its start

@@ -19,7 +19,7 @@ import numpy as np
 
 from klack.acoustics.interface import Complexes
 from klack.arrays import Vector
-from klack.errors import AccuracyWarning, InputError, refuse_if
+from klack.errors import AccuracyWarning, refuse_if
 
 __all__ = ["DynamicStiffness", "Isolator", "MeasuredIsolator", "Spring"]
 
@@ -173,11 +173,11 @@ def measured_frequency(name: str, known: Vector, s: Complexes) -> Vector:
     )
     f = s.imag / (2.0 * np.pi)
     slack = 1e-9 * known[-1]
-    if f.min() < known[0] - slack or f.max() > known[-1] + slack:
-        raise InputError(
-            name,
-            got=f"frequencies from {f.min():.4g} to {f.max():.4g} Hz",
-            expected=f"{known[0]:.4g} to {known[-1]:.4g} Hz, as measured",
-            hint="restrict the frequencies; nothing is extrapolated.",
-        )
+    refuse_if(
+        f.min() < known[0] - slack or f.max() > known[-1] + slack,
+        name,
+        got=f"frequencies from {f.min():.4g} to {f.max():.4g} Hz",
+        expected=f"{known[0]:.4g} to {known[-1]:.4g} Hz, as measured",
+        hint="restrict the frequencies; nothing is extrapolated.",
+    )
     return np.clip(f, known[0], known[-1])

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from klack.acoustics.plate import Plate
 from klack.bodies.reduction.craig_bampton import CraigBampton
 from klack.bodies.reduction.structure import Structure
-from klack.errors import InputError, require_nonnegative, require_positive
+from klack.errors import refuse_if, require_nonnegative, require_positive
 
 __all__ = ["Mount", "axial_freedom", "mounted", "moved_mass", "support_mobility"]
 
@@ -52,13 +52,13 @@ def moved_mass(structure: Structure, mount: Mount | None) -> float:
     """Mass on the support [kg], at least that in the modes."""
     mass = structure.mass if mount is None or mount.mass is None else mount.mass
     carried = float(structure.participation @ structure.participation)
-    if not mass > carried:
-        raise InputError(
-            f"mount of '{structure.name}': mass",
-            got=f"{mass:g} kg",
-            expected=f"more than {carried:g} kg, the mass that the modes of the body move",
-            hint=f"the body alone has {structure.mass:g} kg; leave the mass out to use that.",
-        )
+    refuse_if(
+        not mass > carried,
+        f"mount of '{structure.name}': mass",
+        got=f"{mass:g} kg",
+        expected=f"more than {carried:g} kg, the mass that the modes of the body move",
+        hint=f"the body alone has {structure.mass:g} kg; leave the mass out to use that.",
+    )
     return mass
 
 

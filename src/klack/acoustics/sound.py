@@ -16,7 +16,7 @@ import scipy
 from numpy.typing import NDArray
 
 from klack.acoustics.spectrum import change_spectrum
-from klack.errors import InputError, refuse_if, require_positive
+from klack.errors import refuse_if, require_positive
 from klack.signals.sampled import TimeSeries
 
 __all__ = ["audio_band", "click_pressure", "minimum_phase_filter", "pressure_transfer"]
@@ -204,10 +204,10 @@ def _require_transfer(frequency: NDArray[np.float64], transfer: NDArray[np.float
         expected="ascending frequencies from 0 Hz",
         hint="sort both arrays by frequency.",
     )
-    if not np.all(transfer >= 0.0) or not np.any(transfer[frequency > 0.0] > 0.0):
-        raise InputError(
-            where,
-            got=f"a transfer from {transfer.min():g} to {transfer.max():g} W/N^2",
-            expected="zero or more, and somewhere above zero",
-            hint="a power is never negative; look for an empty set of surfaces.",
-        )
+    refuse_if(
+        not np.all(transfer >= 0.0) or not np.any(transfer[frequency > 0.0] > 0.0),
+        where,
+        got=f"a transfer from {transfer.min():g} to {transfer.max():g} W/N^2",
+        expected="zero or more, and somewhere above zero",
+        hint="a power is never negative; look for an empty set of surfaces.",
+    )

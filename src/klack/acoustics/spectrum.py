@@ -99,13 +99,13 @@ def impulse_spectrum(
             expected=f"ends below {_ENDS_AT_ZERO:g} of the peak",
             hint="record longer, or apply half_cosine_tail and report it.",
         )
-    if not resolution > 0.0:
-        raise InputError(
-            "impulse_spectrum: resolution",
-            got=f"{resolution:g} Hz",
-            expected="a value above 0 Hz",
-            hint="a tenth of the lowest band width is fine enough.",
-        )
+    refuse_if(
+        not resolution > 0.0,
+        "impulse_spectrum: resolution",
+        got=f"{resolution:g} Hz",
+        expected="a value above 0 Hz",
+        hint="a tenth of the lowest band width is fine enough.",
+    )
     n = scipy.fft.next_fast_len(
         max(values.size, int(np.ceil(1.0 / (resolution * series.step)))), real=True
     )

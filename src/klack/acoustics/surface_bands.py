@@ -24,7 +24,7 @@ from klack.acoustics.radiation import PLATE, Efficiency, surface_efficiency
 from klack.acoustics.spectrum import force_spectrum
 from klack.arrays import Vector
 from klack.bodies.reduction.structure import Structure
-from klack.errors import InputError, refuse_if, require_positive
+from klack.errors import refuse_if, require_positive
 from klack.signals.sampled import TimeSeries
 
 __all__ = [
@@ -340,11 +340,11 @@ def _edges(bands: Floats, forces: Mapping[str, TimeSeries]) -> Floats:
         expected="a lower and a higher edge above 0 Hz for each band",
         hint="numpy.column_stack(band_edges(band_numbers(17.0, 224e3))) gives third octaves.",
     )
-    if edges[-1, 1] > highest or np.any(np.diff(edges[:, 0]) <= 0.0):
-        raise InputError(
-            "bands",
-            got=f"edges up to {edges.max():g} Hz",
-            expected=f"ascending bands up to {highest:g} Hz, half the sampling rate",
-            hint="take fewer bands, or a force with a shorter step.",
-        )
+    refuse_if(
+        edges[-1, 1] > highest or np.any(np.diff(edges[:, 0]) <= 0.0),
+        "bands",
+        got=f"edges up to {edges.max():g} Hz",
+        expected=f"ascending bands up to {highest:g} Hz, half the sampling rate",
+        hint="take fewer bands, or a force with a shorter step.",
+    )
     return edges

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError
+from klack.errors import refuse_if
 
 __all__ = ["BodyEnergy", "EnergyLedger", "ImpactHistory"]
 
@@ -200,13 +200,13 @@ class ImpactHistory:
             ("velocity_a", n + 1),
             ("velocity_b", n + 1),
         ):
-            if getattr(self, name).shape != (size,):
-                raise InputError(
-                    f"ImpactHistory.{name}",
-                    got=f"shape {getattr(self, name).shape}",
-                    expected=f"({size},) for {n} intervals",
-                    hint="forces and gaps are per interval, velocities per end of interval.",
-                )
+            refuse_if(
+                getattr(self, name).shape != (size,),
+                f"ImpactHistory.{name}",
+                got=f"shape {getattr(self, name).shape}",
+                expected=f"({size},) for {n} intervals",
+                hint="forces and gaps are per interval, velocities per end of interval.",
+            )
 
     @property
     def time(self) -> NDArray:

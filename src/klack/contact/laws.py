@@ -17,7 +17,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from klack.contact.step_constants import LAW_HERTZ, LAW_LINEAR, LAW_TABLE
-from klack.errors import InputError, refuse_if, require_nonnegative, require_positive
+from klack.errors import refuse_if, require_nonnegative, require_positive
 
 __all__ = [
     "ContactLaw",
@@ -228,13 +228,13 @@ class HuntCrossley:
 
     def __post_init__(self) -> None:
         require_nonnegative("HuntCrossley.dissipation", self.dissipation, "-")
-        if isinstance(self.law, HuntCrossley):
-            raise InputError(
-                "HuntCrossley.law",
-                got="another HuntCrossley law",
-                expected="LinearLaw, HertzLaw or TableLaw",
-                hint="add the two dissipation factors instead.",
-            )
+        refuse_if(
+            isinstance(self.law, HuntCrossley),
+            "HuntCrossley.law",
+            got="another HuntCrossley law",
+            expected="LinearLaw, HertzLaw or TableLaw",
+            hint="add the two dissipation factors instead.",
+        )
 
     def force(self, indentation: ArrayLike) -> NDArray[np.float64]:
         """Elastic force [N] (zero rate) at an indentation [m]."""
@@ -321,13 +321,13 @@ def _with_origin(
     if d[0] != 0.0:
         d, f = np.concatenate(([0.0], d)), np.concatenate(([0.0], f))
     increasing = np.all(np.diff(d) > 0.0) and np.all(np.diff(f) > 0.0)
-    if d.size < 2 or f[0] != 0.0 or not increasing:
-        raise InputError(
-            "TableLaw",
-            got=f"points from ({d[0]:g} m, {f[0]:g} N) to ({d[-1]:g} m, {f[-1]:g} N)",
-            expected="indentation and force, both strictly increasing from (0, 0)",
-            hint="sort the points, remove repeated ones, and start at first touch.",
-        )
+    refuse_if(
+        d.size < 2 or f[0] != 0.0 or not increasing,
+        "TableLaw",
+        got=f"points from ({d[0]:g} m, {f[0]:g} N) to ({d[-1]:g} m, {f[-1]:g} N)",
+        expected="indentation and force, both strictly increasing from (0, 0)",
+        hint="sort the points, remove repeated ones, and start at first touch.",
+    )
     return d, f
 
 

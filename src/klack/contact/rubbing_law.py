@@ -37,7 +37,7 @@ from numpy.typing import ArrayLike
 from klack.arrays import Vector
 from klack.contact.laws import FlatLaw
 from klack.contact.step_constants import LAW_RUBBING
-from klack.errors import InputError, refuse_if, require_positive
+from klack.errors import refuse_if, require_positive
 
 __all__ = ["RubbingLaw"]
 
@@ -77,15 +77,15 @@ class RubbingLaw:
         require_positive("law with friction: ratio", self.ratio, "-")
         sizes = {self.onset.size, self.normal.size, self.strength.size}
         rising = self.onset.size > 0 and self.onset[0] >= 0.0 and np.all(np.diff(self.onset) > 0)
-        if len(sizes) != 1 or not rising or not np.all(self.strength >= 0.0):
-            raise InputError(
-                "law with friction",
-                got=f"{sorted(sizes)} springs, the first from {self.onset[:1]} m, with strengths "
-                f"from {self.strength.min(initial=0.0):g} N/m",
-                expected="one onset, stiffness and strength for each spring, onsets increasing "
-                "from 0 or more, strengths not below 0",
-                hint="sort the springs by their onset.",
-            )
+        refuse_if(
+            len(sizes) != 1 or not rising or not np.all(self.strength >= 0.0),
+            "law with friction",
+            got=f"{sorted(sizes)} springs, the first from {self.onset[:1]} m, with strengths "
+            f"from {self.strength.min(initial=0.0):g} N/m",
+            expected="one onset, stiffness and strength for each spring, onsets increasing "
+            "from 0 or more, strengths not below 0",
+            hint="sort the springs by their onset.",
+        )
         # straight between the onsets, so that the slopes tell
         refuse_if(
             not np.all(np.cumsum(self.normal - self.strength) > 0.0),

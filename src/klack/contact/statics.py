@@ -28,7 +28,7 @@ from klack.contact.asperity_layer import AsperityLayer, press
 from klack.contact.complementarity import ComplementaritySolver
 from klack.contact.face_friction import FaceFriction, with_still_directions
 from klack.contact.mortar import ContactSpace
-from klack.errors import ConvergenceError, InputError, require_positive
+from klack.errors import ConvergenceError, InputError, refuse_if, require_positive
 from klack.machine.cache.entry import Entry
 from klack.machine.cores import side_by_side
 from klack.machine.memory import require_memory
@@ -204,13 +204,13 @@ class StaticContact:
 
     def pattern_at(self, force: float) -> NDArray[np.float64]:
         """Pressure pattern at an axial force [N], shape (nc,), resultant 1 N."""
-        if not 0 < force <= self.max_force * (1 + 1e-9):
-            raise InputError(
-                "static contact: pattern_at",
-                got=f"a force of {force:g} N",
-                expected=f"above 0 N and at most {self.max_force:g} N, the end of the ladder",
-                hint="compute the static contact up to a higher force.",
-            )
+        refuse_if(
+            not 0 < force <= self.max_force * (1 + 1e-9),
+            "static contact: pattern_at",
+            got=f"a force of {force:g} N",
+            expected=f"above 0 N and at most {self.max_force:g} N, the end of the ladder",
+            hint="compute the static contact up to a higher force.",
+        )
         upper = int(np.clip(np.searchsorted(self.force, force), 1, max(len(self.force) - 1, 1)))
         lower = max(upper - 1, 0)
         upper = min(upper, len(self.force) - 1)

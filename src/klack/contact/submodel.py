@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from klack.bodies.elasticity.body import ElasticBody
 from klack.bodies.elasticity.statics import Flexibility
 from klack.contact.statics import StaticContact, contact_compliance, static_contact
-from klack.errors import InputError, refuse_if, require_positive
+from klack.errors import refuse_if, require_positive
 from klack.machine.cache.result_cache import ResultCache
 
 __all__ = ["LocalStiffness", "local_stiffness"]
@@ -87,13 +87,13 @@ def local_stiffness(
     fit_range = (low * static.max_force, high * static.max_force)
     # the ladder may end 1 % above the force that was asked for
     inside = (region.force >= fit_range[0]) & (region.force <= 1.011 * fit_range[1])
-    if np.count_nonzero(inside) < 3:
-        raise InputError(
-            "contact submodel: fit_share",
-            got=f"{np.count_nonzero(inside)} states of the ladder within the fit range",
-            expected="three or more",
-            hint="widen the range, or use a ladder with more states.",
-        )
+    refuse_if(
+        np.count_nonzero(inside) < 3,
+        "contact submodel: fit_share",
+        got=f"{np.count_nonzero(inside)} states of the ladder within the fit range",
+        expected="three or more",
+        hint="widen the range, or use a ladder with more states.",
+    )
     slope = np.polyfit(region.approach[inside], region.force[inside], 1)[0]
     return LocalStiffness(
         static=region,

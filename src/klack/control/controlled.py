@@ -11,7 +11,7 @@ from klack.control.memory import Memory, Remembering
 from klack.control.pid import PidController
 from klack.control.sensor import RunningSensor, Sensor
 from klack.control.state_machine import StateMachine
-from klack.input.problem import CaseProblem, nearest, one_of
+from klack.input.problem import CaseProblem, nearest, one_of, refuse_key_if
 from klack.input.section import Name
 from klack.network.component import Component
 from klack.network.rows import ControllerRow, Rows
@@ -89,14 +89,14 @@ class Controlled(Component):
     ) -> None:
         """Add the controller of ``handle``: a node, or the number of an element."""
         law, function = self.controller, self._function
-        if (law is None) == (function is None):
-            raise CaseProblem(
-                ("components", rows.component, "controller"),
-                got="no controller" if law is None else "a law and a function",
-                expected="one of: pid, hysteresis, state-machine; or a function in Python",
-                hint="add 'controller: {kind: pid, ...}', or use .by(function) in Python; an FMU: "
-                f"--controller {rows.component}=FILE.fmu.",
-            )
+        refuse_key_if(
+            (law is None) == (function is None),
+            ("components", rows.component, "controller"),
+            got="no controller" if law is None else "a law and a function",
+            expected="one of: pid, hysteresis, state-machine; or a function in Python",
+            hint="add 'controller: {kind: pid, ...}', or use .by(function) in Python; an FMU: "
+            f"--controller {rows.component}=FILE.fmu.",
+        )
 
         def begin() -> _Running:
             made = function if law is None else law

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from klack.control.memory import Memory, remembered
-from klack.input.problem import CaseProblem, nearest, refuse_key_if
+from klack.input.problem import nearest, refuse_key_if
 from klack.input.section import Name, Number, Section
 from klack.units import Time
 
@@ -32,14 +32,14 @@ class Transition(Section):
     @model_validator(mode="after")
     def _one_condition(self) -> Self:
         given = [self.above is not None, self.below is not None, self.after is not None]
-        if sum(given) != 1 or (self.sensor is None) != (self.after is not None):
-            raise CaseProblem(
-                ("to",),
-                got=f"{sum(given)} conditions"
-                + (" and no sensor" if self.sensor is None else f" and the sensor {self.sensor}"),
-                expected="'sensor' with 'above' or 'below', or only 'after'",
-                hint="write a transition for each condition; the first that holds is taken.",
-            )
+        refuse_key_if(
+            sum(given) != 1 or (self.sensor is None) != (self.after is not None),
+            ("to",),
+            got=f"{sum(given)} conditions"
+            + (" and no sensor" if self.sensor is None else f" and the sensor {self.sensor}"),
+            expected="'sensor' with 'above' or 'below', or only 'after'",
+            hint="write a transition for each condition; the first that holds is taken.",
+        )
         return self
 
 
@@ -71,13 +71,13 @@ class StateMachine(Section):
         )
         for i, state in enumerate(self.states):
             for j, way in enumerate(state.transitions):
-                if way.to not in names or way.to == state.name:
-                    raise CaseProblem(
-                        ("states", i, "transitions", j, "to"),
-                        got=f"'{way.to}'",
-                        expected=f"another state: {', '.join(n for n in names if n != state.name)}",
-                        hint=nearest(way.to, names, "add the state."),
-                    )
+                refuse_key_if(
+                    way.to not in names or way.to == state.name,
+                    ("states", i, "transitions", j, "to"),
+                    got=f"'{way.to}'",
+                    expected=f"another state: {', '.join(n for n in names if n != state.name)}",
+                    hint=nearest(way.to, names, "add the state."),
+                )
         return self
 
     def used(self) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ from klack.hydraulics.fluid_library import FLUIDS, find_fluid, library_fluid
 from klack.hydraulics.liquid import ATMOSPHERE, Murnaghan, TabulatedLiquid
 from klack.hydraulics.pressure_viscosity import PressureViscosity
 from klack.hydraulics.property_table import PropertyTable, read_property_table
-from klack.input.problem import CaseProblem, nearest, one_of
+from klack.input.problem import CaseProblem, nearest, one_of, refuse_key_if
 from klack.input.section import InputPath, NamedSection, Section, Text
 from klack.units import (
     Density,
@@ -167,21 +167,21 @@ class FluidChoice(NamedSection):
     @model_validator(mode="after")
     def _complete(self) -> Self:
         low, high = self.release_pressure, self.saturation_pressure
-        if (low is None) != (high is None) or (low and high and low >= high):
-            raise CaseProblem(
-                ("saturation_pressure",),
-                got="only one of the two" if low is None or high is None else "not above it",
-                expected="release_pressure below saturation_pressure, or none of them",
-                hint="leave both out: in strokes of milliseconds the gas stays free.",
-            )
+        refuse_key_if(
+            (low is None) != (high is None) or (low and high and low >= high),
+            ("saturation_pressure",),
+            got="only one of the two" if low is None or high is None else "not above it",
+            expected="release_pressure below saturation_pressure, or none of them",
+            hint="leave both out: in strokes of milliseconds the gas stays free.",
+        )
         times = self.release_time, self.absorption_time
-        if times != (None, None) and (None in times or low is None):
-            raise CaseProblem(
-                ("release_time",) if times[0] is not None else ("absorption_time",),
-                got="only one of the two times" if None in times else "no release_pressure",
-                expected="release_time, absorption_time, release_pressure, saturation_pressure",
-                hint="add what is missing, or leave both times out.",
-            )
+        refuse_key_if(
+            times != (None, None) and (None in times or low is None),
+            ("release_time",) if times[0] is not None else ("absorption_time",),
+            got="only one of the two times" if None in times else "no release_pressure",
+            expected="release_time, absorption_time, release_pressure, saturation_pressure",
+            hint="add what is missing, or leave both times out.",
+        )
         if not any(getattr(self, name) is not None for name in _NUMBERS):
             return self._in_library()
         if find_fluid(self.name) is not None or is_coolprop_name(self.name):

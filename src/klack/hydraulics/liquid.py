@@ -7,7 +7,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from klack.errors import InputError, refuse_if, require_nonnegative, require_positive
+from klack.errors import refuse_if, require_nonnegative, require_positive
 
 __all__ = [
     "ATMOSPHERE",
@@ -296,14 +296,13 @@ def _require_rising(p: Values, rho: Values) -> None:
         expected="an equal number of both, at least two",
         hint="give one density per pressure.",
     )
-    if not (np.all(np.diff(p) > 0.0) and np.all(np.diff(rho) > 0.0) and rho[0] > 0 and p[0] > 0):
-        raise InputError(
-            "TabulatedLiquid",
-            got=f"points from ({p[0]:g} Pa, {rho[0]:g} kg/m^3) to ({p[-1]:g} Pa, {rho[-1]:g} "
-            "kg/m^3)",
-            expected="absolute pressures and densities above 0, both strictly increasing",
-            hint="sort the points, remove repeated ones, and state densities with more digits.",
-        )
+    refuse_if(
+        not (np.all(np.diff(p) > 0.0) and np.all(np.diff(rho) > 0.0) and rho[0] > 0 and p[0] > 0),
+        "TabulatedLiquid",
+        got=f"points from ({p[0]:g} Pa, {rho[0]:g} kg/m^3) to ({p[-1]:g} Pa, {rho[-1]:g} kg/m^3)",
+        expected="absolute pressures and densities above 0, both strictly increasing",
+        hint="sort the points, remove repeated ones, and state densities with more digits.",
+    )
 
 
 def walther_viscosity(temperature: ArrayLike, a: float, b: float) -> Values:

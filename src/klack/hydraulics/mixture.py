@@ -80,15 +80,14 @@ class EntrainedGas:
             hint="use 1.4 for air in fast strokes.",
         )
         low, high = self.release_pressure, self.saturation_pressure
-        if (low is None) != (high is None) or (
-            low is not None and high is not None and not LOWEST_PRESSURE < low < high
-        ):
-            raise InputError(
-                "EntrainedGas.saturation_pressure",
-                got=f"release at {low} Pa and saturation at {high} Pa",
-                expected="both or none, release below saturation",
-                hint="leave both out for strokes of milliseconds: the gas stays free.",
-            )
+        refuse_if(
+            (low is None) != (high is None)
+            or (low is not None and high is not None and not LOWEST_PRESSURE < low < high),
+            "EntrainedGas.saturation_pressure",
+            got=f"release at {low} Pa and saturation at {high} Pa",
+            expected="both or none, release below saturation",
+            hint="leave both out for strokes of milliseconds: the gas stays free.",
+        )
         times = self.release_time, self.absorption_time
         if times == (None, None):
             return

@@ -237,13 +237,13 @@ def read_property_table(path: Path) -> PropertyTable:
     )
     columns = {name: v[order].reshape(T.size, p.size) for name, v in value.items()}
     for name, column in columns.items():
-        if not np.all(column > 0.0):
-            raise InputError(
-                where,
-                got=f"a {name} of {column.min():g} {_COLUMNS[name].unit}",
-                expected="values above 0; pressures are absolute",
-                hint="check the column and its unit.",
-            )
+        refuse_if(
+            not np.all(column > 0.0),
+            where,
+            got=f"a {name} of {column.min():g} {_COLUMNS[name].unit}",
+            expected="values above 0; pressures are absolute",
+            hint="check the column and its unit.",
+        )
     boiling = columns.get("vapour pressure")
     refuse_if(
         boiling is not None and np.any(np.ptp(boiling, axis=1) > 1e-3 * boiling[:, 0]),
@@ -354,13 +354,13 @@ def _head(where: str, cells: list[str]) -> tuple[list[str], list[tuple[float, fl
     for cell in cells:
         name, _, unit = (part.strip(" ]\t\"'") for part in cell.partition("["))
         name = " ".join(name.lower().replace("_", " ").split())
-        if name not in _COLUMNS or name in names:
-            raise InputError(
-                where,
-                got=f"the column '{cell.strip()}'" + (" twice" if name in names else ""),
-                expected=f"each of: {', '.join(f'{c} [unit]' for c in _COLUMNS)}",
-                hint=f"required are {', '.join(_REQUIRED)}; remove or rename others.",
-            )
+        refuse_if(
+            name not in _COLUMNS or name in names,
+            where,
+            got=f"the column '{cell.strip()}'" + (" twice" if name in names else ""),
+            expected=f"each of: {', '.join(f'{c} [unit]' for c in _COLUMNS)}",
+            hint=f"required are {', '.join(_REQUIRED)}; remove or rename others.",
+        )
         names.append(name)
         if name == "temperature" and unit in _CELSIUS:
             factors.append((_ZERO_CELSIUS, 1.0))
@@ -388,11 +388,11 @@ def _numbers(where: str, cells: list[str], names: list[str]) -> list[float]:
         row = [float(cell) for cell in cells]
     except ValueError:
         row = []
-    if len(row) != len(names) or not np.all(np.isfinite(row)):
-        raise InputError(
-            where,
-            got=f"'{','.join(cells)[:60]}'",
-            expected=f"{len(names)} finite numbers, one per column of the header",
-            hint="use a decimal point; begin comments with #.",
-        )
+    refuse_if(
+        len(row) != len(names) or not np.all(np.isfinite(row)),
+        where,
+        got=f"'{','.join(cells)[:60]}'",
+        expected=f"{len(names)} finite numbers, one per column of the header",
+        hint="use a decimal point; begin comments with #.",
+    )
     return row

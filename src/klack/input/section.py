@@ -118,33 +118,33 @@ class Section(BaseModel):
                     on_key=True,
                 )
             own = known[key]  # a key whose default is another value says with null that it is off
-            if value[key] is None and own.get_default() is None and info.context is not None:
-                raise CaseProblem(
-                    (key,),
-                    got="nothing",
-                    expected=f"{key}: {(own.description or '').rstrip('.')}",
-                    hint=f"write its value, or remove '{key}'.",
-                )
+            refuse_key_if(
+                value[key] is None and own.get_default() is None and info.context is not None,
+                (key,),
+                got="nothing",
+                expected=f"{key}: {(own.description or '').rstrip('.')}",
+                hint=f"write its value, or remove '{key}'.",
+            )
         for key, field in known.items():
-            if field.is_required() and key not in value:
-                raise CaseProblem(
-                    (),
-                    got=f"no key '{key}'",
-                    expected=f"{key}: {(field.description or '').rstrip('.')}",
-                    hint=f"add '{key}' here; klack schema describes every key.",
-                )
+            refuse_key_if(
+                field.is_required() and key not in value,
+                (),
+                got=f"no key '{key}'",
+                expected=f"{key}: {(field.description or '').rstrip('.')}",
+                hint=f"add '{key}' here; klack schema describes every key.",
+            )
         return value
 
     def _exactly_one(self, names: tuple[str, ...], what: str) -> str:
         """The only key among ``names`` that is given; raise if none or several are."""
         given = [name for name in names if getattr(self, name) is not None]
-        if len(given) != 1:
-            raise CaseProblem(
-                (),
-                got=f"{' and '.join(given)} together" if given else "none of them",
-                expected=f"exactly one of {one_of(names)} ({what})",
-                hint=f"keep one of {one_of(given)}." if given else f"add one, e.g. {names[0]}.",
-            )
+        refuse_key_if(
+            len(given) != 1,
+            (),
+            got=f"{' and '.join(given)} together" if given else "none of them",
+            expected=f"exactly one of {one_of(names)} ({what})",
+            hint=f"keep one of {one_of(given)}." if given else f"add one, e.g. {names[0]}.",
+        )
         return given[0]
 
     def _refuse_with(self, names: tuple[str, ...], chosen: str, why: str) -> Self:

@@ -21,7 +21,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError, refuse_if, require_nonnegative
+from klack.errors import refuse_if, require_nonnegative
 from klack.magnetics.hysteresis import IronStops
 from klack.magnetics.reluctance import GapReluctance, LinearReluctance, ReluctanceLaw
 
@@ -102,13 +102,13 @@ class MagneticCircuit:
             expected=f"one row per branch and 1 to {MOST_LOOPS} columns",
             hint="write +1 or -1 where a loop passes through a branch, else 0.",
         )
-        if np.any(np.abs(loops) > 1) or np.linalg.matrix_rank(loops) < columns:
-            raise InputError(
-                "MagneticCircuit.loops",
-                got=f"{loops.tolist()}",
-                expected="independent columns of 0, +1 and -1",
-                hint="drop the loop that is a sum of others.",
-            )
+        refuse_if(
+            np.any(np.abs(loops) > 1) or np.linalg.matrix_rank(loops) < columns,
+            "MagneticCircuit.loops",
+            got=f"{loops.tolist()}",
+            expected="independent columns of 0, +1 and -1",
+            hint="drop the loop that is a sum of others.",
+        )
         names = [branch.name for branch in self.branches]
         refuse_if(
             self.main not in names or len(set(names)) < len(names),

@@ -60,13 +60,13 @@ class DriveProfile(DiodeDriver):
 
     @model_validator(mode="after")
     def _one_course(self) -> Self:
-        if (self.current is None) == (self.voltage is None):
-            raise CaseProblem(
-                (),
-                got="neither current nor voltage" if self.current is None else "both",
-                expected="a current over time, or a voltage over time",
-                hint="current: [0 A, 10 A, 10 A, 0 A] with supply_voltage: 65 V.",
-            )
+        refuse_key_if(
+            (self.current is None) == (self.voltage is None),
+            (),
+            got="neither current nor voltage" if self.current is None else "both",
+            expected="a current over time, or a voltage over time",
+            hint="current: [0 A, 10 A, 10 A, 0 A] with supply_voltage: 65 V.",
+        )
         values = self.current if self.current is not None else self.voltage or ()
         refuse_key_if(
             len(values) != len(self.time),

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, model_validator
 
-from klack.errors import InputError, refuse_if
+from klack.errors import refuse_if
 from klack.input.problem import CaseProblem
 from klack.magnetics.output_stage import OutputStage
 from klack.network.component import Component
@@ -195,13 +195,13 @@ class DriveProgram:
 
 def _check(state: DriveState, switch: Switch, names: Sequence[str]) -> None:
     where = f"DriveState '{state.name}'"
-    if state.target is not None and isinstance(state.voltage, DriveCourse):
-        raise InputError(
-            where,
-            got="a voltage over time and a target current",
-            expected="a constant voltage with a target",
-            hint="the switches of the state follow the target.",
-        )
+    refuse_if(
+        state.target is not None and isinstance(state.voltage, DriveCourse),
+        where,
+        got="a voltage over time and a target current",
+        expected="a constant voltage with a target",
+        hint="the switches of the state follow the target.",
+    )
     refuse_if(
         switch.to not in names or (switch.to == state.name and not switch.new_cycle),
         where,

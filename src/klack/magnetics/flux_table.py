@@ -18,7 +18,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError, refuse_if
+from klack.errors import refuse_if
 from klack.magnetics.circuit import MagneticBranch, MagneticCircuit
 from klack.magnetics.hysteresis import STOPS_PER_PART, IronStops
 from klack.magnetics.reluctance import GapReluctance, IronReluctance, LinearReluctance
@@ -134,13 +134,13 @@ def circuit_numbers(circuit: MagneticCircuit) -> Vector:
         hint="put branches that carry the same flux in series in one loop.",
     )
     stops = sum(part.share.size for tube in tubes for part in tube.stops)
-    if stops > MOST_STOPS:
-        raise InputError(
-            "magnetic circuit: hysteresis",
-            got=f"{sum(len(tube.stops) for tube in tubes)} parts of iron with hysteresis",
-            expected=f"at most {MOST_STOPS // STOPS_PER_PART}",
-            hint="join parts of one material, or give hysteresis to the largest parts only.",
-        )
+    refuse_if(
+        stops > MOST_STOPS,
+        "magnetic circuit: hysteresis",
+        got=f"{sum(len(tube.stops) for tube in tubes)} parts of iron with hysteresis",
+        expected=f"at most {MOST_STOPS // STOPS_PER_PART}",
+        hint="join parts of one material, or give hysteresis to the largest parts only.",
+    )
     loops = circuit.loops.shape[1]
     head = np.zeros(HEADER)
     linear = all(tube.iron.size == 0 for tube in tubes)

@@ -257,26 +257,26 @@ def _branch(
         hint="use only one branch; smooth its noise and remove repeated points.",
     )
     uneven = max(abs(B[0] + B[-1]) / B[-1], abs(H[0] + H[-1]) / H[-1]) if B[-1] > 0 else np.inf
-    if uneven > _UNEVEN:
-        raise InputError(
-            where,
-            got=f"tips at ({B[-1]:g} T, {H[-1]:g} A/m) and ({B[0]:g} T, {H[0]:g} A/m)",
-            expected="opposite tips, within 1 %",
-            hint="remove the offset of the integrator, and give the branch from tip to tip.",
-        )
+    refuse_if(
+        uneven > _UNEVEN,
+        where,
+        got=f"tips at ({B[-1]:g} T, {H[-1]:g} A/m) and ({B[0]:g} T, {H[0]:g} A/m)",
+        expected="opposite tips, within 1 %",
+        hint="remove the offset of the integrator, and give the branch from tip to tip.",
+    )
     tip, field = 0.5 * (B[-1] - B[0]), 0.5 * (H[-1] - H[0])
     B = B - 0.5 * (B[0] + B[-1])
     H[0], H[-1] = -field, field
     branch: scipy.interpolate.PPoly = scipy.interpolate.PchipInterpolator(B, H)
     inner = np.linspace(0.0, tip, 8 * _INTERVALS + 1)[:-1]
     least = float(np.min(-(branch(inner) + branch(-inner))))
-    if not least > 2.0 * _CROSSED * float(branch(0.0)):
-        raise InputError(
-            where,
-            got=f"a field strength of {float(branch(0.0)):.4g} A/m at 0 T",
-            expected="the falling branch: the flux density is zero at minus the coercivity",
-            hint="give the branch through (0 A/m, +B_r); mirror a rising branch about the origin.",
-        )
+    refuse_if(
+        not least > 2.0 * _CROSSED * float(branch(0.0)),
+        where,
+        got=f"a field strength of {float(branch(0.0)):.4g} A/m at 0 T",
+        expected="the falling branch: the flux density is zero at minus the coercivity",
+        hint="give the branch through (0 A/m, +B_r); mirror a rising branch about the origin.",
+    )
     return branch, tip
 
 

@@ -28,7 +28,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from klack.errors import InputError, refuse_if, require_positive
+from klack.errors import refuse_if, require_positive
 from klack.magnetics.reluctance import IronReluctance
 from klack.magnetics.tabulation import hermite_grid
 
@@ -169,13 +169,13 @@ def brauer(k1: float, k2: float, k3: float) -> IronCurve:
     """
     for name, value in (("k1", k1), ("k2", k2)):
         require_positive(f"brauer: {name}", value, "m/H" if name == "k1" else "1/T^2")
-    if not 0.0 < k1 + k3 < 1.0 / _MU0:
-        raise InputError(
-            "brauer: k1 + k3",
-            got=f"{k1 + k3:g} m/H",
-            expected=f"a value between 0 and 1/mu0 = {1.0 / _MU0:.6g} m/H",
-            hint="k1 + k3 is the initial slope 1/(mu0 mu_r); check the units (SI).",
-        )
+    refuse_if(
+        not 0.0 < k1 + k3 < 1.0 / _MU0,
+        "brauer: k1 + k3",
+        got=f"{k1 + k3:g} m/H",
+        expected=f"a value between 0 and 1/mu0 = {1.0 / _MU0:.6g} m/H",
+        hint="k1 + k3 is the initial slope 1/(mu0 mu_r); check the units (SI).",
+    )
 
     def curve(B: Vector) -> tuple[Vector, Vector]:
         E = k1 * np.exp(np.minimum(k2 * B * B, 200.0))
@@ -233,13 +233,13 @@ def measured(flux_density: ArrayLike, field_strength: ArrayLike) -> IronCurve:
     if B[0] != 0.0:
         B, H = np.concatenate(([0.0], B)), np.concatenate(([0.0], H))
     rising = np.all(np.diff(B) > 0.0) and np.all(np.diff(H) > 0.0)
-    if B.size < 2 or H[0] != 0.0 or not rising:
-        raise InputError(
-            "measured magnetisation curve",
-            got=f"points from ({B[0]:g} T, {H[0]:g} A/m) to ({B[-1]:g} T, {H[-1]:g} A/m)",
-            expected="flux density and field strength, both increasing from (0, 0)",
-            hint="use the initial magnetisation curve, sorted; remove repeated points.",
-        )
+    refuse_if(
+        B.size < 2 or H[0] != 0.0 or not rising,
+        "measured magnetisation curve",
+        got=f"points from ({B[0]:g} T, {H[0]:g} A/m) to ({B[-1]:g} T, {H[-1]:g} A/m)",
+        expected="flux density and field strength, both increasing from (0, 0)",
+        hint="use the initial magnetisation curve, sorted; remove repeated points.",
+    )
     slope = (
         scipy.interpolate.PchipInterpolator(B, H)(B, 1) if B.size > 2 else np.full(2, H[1] / B[1])
     )

@@ -130,14 +130,14 @@ class MapFile(Section):
         force = None
         if self.force_file is not None:
             i, x, force = read_matrix(self.force_file, "force", units)
-            if not (_same(i, current) and _same(x, gap)):
-                raise InputError(
-                    f"force map '{self.force_file.name}'",
-                    got=f"{i.size} currents and {x.size} gaps",
-                    expected=f"the {current.size} currents and {gap.size} gaps of "
-                    f"'{Path(self.file).name}'",
-                    hint="export both over the same points.",
-                )
+            refuse_if(
+                not (_same(i, current) and _same(x, gap)),
+                f"force map '{self.force_file.name}'",
+                got=f"{i.size} currents and {x.size} gaps",
+                expected=f"the {current.size} currents and {gap.size} gaps of "
+                f"'{Path(self.file).name}'",
+                hint="export both over the same points.",
+            )
         return MapTable(current=current, gap=gap, linkage=linkage, force=force)
 
 
@@ -189,12 +189,12 @@ def _require_coil(where: str, table: MapTable) -> None:
             if turned
             else "correct that point.",
         )
-    if np.all(np.diff(psi[-1]) > 0.0):
-        raise InputError(
-            where,
-            got=f"a linkage that rises from {format_si(psi[-1, 0], 'Wb')} to "
-            f"{format_si(psi[-1, -1], 'Wb')} as the gap opens from {format_si(x[0], 'm')} to "
-            f"{format_si(x[-1], 'm')}",
-            expected="a linkage that falls: iron is attracted",
-            hint="if the column is a position that grows while the gap closes, give closed_at.",
-        )
+    refuse_if(
+        np.all(np.diff(psi[-1]) > 0.0),
+        where,
+        got=f"a linkage that rises from {format_si(psi[-1, 0], 'Wb')} to "
+        f"{format_si(psi[-1, -1], 'Wb')} as the gap opens from {format_si(x[0], 'm')} to "
+        f"{format_si(x[-1], 'm')}",
+        expected="a linkage that falls: iron is attracted",
+        hint="if the column is a position that grows while the gap closes, give closed_at.",
+    )

@@ -290,13 +290,13 @@ def _families(cells: CellTable, found: Mapping[int, _Column]) -> dict[str, Vecto
     (first, at), (other,) = next(iter(own.items())), names
     for place in places:
         for quantity in values:
-            if (place, quantity) not in varied:
-                raise InputError(
-                    cells.where,
-                    got=f"no {quantity} at {other} = {format_si(place[1], _UNITS[other])}",
-                    expected=f"a column of it, as of {' and '.join(values)} elsewhere",
-                    hint="export both for the same values.",
-                )
+            refuse_if(
+                (place, quantity) not in varied,
+                cells.where,
+                got=f"no {quantity} at {other} = {format_si(place[1], _UNITS[other])}",
+                expected=f"a column of it, as of {' and '.join(values)} elsewhere",
+                hint="export both for the same values.",
+            )
     for row in cells.rows:
         for place in places:
             points[first].append(found[at].factor * _value(cells, row, at))

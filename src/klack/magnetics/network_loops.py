@@ -45,15 +45,15 @@ def circuit_of_network(tubes: Sequence[Tube], main: str, gap: float) -> Magnetic
         For loose nodes, parts that are not joined, loops without reluctance, too many loops.
     """
     tree, chords = _spanning_tree(tubes)
-    if not 1 <= len(chords) <= MOST_LOOPS:
-        raise InputError(
-            "magnetic network",
-            got=f"{len(chords)} independent loops"
-            + (f": {', '.join(tubes[k].branch.name for k in chords)}" if chords else ""),
-            expected=f"1 to {MOST_LOOPS}",
-            hint="join parallel elements or leave out small leakages; an eddy ladder of n terms "
-            "counts as n - 1 loops.",
-        )
+    refuse_if(
+        not 1 <= len(chords) <= MOST_LOOPS,
+        "magnetic network",
+        got=f"{len(chords)} independent loops"
+        + (f": {', '.join(tubes[k].branch.name for k in chords)}" if chords else ""),
+        expected=f"1 to {MOST_LOOPS}",
+        hint="join parallel elements or leave out small leakages; an eddy ladder of n terms "
+        "counts as n - 1 loops.",
+    )
     loops = np.zeros((len(tubes), len(chords)), dtype=np.int64)
     for column, k in enumerate(chords):
         loops[k, column] = 1

@@ -101,13 +101,13 @@ class PoleGap(Section):
         for name in ("shoulder", "wall"):
             if name != key:
                 self._refuse_with((name,), f"fringing: {self.fringing}", "it is not used there")
-        if key is not None and getattr(self, key) is None:
-            raise CaseProblem(
-                (),
-                got=f"fringing: {self.fringing} without {key}",
-                expected=f"a length '{key}'",
-                hint=f"add {key}, or choose fringing: none.",
-            )
+        refuse_key_if(
+            key is not None and getattr(self, key) is None,
+            (),
+            got=f"fringing: {self.fringing} without {key}",
+            expected=f"a length '{key}'",
+            hint=f"add {key}, or choose fringing: none.",
+        )
         return self
 
     @property

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from klack.errors import InputError, refuse_if, require_positive
+from klack.errors import refuse_if, require_positive
 
 __all__ = [
     "HARDNESS_SPREAD",
@@ -42,13 +42,13 @@ class Hardening:
     def __post_init__(self) -> None:
         require_positive("yield stress", self.yield_stress, "Pa")
         for name in ("isotropic", "kinematic"):
-            if not getattr(self, name) >= 0.0:
-                raise InputError(
-                    f"{name} hardening",
-                    got=f"{getattr(self, name):g} Pa",
-                    expected="0 Pa or more",
-                    hint="a metal that softens has no unique answer; 0 is perfectly plastic.",
-                )
+            refuse_if(
+                not getattr(self, name) >= 0.0,
+                f"{name} hardening",
+                got=f"{getattr(self, name):g} Pa",
+                expected="0 Pa or more",
+                hint="a metal that softens has no unique answer; 0 is perfectly plastic.",
+            )
 
     @property
     def slope(self) -> float:

@@ -27,7 +27,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from klack.errors import InputError, require_positive
+from klack.errors import InputError, refuse_if, require_positive
 from klack.measurement.time_base import uniform_step
 
 __all__ = ["VelocityEstimate", "differentiator_gain", "noise_floor", "velocity_of"]
@@ -144,13 +144,13 @@ def noise_floor(records: NDArray[np.float64], step: float) -> tuple[NDArray[np.f
     """
     second = np.diff(records, 2, axis=-1)
     n = second.shape[-1]
-    if n < 8:
-        raise InputError(
-            "velocity_of: lift",
-            got=f"{records.shape[-1]} samples",
-            expected="at least 10",
-            hint="a stroke needs a few hundred samples.",
-        )
+    refuse_if(
+        n < 8,
+        "velocity_of: lift",
+        got=f"{records.shape[-1]} samples",
+        expected="at least 10",
+        hint="a stroke needs a few hundred samples.",
+    )
     taper = np.hanning(n + 2)[1:-1]
     lines = np.fft.rfft(second * taper, axis=-1)[:, 1 : n // 2 + 1]
     angle = 2.0 * pi * np.arange(1, n // 2 + 1) / n
@@ -195,13 +195,13 @@ def _half_window(bandwidth: float, samples: int, step: float) -> int:
             expected=f"at most {_lost_3_dB(5, step):.3g} Hz: the narrowest window",
             hint="request less bandwidth, or sample faster.",
         )
-    if 2 * guess + 1 > samples:
-        raise InputError(
-            "velocity bandwidth",
-            got=f"{bandwidth:g} Hz for {samples} samples of {step:g} s",
-            expected=f"a record of {2 * guess + 1} samples or more",
-            hint="request more bandwidth, or keep more time around the stroke.",
-        )
+    refuse_if(
+        2 * guess + 1 > samples,
+        "velocity bandwidth",
+        got=f"{bandwidth:g} Hz for {samples} samples of {step:g} s",
+        expected=f"a record of {2 * guess + 1} samples or more",
+        hint="request more bandwidth, or keep more time around the stroke.",
+    )
     return guess
 
 

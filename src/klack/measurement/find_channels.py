@@ -9,7 +9,7 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.measurement.channels import ROLES, ChannelChoice, Role
 from klack.measurement.recording import ChannelInfo, Recording, some_names
 from klack.measurement.unit_text import no_unit, roles_of_unit, unit_factor
@@ -116,13 +116,13 @@ def _matching(recording: Recording, role: Role, choice: ChannelChoice) -> list[C
         for info in recording.channels
         if matches(choice.name, info.label) or matches(choice.name, _last_part(info.name))
     ]
-    if not found:
-        raise InputError(
-            f"{recording.path.name}: measurement.channels.{role}",
-            got=f"no channel '{choice.name}'",
-            expected=f"one of: {some_names(recording.channels)}",
-            hint="correct the name; * and ? are wildcards.",
-        )
+    refuse_if(
+        not found,
+        f"{recording.path.name}: measurement.channels.{role}",
+        got=f"no channel '{choice.name}'",
+        expected=f"one of: {some_names(recording.channels)}",
+        hint="correct the name; * and ? are wildcards.",
+    )
     numbered = {re.sub(r" #\d+$", "", info.name) for info in found} == {choice.name}
     if len(found) > 1 and not (numbered or re.search(r"[*?]", choice.name)):
         raise _ambiguous(recording, role, found)

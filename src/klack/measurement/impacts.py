@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.measurement.channels import LiftSensor
 from klack.measurement.flight import Crossing, Flight, correlation_factor, fit_flight
 from klack.measurement.flight_train import FlightTrain, join_flights
@@ -162,15 +162,15 @@ def _prepare(
 ) -> tuple[_Record, tuple[str, ...]]:
     step = uniform_step(time, "measure_stroke: time")
     shown = np.asarray(lift, dtype=np.float64)
-    if shown.shape != time.shape or not np.all(np.isfinite(shown)) or np.ptp(shown) == 0.0:
-        raise InputError(
-            "measure_stroke: lift",
-            got=f"{shown.shape} values, {int(np.sum(~np.isfinite(shown)))} of them missing"
-            if shown.size and np.ptp(shown) != 0.0
-            else "a lift that never changes",
-            expected=f"{time.size} finite values that move",
-            hint="check the channel, and cut the record to one stroke.",
-        )
+    refuse_if(
+        shown.shape != time.shape or not np.all(np.isfinite(shown)) or np.ptp(shown) == 0.0,
+        "measure_stroke: lift",
+        got=f"{shown.shape} values, {int(np.sum(~np.isfinite(shown)))} of them missing"
+        if shown.size and np.ptp(shown) != 0.0
+        else "a lift that never changes",
+        expected=f"{time.size} finite values that move",
+        hint="check the channel, and cut the record to one stroke.",
+    )
     used = LiftSensor() if sensor is None else sensor
     true = (shown - used.offset) / used.sensitivity
     smooth = smooth_lift(time, true)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import AccuracyWarning, InputError, refuse_if
+from klack.errors import AccuracyWarning, refuse_if
 from klack.measurement.channels import ROLES, Role
 from klack.measurement.find_channels import FoundChannel
 from klack.measurement.recording import Recording
@@ -58,14 +58,14 @@ def common_time(recording: Recording, found: Mapping[Role, FoundChannel]) -> Com
     skipped = max(int(np.ceil((begin - fastest.start - slack) / fastest.step)), 0)
     start = fastest.start + skipped * fastest.step
     count = int(np.floor((end - start + slack) / fastest.step)) + 1
-    if count < 2:
-        raise InputError(
-            f"{recording.path.name}: channels",
-            got="no common time of "
-            + ", ".join(f"{name} ({b.start:.6g} to {b.end:.6g} s)" for name, b in bases.items()),
-            expected="channels that were recorded at the same time",
-            hint="choose channels of one measurement in the section 'measurement' of the case.",
-        )
+    refuse_if(
+        count < 2,
+        f"{recording.path.name}: channels",
+        got="no common time of "
+        + ", ".join(f"{name} ({b.start:.6g} to {b.end:.6g} s)" for name, b in bases.items()),
+        expected="channels that were recorded at the same time",
+        hint="choose channels of one measurement in the section 'measurement' of the case.",
+    )
     notes = [*recording.notes, *(channel.note for channel in found.values())]
     notes += _started(recording, found)
     for name, base in bases.items():
@@ -101,13 +101,13 @@ def read_channels(
     clock = common_time(recording, found)
     last = clock.count if last is None else min(last, clock.count)
     first = max(first, 0)
-    if last <= first:
-        raise InputError(
-            f"{recording.path.name}: read_channels",
-            got=f"samples {first} to {last} of {clock.count}",
-            expected="at least one sample",
-            hint="check the window.",
-        )
+    refuse_if(
+        last <= first,
+        f"{recording.path.name}: read_channels",
+        got=f"samples {first} to {last} of {clock.count}",
+        expected="at least one sample",
+        hint="check the window.",
+    )
     start = clock.start + clock.step * first
     bases = _bases(recording, found)
     return {
@@ -253,14 +253,14 @@ def _filled(recording: Recording, name: str, at: Vector, values: Vector, time: V
     edges = np.diff(np.concatenate(([0], missing.astype(np.int8), [0])))
     begins, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
     longest = int(np.argmax(ends - begins))
-    if ends[longest] - begins[longest] > _MOST_MISSING:
-        raise InputError(
-            f"{recording.path.name}: channel '{name}'",
-            got=f"{ends[longest] - begins[longest]} missing values in a row at "
-            f"{time[begins[longest]]:.6g} s",
-            expected="at most five",
-            hint="leave this part out of the file, or choose another channel.",
-        )
+    refuse_if(
+        ends[longest] - begins[longest] > _MOST_MISSING,
+        f"{recording.path.name}: channel '{name}'",
+        got=f"{ends[longest] - begins[longest]} missing values in a row at "
+        f"{time[begins[longest]]:.6g} s",
+        expected="at most five",
+        hint="leave this part out of the file, or choose another channel.",
+    )
     warnings.warn(
         f"{recording.path.name}: {np.count_nonzero(missing)} missing values of '{name}' were "
         f"filled by linear interpolation, the first at {time[begins[0]]:.6g} s.",

@@ -170,13 +170,13 @@ def uniform_step(time: NDArray[np.float64], where: str) -> float:
     """
     n = time.size
     step = float(time[-1] - time[0]) / (n - 1) if time.ndim == 1 and n > 1 else 0.0
-    if not step > 0.0:
-        raise InputError(
-            where,
-            got=f"{n} times from {time[0] if n else 0:g} s",
-            expected="at least two ascending times",
-            hint="check the time channel and its unit.",
-        )
+    refuse_if(
+        not step > 0.0,
+        where,
+        got=f"{n} times from {time[0] if n else 0:g} s",
+        expected="at least two ascending times",
+        hint="check the time channel and its unit.",
+    )
     worst = float(np.max(np.abs(time - time[0] - step * np.arange(n)))) / step
     if not worst <= _JITTER:  # also nan
         raise InputError(

@@ -8,7 +8,7 @@ from pydantic import Field, PrivateAttr, model_validator
 
 from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.errors import InputError
-from klack.input.problem import CaseProblem, nearest, one_of
+from klack.input.problem import CaseProblem, nearest, one_of, refuse_key_if
 from klack.input.section import Name
 from klack.mechanics.rigid_mass import RigidMass
 from klack.network.component import Component
@@ -48,13 +48,13 @@ class FlexibleBody(Component):
 
     @model_validator(mode="after")
     def _different_points(self) -> "FlexibleBody":
-        if len(set(self.points)) < len(self.points):
-            raise CaseProblem(
-                ("points",),
-                got=f"{', '.join(self.points)}",
-                expected="every surface once",
-                hint="one point can have any number of springs, stops and forces.",
-            )
+        refuse_key_if(
+            len(set(self.points)) < len(self.points),
+            ("points",),
+            got=f"{', '.join(self.points)}",
+            expected="every surface once",
+            hint="one point can have any number of springs, stops and forces.",
+        )
         return self
 
     @classmethod
@@ -96,13 +96,13 @@ class FlexibleBody(Component):
         """
         names = [(port_map or {}).get(point, point) for point in self.points]
         for point, name in zip(self.points, names, strict=True):
-            if name not in reduced.port_names:
-                raise CaseProblem(
-                    ("points",),
-                    got=f"'{point}', but the reduced body '{reduced.name}' has no port '{name}'",
-                    expected=f"one of: {one_of(reduced.port_names)}",
-                    hint=nearest(name, reduced.port_names, "reduce the body with this surface."),
-                )
+            refuse_key_if(
+                name not in reduced.port_names,
+                ("points",),
+                got=f"'{point}', but the reduced body '{reduced.name}' has no port '{name}'",
+                expected=f"one of: {one_of(reduced.port_names)}",
+                hint=nearest(name, reduced.port_names, "reduce the body with this surface."),
+            )
         if self.speed and not reduced.rigid_count:
             raise CaseProblem(
                 ("speed",),

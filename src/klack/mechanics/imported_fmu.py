@@ -6,7 +6,7 @@ from typing import ClassVar, Literal, Self
 from pydantic import Field, model_validator
 
 from klack.errors import InputError
-from klack.input.problem import CaseProblem, nearest, one_of
+from klack.input.problem import CaseProblem, nearest, one_of, refuse_key_if
 from klack.input.section import InputPath, Number
 from klack.mechanics.fmu_coupling import STATES, FmuCoupling
 from klack.mechanics.fmu_file import FmuDescription, FmuVariable, describe_fmu
@@ -127,13 +127,13 @@ class ImportedFmu(Component):
                 expected=f"an {' or '.join(causalities)} of {self.file.name}: {_some(fitting)}",
                 hint=nearest(name, fitting, "inspect it with: fmpy info."),
             )
-        if known[name].kind != "real" and key[0] != "parameters":
-            raise CaseProblem(
-                key,
-                got=f"'{name}', which is not a single real number",
-                expected="a real variable",
-                hint="take another one.",
-            )
+        refuse_key_if(
+            known[name].kind != "real" and key[0] != "parameters",
+            key,
+            got=f"'{name}', which is not a single real number",
+            expected="a real variable",
+            hint="take another one.",
+        )
         return known[name]
 
     def _parameter(self, name: str) -> None:
@@ -145,14 +145,14 @@ class ImportedFmu(Component):
             and item.causality in ("parameter", "structuralParameter", "local", "output")
             and item.kind != "other"
         ]
-        if name not in names:
-            raise CaseProblem(
-                ("parameters", name),
-                got=f"'{name}'",
-                expected=f"a parameter or start value of {self.file.name}: {_some(names)}",
-                hint=nearest(name, names, "inspect it with: fmpy info."),
-                on_key=True,
-            )
+        refuse_key_if(
+            name not in names,
+            ("parameters", name),
+            got=f"'{name}'",
+            expected=f"a parameter or start value of {self.file.name}: {_some(names)}",
+            hint=nearest(name, names, "inspect it with: fmpy info."),
+            on_key=True,
+        )
 
     def add_rows(self, rows: Rows) -> None:
         """Add one element with its own instance of the FMU."""

@@ -9,7 +9,7 @@ import scipy
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from klack.input.problem import CaseProblem, refuse_key_if
+from klack.input.problem import refuse_key_if
 from klack.input.section import Number
 from klack.machine.compiling.jit import inner
 from klack.network.component import Component
@@ -215,15 +215,15 @@ class NonlinearSpring(Component):
             expected="either 'stiffness' (with 'higher') or 'deflection' with 'force'",
             hint="give one of the two curves.",
         )
-        if bool(self.higher) != (self.reference is not None) or (self.higher and self.deflection):
-            raise CaseProblem(
-                ("higher",),
-                got=f"{len(self.higher)} terms"
-                + ("" if self.reference is None else " and a reference")
-                + (" together with a table" if self.deflection else ""),
-                expected="terms of the polynomial together with 'reference', or neither",
-                hint="reference: 1 mm makes higher: [0.2] add 20 % at a deflection of 1 mm.",
-            )
+        refuse_key_if(
+            bool(self.higher) != (self.reference is not None) or (self.higher and self.deflection),
+            ("higher",),
+            got=f"{len(self.higher)} terms"
+            + ("" if self.reference is None else " and a reference")
+            + (" together with a table" if self.deflection else ""),
+            expected="terms of the polynomial together with 'reference', or neither",
+            hint="reference: 1 mm makes higher: [0.2] add 20 % at a deflection of 1 mm.",
+        )
         refuse_key_if(
             len(self.deflection) != len(self.force) or len(self.deflection) == 1,
             ("force",),

@@ -67,13 +67,13 @@ class PrescribedMotion(Component):
     def _one_curve(self) -> Self:
         given = (self.file, self.time_unit, self.displacement_unit)
         some, whole = any(x is not None for x in given), all(x is not None for x in given)
-        if bool(self.time or self.displacement) == some or (some and not whole):
-            raise CaseProblem(
-                ("time",),
-                got="a table and a file" if some and self.time else "an incomplete curve",
-                expected="'time' and 'displacement', or 'file' with the units of its columns",
-                hint="file: lift.csv, time_unit: ms, displacement_unit: um.",
-            )
+        refuse_key_if(
+            bool(self.time or self.displacement) == some or (some and not whole),
+            ("time",),
+            got="a table and a file" if some and self.time else "an incomplete curve",
+            expected="'time' and 'displacement', or 'file' with the units of its columns",
+            hint="file: lift.csv, time_unit: ms, displacement_unit: um.",
+        )
         refuse_key_if(
             len(set(self.points)) < len(self.points),
             ("points",),

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, model_validator
 
-from klack.input.problem import CaseProblem
+from klack.input.problem import refuse_key_if
 from klack.input.section import Number, Section
 from klack.machine.compiling.jit import inner
 from klack.mechanics.nonlinear_spring import (
@@ -155,16 +155,16 @@ class RubberStop(Component):
     @model_validator(mode="after")
     def _terms(self) -> Self:
         wrong = any(a < 0.0 for a in self.higher)
-        if wrong or bool(self.higher) != (self.reference is not None):
-            raise CaseProblem(
-                ("higher",),
-                got="a negative term"
-                if wrong
-                else f"{len(self.higher)} terms"
-                + ("" if self.reference is None else " and a reference"),
-                expected="terms of at least 0 together with 'reference', or neither",
-                hint="rubber stiffens; with reference: 1 mm, higher: [0.2] adds 20 % there.",
-            )
+        refuse_key_if(
+            wrong or bool(self.higher) != (self.reference is not None),
+            ("higher",),
+            got="a negative term"
+            if wrong
+            else f"{len(self.higher)} terms"
+            + ("" if self.reference is None else " and a reference"),
+            expected="terms of at least 0 together with 'reference', or neither",
+            hint="rubber stiffens; with reference: 1 mm, higher: [0.2] adds 20 % there.",
+        )
         return self
 
     def modulus(self, frequency: ArrayLike) -> NDArray[np.complex128]:

@@ -10,8 +10,8 @@ from math import inf, isfinite
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError
-from klack.input.problem import CaseProblem, nearest
+from klack.errors import InputError, refuse_if
+from klack.input.problem import CaseProblem, nearest, refuse_key_if
 from klack.network.protocols import RunningController
 from klack.network.rows import ControllerRow
 from klack.simulation.flow_channels import present_name
@@ -116,14 +116,14 @@ class ControlLoop:
         for running in self._all:
             head = f"{_STORED}{running.row.component}."
             where = f"components.{running.row.component}"
-            if not running.output.can_be_stored:
-                raise InputError(
-                    where,
-                    got="a run that continues from a stored state",
-                    expected="a run from its start: the memory of this controller is not stored",
-                    hint="compute the whole time in one run; a function in Python can be stored if "
-                    "it has the methods memory() and recall().",
-                )
+            refuse_if(
+                not running.output.can_be_stored,
+                where,
+                got="a run that continues from a stored state",
+                expected="a run from its start: the memory of this controller is not stored",
+                hint="compute the whole time in one run; a function in Python can be stored if "
+                "it has the methods memory() and recall().",
+            )
             found = {k[len(head) :]: a for k, a in state.items() if k.startswith(head)}
             try:
                 running.target[running.place] = float(np.asarray(found.pop("output"))[0])
@@ -142,13 +142,13 @@ class ControlLoop:
 
     def _running(self, row: ControllerRow) -> _Running:
         looks = round(row.period / self._look)
-        if looks < 1 or abs(row.period / self._look - looks) > _WHOLE * max(looks, 1):
-            raise CaseProblem(
-                ("components", row.component, "sample_time"),
-                got=format_si(row.period, "s", 8),
-                expected=f"a whole number of steps of {format_si(self._look, 's', 8)}",
-                hint="choose such a time, or another run.step, run.coarse or run.record.",
-            )
+        refuse_key_if(
+            looks < 1 or abs(row.period / self._look - looks) > _WHOLE * max(looks, 1),
+            ("components", row.component, "sample_time"),
+            got=format_si(row.period, "s", 8),
+            expected=f"a whole number of steps of {format_si(self._look, 's', 8)}",
+            hint="choose such a time, or another run.step, run.coarse or run.record.",
+        )
         places = [self._column(row, i) for i in range(len(row.channels))]
         target, place, pushed = self._actuator(row)
         return _Running(
@@ -166,13 +166,13 @@ class ControlLoop:
     def _column(self, row: ControllerRow, i: int) -> tuple[int, float]:
         key = ("components", row.component, "sensors", row.sensors[i])
         name, unit = present_name(row.channels[i], self._names), row.units[i]
-        if name not in self._names:
-            raise CaseProblem(
-                (*key, "channel"),
-                got=f"'{name}'",
-                expected="a recorded channel: a displacement, velocity, force, pressure or current",
-                hint=nearest(name, self._names, f"available are: {', '.join(self._names)[:600]}."),
-            )
+        refuse_key_if(
+            name not in self._names,
+            (*key, "channel"),
+            got=f"'{name}'",
+            expected="a recorded channel: a displacement, velocity, force, pressure or current",
+            hint=nearest(name, self._names, f"available are: {', '.join(self._names)[:600]}."),
+        )
         column = self._names.index(name)
         si = self._units[column]
         if si in _OTHER:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.contact.step_constants import TAYLOR_BELOW, TAYLOR_TERMS
-from klack.errors import InputError, require_positive
+from klack.errors import refuse_if, require_positive
 
 __all__ = ["Propagator", "damping_loss", "modal_propagator"]
 
@@ -68,14 +68,14 @@ def modal_propagator(
     """
     require_positive("modal_propagator: step", step, "s")
     w, z = np.asarray(omega, dtype=float), np.asarray(damping, dtype=float)
-    if w.shape != z.shape or np.any(w < 0.0) or np.any(z < 0.0):
-        raise InputError(
-            "modal_propagator",
-            got=f"{w.size} frequencies and {z.size} damping ratios, the least being "
-            f"{w.min(initial=0):g} rad/s and {z.min(initial=0):g}",
-            expected="an equal number of both, none below zero",
-            hint="give one damping ratio per mode.",
-        )
+    refuse_if(
+        w.shape != z.shape or np.any(w < 0.0) or np.any(z < 0.0),
+        "modal_propagator",
+        got=f"{w.size} frequencies and {z.size} damping ratios, the least being "
+        f"{w.min(initial=0):g} rad/s and {z.min(initial=0):g}",
+        expected="an equal number of both, none below zero",
+        hint="give one damping ratio per mode.",
+    )
     A11, A12, A21, A22, B1, S, SS = _matrices(w.tobytes(), z.tobytes(), float(step)).copy()
     # a force f(t) makes q(h) = int A12(h - t) f(t) dt; by parts with f = t/h - 1/2
     return Propagator(

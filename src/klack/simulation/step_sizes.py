@@ -6,7 +6,7 @@ from math import inf, sqrt
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from klack.errors import InputError, refuse_if
+from klack.errors import refuse_if
 from klack.network.accuracy import ACCURACIES, Accuracy, fine_step
 from klack.network.rows import LineRow, Rows
 from klack.simulation.network_arrays import PARTS
@@ -59,20 +59,20 @@ def step_sizes(
     Macro steps are as long as the accuracy has them, but no longer than any segment of a line; if
     possible a whole number of them makes the exchange interval of a row that has one.
     """
-    if accuracy not in ACCURACIES:
-        raise InputError(
-            "accuracy",
-            got=repr(accuracy),
-            expected="one of: " + ", ".join(ACCURACIES),
-            hint="'normal' suits most cases; 'fine' takes about four times as long.",
-        )
-    if coarse is not None and coarse < 1:
-        raise InputError(
-            "coarse",
-            got=str(coarse),
-            expected="1 or more",
-            hint="1 switches macro steps off; without the key, klack chooses.",
-        )
+    refuse_if(
+        accuracy not in ACCURACIES,
+        "accuracy",
+        got=repr(accuracy),
+        expected="one of: " + ", ".join(ACCURACIES),
+        hint="'normal' suits most cases; 'fine' takes about four times as long.",
+    )
+    refuse_if(
+        coarse is not None and coarse < 1,
+        "coarse",
+        got=str(coarse),
+        expected="1 or more",
+        hint="1 switches macro steps off; without the key, klack chooses.",
+    )
     h = fine_step(accuracy, step)
     chosen = _chosen(rows, ACCURACIES[accuracy][1], h) if coarse is None else coarse
     near = largest_divisor(chosen, max(1, chosen // 4))

@@ -166,10 +166,10 @@ class ReducedSystem:
         if body.rigid_count == 0:
             return
         unit = float(phi[: body.rigid_count] @ body.rigid_axial)
-        if abs(unit - 1.0) > _UNIT_TRANSLATION:
-            raise InputError(
-                f"contact port '{port}' of body '{name}'",
-                got=f"{unit:.6g} m of port displacement per metre of motion along +z",
-                expected="1",
-                hint="the load pattern of a contact port has a resultant of 1 N along +z.",
-            )
+        refuse_if(
+            abs(unit - 1.0) > _UNIT_TRANSLATION,
+            f"contact port '{port}' of body '{name}'",
+            got=f"{unit:.6g} m of port displacement per metre of motion along +z",
+            expected="1",
+            hint="the load pattern of a contact port has a resultant of 1 N along +z.",
+        )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 from cyclopts import Parameter
 
-from klack.errors import InputError, require_positive
+from klack.errors import refuse_if, require_positive
 from klack.terminal.output import require_json_target, write_json
 from klack.terminal.tables import Notes, TextTable, print_table
 
@@ -112,13 +112,13 @@ def require_threads(threads: int | None) -> None:
 def require_files(option: str, files: Sequence[Path]) -> None:
     """Refuse missing files before the long work begins."""
     for file in files:
-        if not file.is_file():
-            raise InputError(
-                f"{option} {file}",
-                got="a folder" if file.is_dir() else "no such file",
-                expected="a file",
-                hint="check the spelling; the path is relative to the current folder.",
-            )
+        refuse_if(
+            not file.is_file(),
+            f"{option} {file}",
+            got="a folder" if file.is_dir() else "no such file",
+            expected="a file",
+            hint="check the spelling; the path is relative to the current folder.",
+        )
 
 
 @Parameter(name="*")

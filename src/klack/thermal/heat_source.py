@@ -5,7 +5,7 @@ from typing import ClassVar, Self
 
 from pydantic import Field, model_validator
 
-from klack.input.problem import CaseProblem
+from klack.input.problem import refuse_key_if
 from klack.input.section import Section
 from klack.network.port import HEAT, Port
 from klack.thermal.heat_rows import HeatRows, HeatSupply, ThermalComponent
@@ -23,15 +23,15 @@ class HeatTable(Section):
     @model_validator(mode="after")
     def _usable(self) -> Self:
         rising = all(b > a for a, b in zip(self.time, self.time[1:], strict=False))
-        if len(self.time) != len(self.power) or not rising:
-            raise CaseProblem(
-                ("time",),
-                got=f"{len(self.time)} times for {len(self.power)} powers"
-                if rising
-                else "times that do not rise",
-                expected="as many times as powers, rising",
-                hint="write a jump as a short ramp, e.g. of 1 ms.",
-            )
+        refuse_key_if(
+            len(self.time) != len(self.power) or not rising,
+            ("time",),
+            got=f"{len(self.time)} times for {len(self.power)} powers"
+            if rising
+            else "times that do not rise",
+            expected="as many times as powers, rising",
+            hint="write a jump as a short ramp, e.g. of 1 ms.",
+        )
         return self
 
 

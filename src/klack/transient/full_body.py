@@ -148,14 +148,14 @@ def massless_nodes(M: csr_array, nodes: NDArray[np.int64], dimension: int) -> cs
     light[nodes] = True
     weights = abs(m)[light][:, ~light]
     total = weights.sum(axis=1)
-    if np.any(total == 0.0):
-        raise InputError(
-            "massless contact nodes",
-            got=f"{int(np.count_nonzero(total == 0.0))} contact nodes whose neighbours are all "
-            "contact nodes",
-            expected="elements below the contact surface",
-            hint="use the scheme 'contact-stabilised-newmark', or a smaller reach.",
-        )
+    refuse_if(
+        np.any(total == 0.0),
+        "massless contact nodes",
+        got=f"{int(np.count_nonzero(total == 0.0))} contact nodes whose neighbours are all "
+        "contact nodes",
+        expected="elements below the contact surface",
+        hint="use the scheme 'contact-stabilised-newmark', or a smaller reach.",
+    )
     W = diags_array(1.0 / total) @ weights
     heavy = np.flatnonzero(~light)
     order = np.concatenate([heavy, np.flatnonzero(light)])
@@ -378,14 +378,14 @@ class FullBody:
         if not np.any(velocity):
             return np.zeros(len(self.free))
         direction = self.free % self.dimension
-        if self.dimension < 3 or np.count_nonzero(direction < 2) < 2 * (self.dof_count // 3):
-            raise InputError(
-                f"simulate_full_order: sideways motion of body '{self.name}'",
-                got=f"({velocity[0]:g}, {velocity[1]:g}) m/s, spin "
-                f"{np.linalg.norm(velocity[3:]):g} rad/s",
-                expected="none for an axisymmetric body, or for one held sideways",
-                hint="model a solid that is free to move across the axis.",
-            )
+        refuse_if(
+            self.dimension < 3 or np.count_nonzero(direction < 2) < 2 * (self.dof_count // 3),
+            f"simulate_full_order: sideways motion of body '{self.name}'",
+            got=f"({velocity[0]:g}, {velocity[1]:g}) m/s, spin "
+            f"{np.linalg.norm(velocity[3:]):g} rad/s",
+            expected="none for an axisymmetric body, or for one held sideways",
+            hint="model a solid that is free to move across the axis.",
+        )
         arm = self.body.mesh.points - self.body.centre_of_mass
         field = velocity[:3] + np.cross(velocity[3:], arm)
         return np.asarray(field.ravel()[self.free])

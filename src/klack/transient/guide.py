@@ -28,7 +28,7 @@ from scipy.sparse import csr_array
 from klack.bodies.elasticity.body import ElasticBody
 from klack.bodies.elasticity.ring_points import RingSections
 from klack.bodies.elasticity.statics import Flexibility
-from klack.errors import InputError, refuse_if, require_nonnegative, require_positive
+from klack.errors import refuse_if, require_nonnegative, require_positive
 from klack.mesh.mesh import Mesh
 from klack.transient.interface_arrays import Guide
 from klack.transient.interface_model import InterfaceModel
@@ -205,13 +205,13 @@ def guide_at_sections(
                     model.omega[inside], section.motion[:2], section.compliance
                 )
     for k, section in enumerate(sections):
-        if not np.linalg.eigvalsh(compliance[k])[0] > 0:
-            raise InputError(
-                f"guide of body '{name}' at z = {section.centre[2] * 1e3:.4g} mm",
-                got="a contact without compliance",
-                expected="a stiffness of the bore, or the consistent law",
-                hint="give law: {kind: linear, stiffness: 1e8 N/m}.",
-            )
+        refuse_if(
+            not np.linalg.eigvalsh(compliance[k])[0] > 0,
+            f"guide of body '{name}' at z = {section.centre[2] * 1e3:.4g} mm",
+            got="a contact without compliance",
+            expected="a stiffness of the bore, or the consistent law",
+            hint="give law: {kind: linear, stiffness: 1e8 N/m}.",
+        )
     return Guide(
         heights=np.ascontiguousarray(centre[:, 2]),
         clearance=np.full(count, clearance),
@@ -384,13 +384,13 @@ def _require_shaft(body: str, surface: str, r: NDArray[np.float64], z: NDArray[n
     terms = np.vander(place, 3)
     solution, *_ = np.linalg.lstsq(terms, (r / size) ** 2, rcond=1e-10)
     miss = float(np.max(np.abs(terms @ solution - (r / size) ** 2)))
-    if len(np.unique(np.round(z / size, 6))) < 2 or not miss < _ROUND or not r.min() > 0.0:
-        raise InputError(
-            f"guide of body '{body}': surface '{surface}'",
-            got=f"a surface whose radius is {r.min() * 1e3:.4g} to {r.max() * 1e3:.4g} mm",
-            expected="a cylinder around the axis of the body",
-            hint="name only the cylindrical part of the shaft.",
-        )
+    refuse_if(
+        len(np.unique(np.round(z / size, 6))) < 2 or not miss < _ROUND or not r.min() > 0.0,
+        f"guide of body '{body}': surface '{surface}'",
+        got=f"a surface whose radius is {r.min() * 1e3:.4g} to {r.max() * 1e3:.4g} mm",
+        expected="a cylinder around the axis of the body",
+        hint="name only the cylindrical part of the shaft.",
+    )
 
 
 def shaft_sections(sections: RingSections, shaft: RevolvedPoints) -> list[ShaftSection]:

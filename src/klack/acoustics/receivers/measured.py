@@ -46,7 +46,7 @@ from klack.acoustics.receivers.sanity import (
     check_taken_power,
 )
 from klack.arrays import Matrix, Vector
-from klack.errors import AccuracyWarning, InputError, refuse_if
+from klack.errors import AccuracyWarning, refuse_if
 
 __all__ = [
     "HeardReceiver",
@@ -496,15 +496,15 @@ def _mobility(responses: FrequencyResponses, rows: list[_Row]) -> tuple[Complexe
     lost = [
         f"{rows[i].freedom} / {rows[j].freedom}" for i, j in np.argwhere(np.isnan(Y[0])) if i > j
     ]
-    if lost:
-        raise InputError(
-            responses.name,
-            got=f"no response {', '.join(lost[:6])}{', ...' if len(lost) > 6 else ''} and not "
-            "its reciprocal either",
-            expected="the responses between all freedoms of the interface",
-            hint="measure the transfers between the mounts as well: on a plate they are as large "
-            "as the driving-point responses.",
-        )
+    refuse_if(
+        lost,
+        responses.name,
+        got=f"no response {', '.join(lost[:6])}{', ...' if len(lost) > 6 else ''} and not "
+        "its reciprocal either",
+        expected="the responses between all freedoms of the interface",
+        hint="measure the transfers between the mounts as well: on a plate they are as large "
+        "as the driving-point responses.",
+    )
     return Y, measured
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from klack.acoustics.interface import Complexes, Freedom
 from klack.arrays import Vector
-from klack.errors import AccuracyWarning, InputError
+from klack.errors import AccuracyWarning, refuse_if
 
 __all__ = ["check_places", "check_reciprocity", "check_resolution", "check_taken_power"]
 
@@ -53,16 +53,16 @@ def check_taken_power(
             "a mobility of reversed sign": -own,
         }
         like = [what for what, values in others.items() if _below(values) < min(_RIGHT, share / 4)]
-        if share > _WRONG:
-            raise InputError(
-                f"{name}: {freedom} / {freedom}",
-                got=f"a real part below 0 at {100 * share:.0f} % of the lines"
-                + (f", as of {like[0]} read as a mobility" if like else ""),
-                expected="a real part of 0 or more at a driving point: the receiver takes up power",
-                hint="check the quantity, and the sign and direction of sensor and hammer."
-                if like
-                else "check that sensor and hammer are at one point in one direction.",
-            )
+        refuse_if(
+            share > _WRONG,
+            f"{name}: {freedom} / {freedom}",
+            got=f"a real part below 0 at {100 * share:.0f} % of the lines"
+            + (f", as of {like[0]} read as a mobility" if like else ""),
+            expected="a real part of 0 or more at a driving point: the receiver takes up power",
+            hint="check the quantity, and the sign and direction of sensor and hammer."
+            if like
+            else "check that sensor and hammer are at one point in one direction.",
+        )
         if share > _DOUBTFUL:
             warnings.warn(
                 f"{name}: the real part of {freedom} / {freedom} is below 0 at "
@@ -106,13 +106,13 @@ def check_reciprocity(
             size = np.linalg.norm(one) + np.linalg.norm(other)
             apart = 2.0 * float(np.linalg.norm(one - other) / max(size, np.finfo(float).tiny))
             names = str(freedoms[i]), str(freedoms[j])
-            if np.linalg.norm(one + other) < 0.5 * np.linalg.norm(one - other):
-                raise InputError(
-                    f"{name}: {names[0]} / {names[1]}",
-                    got=f"the opposite of {names[1]} / {names[0]}",
-                    expected="the same, by reciprocity",
-                    hint="the sign of one direction is wrong, in a sensor or in a hammer blow.",
-                )
+            refuse_if(
+                np.linalg.norm(one + other) < 0.5 * np.linalg.norm(one - other),
+                f"{name}: {names[0]} / {names[1]}",
+                got=f"the opposite of {names[1]} / {names[0]}",
+                expected="the same, by reciprocity",
+                hint="the sign of one direction is wrong, in a sensor or in a hammer blow.",
+            )
             if apart > worst:
                 worst, pair = apart, names
     if worst > _RECIPROCITY:

@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 from klack.hydraulics.gas.conductance import factor_of_area, factor_of_conductance
 from klack.hydraulics.gas.network_gas import add_restriction, network_gas
 from klack.hydraulics.gas.restriction import RestrictionComponent
-from klack.input.problem import CaseProblem
+from klack.input.problem import refuse_key_if
 from klack.network.port import ELEMENT, GAS_FLOW, Port, Role
 from klack.network.rows import Rows
 from klack.units import Angle, Length, Ratio, SonicConductance
@@ -79,21 +79,21 @@ class GasValve(RestrictionComponent):
         self._refuse_with(("half_angle", "discharge"), "lift", "a sonic conductance contains it")
         self._require_with(("conductance", "critical_ratio"), "lift", "those of the data sheet")
         lift, conductance = self.lift or (), self.conductance or ()
-        if len(lift) != len(conductance):
-            raise CaseProblem(
-                ("conductance",),
-                got=f"{len(conductance)} conductances for {len(lift)} lifts",
-                expected="one for each lift",
-                hint="add or remove values.",
-            )
+        refuse_key_if(
+            len(lift) != len(conductance),
+            ("conductance",),
+            got=f"{len(conductance)} conductances for {len(lift)} lifts",
+            expected="one for each lift",
+            hint="add or remove values.",
+        )
         for k in range(1, len(lift)):
-            if not lift[k] > lift[k - 1]:
-                raise CaseProblem(
-                    ("lift", k),
-                    got=f"{lift[k]:g} m after {lift[k - 1]:g} m",
-                    expected="lifts that rise",
-                    hint="sort them.",
-                )
+            refuse_key_if(
+                not lift[k] > lift[k - 1],
+                ("lift", k),
+                got=f"{lift[k]:g} m after {lift[k - 1]:g} m",
+                expected="lifts that rise",
+                hint="sort them.",
+            )
         return self
 
     def table(self) -> NDArray[np.float64]:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError, foreign_reading, optional_package, refuse_if
+from klack.errors import foreign_reading, optional_package, refuse_if
 from klack.measurement.files.clock import unique_names
 from klack.measurement.files.csv_dialect import split_label
 from klack.measurement.recording import ChannelInfo, Recording, left_out
@@ -124,13 +124,13 @@ class UffFile(Recording):
 def _opened(path: Path) -> Any:
     pyuff = optional_package("pyuff", f"reading {path.name} (UFF)", "measurement")
     size = path.stat().st_size
-    if size > _LARGEST:
-        raise InputError(
-            str(path),
-            got=f"a universal file of {size / 2**30:.1f} GB",
-            expected="at most 2 GB (it is read at once)",
-            hint="export MDF4, TDMS or HDF5.",
-        )
+    refuse_if(
+        size > _LARGEST,
+        str(path),
+        got=f"a universal file of {size / 2**30:.1f} GB",
+        expected="at most 2 GB (it is read at once)",
+        hint="export MDF4, TDMS or HDF5.",
+    )
     with _damage(str(path)):
         return pyuff.UFF(str(path))
 
