@@ -466,8 +466,8 @@ COMPLAINTS = {
         "a start from 0.0005 s on",
     ),
     "backwards": ({"shots": (Shot(start=0.5e-3, end=0.4e-3),)}, "an end after it"),
-    "peak too long": ({"peak_duration": 0.4e-3}, "less than the shot from 0.0006 s"),
-    "period": ({"repeat_every": 0.8e-3}, "at least 0.0009 s"),
+    "peak too long": ({"peak_duration": 0.4e-3}, "less than the 300 us of a shot"),
+    "period": ({"repeat_every": 0.8e-3}, "at least 900 us"),
     "none": ({"shots": ()}, "at least 1 item"),
     "no capacitor": ({"capacitance": 0.0}, "greater than 0"),
 }

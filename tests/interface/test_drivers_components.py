@@ -53,7 +53,7 @@ PEAK_HOLD = {
     [
         (
             lambda: VoltageStep(voltage=12.0, start=2e-3, end=1e-3),
-            "a time after the start at 0.002",
+            "a time after the start at 2 ms",
         ),
         (lambda: VoltageStep(voltage=-3.0), "greater than 0"),
         (lambda: VoltageStep(voltage=3.0, end=2e-3, repeat_every=1e-3), "not shorter"),
@@ -62,7 +62,10 @@ PEAK_HOLD = {
         (lambda: PulseWidth(voltage=12.0, period=1e-3, duty=1.2), "less than 1"),
         (lambda: PeakHold(**{**PEAK_HOLD, "peak_current": 6.2}), "above the band of the hold"),
         (lambda: PeakHold(**{**PEAK_HOLD, "hold_band": 12.0}), "less than twice the hold current"),
-        (lambda: PeakHold(**PEAK_HOLD, peak_until=2e-3), "between start and end"),
+        (
+            lambda: PeakHold(**PEAK_HOLD, peak_until=2e-3),
+            "2 ms, expected a time after the start at 20 us and before the end at 1.2",
+        ),
         (lambda: VoltageTable(time=(0.0, 1e-3), voltage=(1.0,)), "2 times for 1 voltages"),
         (lambda: VoltageTable(time=(1e-3, 0.0), voltage=(1.0, 2.0)), "decreasing times"),
         (lambda: DriveProfile(time=(0.0, 1e-3)), "neither current nor voltage"),
@@ -72,7 +75,7 @@ PEAK_HOLD = {
             "not negative, one of them above zero",
         ),
         (lambda: DriveProfile(time=(0.0, 1e-3), voltage=(1.0,)), "2 times for 1 values"),
-        (lambda: DriveProfile(time=(1e-3, 0.0), voltage=(1.0, 2.0)), "0 s after 0.001 s"),
+        (lambda: DriveProfile(time=(1e-3, 0.0), voltage=(1.0, 2.0)), "0 s after 1 ms"),
         (lambda: DriveProfile(time=(1e-3, 1e-3), voltage=(1.0, 2.0)), "the last one after"),
         (lambda: DriveProfile(time=(0.0, 1e-3), voltage=(1.0, 2.0), band=0.1), "'band' with a vol"),
         (

@@ -12,7 +12,7 @@ from klack.magnetics.output_stage import Capacitor, OutputStage, StagePath
 from klack.magnetics.shared_capacitors import shared_capacitors
 from klack.network.port import FED, VOLTAGE, Port
 from klack.network.rows import Rows
-from klack.units import Capacitance, Current, Power, Ratio, Resistance, Time, Voltage
+from klack.units import Capacitance, Current, Power, Ratio, Resistance, Time, Voltage, format_si
 
 __all__ = ["BoostDriver", "Shot"]
 
@@ -161,23 +161,23 @@ class BoostDriver(Driver):
             refuse_key_if(
                 not before <= shot.start < shot.end,
                 ("shots", k),
-                got=f"from {shot.start:g} s to {shot.end:g} s",
-                expected=f"a start from {before:g} s on, and an end after it",
+                got=f"from {format_si(shot.start, 's')} to {format_si(shot.end, 's')}",
+                expected=f"a start from {format_si(before, 's')} on, and an end after it",
                 hint="list the shots in order; they must not overlap.",
             )
             if self.peak_duration is not None and not shot.start + self.peak_duration < shot.end:
                 raise CaseProblem(
                     ("peak_duration",),
-                    got=f"{self.peak_duration:g} s",
-                    expected=f"less than the shot from {shot.start:g} s to {shot.end:g} s lasts",
+                    got=format_si(self.peak_duration, "s"),
+                    expected=f"less than the {format_si(shot.end - shot.start, 's')} of a shot",
                     hint="shorten it, or leave it out.",
                 )
             before = shot.end
         if self.repeat_every is not None and self.repeat_every < before:
             raise CaseProblem(
                 ("repeat_every",),
-                got=f"a period of {self.repeat_every:g} s",
-                expected=f"at least {before:g} s, the end of the last shot",
+                got=f"a period of {format_si(self.repeat_every, 's')}",
+                expected=f"at least {format_si(before, 's')}, the end of the last shot",
                 hint="give a longer period.",
             )
         return self

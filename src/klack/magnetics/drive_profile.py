@@ -15,7 +15,7 @@ from klack.magnetics.driver import (
     Switch,
     When,
 )
-from klack.units import Current, Time, Voltage
+from klack.units import Current, Time, Voltage, format_si
 
 __all__ = ["DriveProfile"]
 
@@ -80,7 +80,8 @@ class DriveProfile(DiodeDriver):
             k = falls[0] if falls else 0
             raise CaseProblem(
                 ("time", k),
-                got=f"{self.time[k]:g} s" + (f" after {self.time[k - 1]:g} s" if falls else ""),
+                got=format_si(self.time[k], "s")
+                + (f" after {format_si(self.time[k - 1], 's')}" if falls else ""),
                 expected="times from 0 s in ascending order, the last one after the first",
                 hint="write a jump as the same time twice.",
             )

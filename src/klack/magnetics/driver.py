@@ -30,7 +30,7 @@ from klack.magnetics.output_stage import OutputStage
 from klack.network.component import Component
 from klack.network.port import VOLTAGE, Port
 from klack.network.rows import Rows
-from klack.units import Time, Voltage
+from klack.units import Time, Voltage, format_si
 
 __all__ = [
     "DiodeDriver",
@@ -301,7 +301,7 @@ class DiodeDriver(Driver):
         if self.repeat_every is not None and (end is None or self.repeat_every < end):
             raise CaseProblem(
                 ("repeat_every",),
-                got=f"a period of {self.repeat_every:g} s",
+                got=f"a period of {format_si(self.repeat_every, 's')}",
                 expected="an end, and a period that is not shorter",
                 hint="give an end, or a longer period.",
             )
@@ -320,8 +320,8 @@ class TimedDriver(DiodeDriver):
         if self.end is not None and not self.end > self.start:
             raise CaseProblem(
                 ("end",),
-                got=f"an end at {self.end:g} s",
-                expected=f"a time after the start at {self.start:g} s",
+                got=f"an end at {format_si(self.end, 's')}",
+                expected=f"a time after the start at {format_si(self.start, 's')}",
                 hint="times count from the start of the run.",
             )
         self.require_period(self.end)

@@ -6,7 +6,7 @@ from pydantic import Field, model_validator
 
 from klack.input.problem import CaseProblem, refuse_key_if
 from klack.magnetics.driver import DriveProgram, DriveState, Switch, TimedDriver, When
-from klack.units import Current, Time, Voltage
+from klack.units import Current, Time, Voltage, format_si
 
 __all__ = ["PeakHold"]
 
@@ -66,8 +66,9 @@ class PeakHold(TimedDriver):
         if not inside:
             raise CaseProblem(
                 ("peak_until",),
-                got=f"{self.peak_until:g} s",
-                expected="a time between start and end",
+                got=format_si(self.peak_until, "s"),
+                expected=f"a time after the start at {format_si(self.start, 's')}"
+                + (f" and before the end at {format_si(self.end, 's')}" if self.end else ""),
                 hint="times count from the start of the run.",
             )
         return self
