@@ -405,7 +405,7 @@ def test_a_valve_shows_travels_pairs_and_a_first_speed(tmp_path: Path, capsys):
     assert "rest armature.bottom on needle.ring: gap 0 m, opens to 40 um" in shown
     both = "springs 1.54 mJ, pressures 0 J on 2.85 g with armature over 60 um"
     assert f"needle 1.04 m/s: {both}" in shown
-    assert "on 1.6 g over 100 um; faster, as needle pushes it at first" in shown
+    assert "on 1.6 g over 100 um; faster, because needle pushes it at first" in shown
 
 
 def test_a_body_pushes_all_that_lie_below_it(tmp_path: Path, capsys):
@@ -437,7 +437,7 @@ def test_a_body_pushes_all_that_lie_below_it(tmp_path: Path, capsys):
 
     shown = " ".join(capsys.readouterr().out.split())
     assert "a 1 m/s: springs 3 mJ, pressures 0 J on 6 g with b and c over 50 um" in shown
-    assert "on 3 g over 50 um; faster, as a pushes it at first" in shown
+    assert "on 3 g over 50 um; faster, because a pushes it at first" in shown
 
 
 def test_a_body_that_falls_faster_than_what_is_above_it_is_not_pushed(tmp_path: Path, capsys):

@@ -157,7 +157,7 @@ def test_the_report_holds_players_and_says_what_it_is(heard):
     page = (heard / "report.html").read_text(encoding="utf-8")
 
     assert page.count("<audio controls") == 2
-    for words in ("media-src data:", "is no bound", "estimate"):
+    for words in ("media-src data:", "is not a bound", "estimate"):
         assert words in page
     assert (heard / "report.pdf").read_bytes().startswith(b"%PDF")
 

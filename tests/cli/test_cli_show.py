@@ -96,7 +96,7 @@ def test_a_valve_without_shapes_is_its_network(tmp_path, capsys):
     payload = payload_of(tmp_path / "valve.html")
     assert payload["bodies"] == []
     assert payload["schematic"].startswith("<svg")
-    assert any("network only" in note for note in payload["notes"])
+    assert any("only its network" in note for note in payload["notes"])
     numbers = json.loads((tmp_path / "numbers.json").read_text())
     require_documented(numbers)
     assert numbers["bodies"] == {}

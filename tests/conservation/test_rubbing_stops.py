@@ -473,5 +473,5 @@ def test_a_continued_run_has_the_bits_of_one_in_one_go_stops():
 
 def test_a_restitution_beside_yield_is_refused():
     stop = EndStop(gap=0.0, law={"kind": "consistent"}, restitution=0.9).with_law(two_lines())
-    with pytest.raises(InputError, match="beside yield"):
+    with pytest.raises(InputError, match="together with yield"):
         stop.contact_law()

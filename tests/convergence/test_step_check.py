@@ -78,9 +78,13 @@ def test_changes_are_those_of_the_longer_steps_to_the_shorter_ones():
     [
         ([1e-3, 2e-3, 3e-3], [1e-3, 2e-3], ["", "", "missing with longer steps"]),
         ([1e-3, 3e-3], [1e-3, 2e-3, 3e-3], ["", "at another time with longer steps"]),
-        ([1e-3, 1.004e-3], [1e-3], ["one impact in one run, several in the other", "before it"]),
+        (
+            [1e-3, 1.004e-3],
+            [1e-3],
+            ["one impact in one run, several in the other", "an earlier impact"],
+        ),
         ([1e-3], [1e-3, 1.004e-3], ["one impact in one run, several in the other"]),
-        ([1e-3, 2e-3], [1.01e-3, 2e-3], ["at another time with longer steps", "before it"]),
+        ([1e-3, 2e-3], [1.01e-3, 2e-3], ["at another time with longer steps", "an earlier impact"]),
     ],
     ids=["missing", "one more between", "split", "split by longer steps", "too far apart"],
 )

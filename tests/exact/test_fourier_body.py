@@ -282,5 +282,5 @@ def test_bad_input():
     with pytest.raises(InputError, match="0 or more"):
         fourier_body("needle", cylinder("tri6"), {"solid": STEEL}, order=-1)
     body = bending("tri6")
-    with pytest.raises(InputError, match="outside of the body"):
+    with pytest.raises(InputError, match="outside the body"):
         field_rows(body, np.array([[2 * RADIUS, BOTTOM, 0.0]]), where="probe")

@@ -296,7 +296,7 @@ def test_a_hose_slows_the_waves_of_a_line():
                 wall_thickness=1e-3,
                 wall_modulus=2e11,
             ),
-            "duplicate entries",
+            "together with wall",
         ),
         (
             lambda: Line(

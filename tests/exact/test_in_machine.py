@@ -406,7 +406,7 @@ def test_the_motion_of_the_mounts_is_doubted() -> None:
     found = on(receiver=INFINITE)
     record, _ = in_machine(found, 1.0)
     assert record.motion > 0.01
-    assert any("off by about as much" in note for note in record.notes)
+    assert any("wrong by about as much" in note for note in record.notes)
     slow, _ = in_machine(found, 200.0 * record.motion)
     assert slow.motion == pytest.approx(0.005)
     assert not slow.notes or all("as much" not in note for note in slow.notes)
@@ -467,7 +467,7 @@ MISTAKES = {
     f"receiver: {{{PLATE}, axes: {{flange: [[1, 0, 0], [0, 1, 0]]}}}}": "one pair",
     f"receiver: {{{PLATE}}}": "flange.x, flange.y, flange.rx, flange.ry, flange.rz",
     f"receiver: {{{PLATE}, axes: [[1, 0, 0], [1, 0, 0]], {MISSING}}}": "right angles",
-    f"receiver: {{{PLATE}, {MISSING}}}\n  ears: {{a: 7}}": "the place",
+    f"receiver: {{{PLATE}, {MISSING}}}\n  ears: {{a: 7}}": "the position",
     f"receiver: {{{PLATE}, {MISSING}}}\n  ears: {{a: [1 m, 2 m]}}": "ears",
     f"receiver: {{{PLATE}, {MISSING}}}\n  ears: {{a: [0 m, 0 m, -1 m]}}": "above the plate",
     f"receiver: {{{PLATE}, {MISSING}}}\n  elements: {{clip: {{stiffness: {{z: 1 N/um}}}}}}": "clip",

@@ -422,7 +422,9 @@ def test_nodes_in_a_frame(tmp_path, text, expected):
 
 def test_quadrilaterals_of_meshio_are_named_as_such(tmp_path):
     text = ROW + "*ELEMENT, TYPE=CAX4P\n7, 1, 2, 3, 4\n"
-    with pytest.raises(InputError, match=r"got TYPE=CAX4P(?s:.*)meshio writes quadrilaterals so"):
+    with pytest.raises(
+        InputError, match=r"got TYPE=CAX4P(?s:.*)meshio writes quadrilaterals like this"
+    ):
         read(tmp_path / "cube.inp", text)
 
 

@@ -392,7 +392,7 @@ def test_sectors_cover_their_share_of_the_circumference(meridian):
 def test_sectors_are_refused_where_they_make_no_sense(meridian, solid):
     for mesh, name, count, width, words in (
         (meridian, "shank", 3, 0.5, r"(?s)an axisymmetric mesh.*hold the whole surface"),
-        (solid, "shank", 3, 2.2, "do not overlap"),
+        (solid, "shank", 3, 2.2, "avoid overlap"),
         (solid, "shank", 40, 0.01, r"nodes in \d+ of 40 sectors"),
         (solid, "shaft", 3, 0.5, "one of: shank, tip, top"),
     ):

@@ -246,7 +246,10 @@ def test_a_set_that_is_a_shift_along_the_axis_changes_nothing():
     [
         ("{force: 100 N, radius: [0.5 mm], opening: [0 um]}", "contact.worn.radius"),
         ("{force: 100 N, radius: [0.5 mm, 0.6 mm], opening: [0 um, 1 um, 0 um]}", "3 values for 2"),
-        ("{force: 100 N, radius: [0.6 mm, 0.5 mm], opening: [0 um, 1 um]}", "radii that rise"),
+        (
+            "{force: 100 N, radius: [0.6 mm, 0.5 mm], opening: [0 um, 1 um]}",
+            "ascending radii from 0",
+        ),
         ("{force: 100 N, radius: [0.5 mm, 0.6 mm], opening: [0 um, 1 mm]}", "check the units"),
         ("{force: 0 N, radius: [0.5 mm, 0.6 mm], opening: [0 um, 1 um]}", "contact.worn.force"),
         ("{force: 100 N, radius: [0.5 mm, .nan], opening: [0 um, 1 um]}", "contact.worn.radius"),

@@ -248,7 +248,7 @@ def test_what_cannot_be_used_is_refused():
     for given, air, words in (
         ((coarse, FREQUENCY, power), AIR, r"at most 20\.8 us"),
         ((force, FREQUENCY, 0.0 * FREQUENCY), AIR, "somewhere above zero"),
-        ((force, FREQUENCY[::-1], power), AIR, "increasing"),
+        ((force, FREQUENCY[::-1], power), AIR, "ascending"),
         ((force, FREQUENCY, power[:-1]), AIR, "same length"),
         ((force, FREQUENCY, power), {**AIR, "distance": 0.0}, "distance"),
     ):

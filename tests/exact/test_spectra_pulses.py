@@ -312,7 +312,7 @@ def test_what_cannot_be_used_is_refused():
     with pytest.raises(InputError, match="finer steps"):
         force_spectrum(series, high=60e6)
     density = energy_spectral_density(force_spectrum(series, high=1e5, resolution=1e3))
-    with pytest.raises(InputError, match="rising order"):
+    with pytest.raises(InputError, match="ascending order"):
         cumulative_energy(density, low=20.0, high=2e5)
     with pytest.raises(InputError, match="above 0 and below 1"):
         cumulative_energy(density, low=20.0, high=1e5).frequency_below(1.0)

@@ -302,7 +302,7 @@ def test_a_source_that_is_turned_and_stands_beside_the_point() -> None:
 
 
 def test_directions_that_are_reversed_and_points_with_axes_of_their_own() -> None:
-    """The receiver measured along -z, and in axes of its own: the same powers."""
+    """The receiver measured along -z, and in its own axes: the same powers."""
     pair = Pair()
     sign = np.array([1, 1, -1, 1, 1, 1])
     Y = pair.Y_R.copy()
@@ -494,7 +494,7 @@ def test_limits_of_plates_are_told() -> None:
     with pytest.raises(InputError, match="inside"):
         finite_plate(THIN_PLATE, (0.1, 0.2), point, highest=1e3)
     turned = InterfacePoint(name="a", axes=axes_of([0, 1, 0], [-1, 0, 0]))
-    with pytest.raises(InputError, match="axes of its own"):
+    with pytest.raises(InputError, match="its own axes"):
         _ = InfinitePlate(plate=THIN_PLATE, points=(turned,)).freedoms
 
 

@@ -180,7 +180,9 @@ def test_a_bore_that_is_narrower_than_its_shaft_is_refused():
 
 @pytest.mark.parametrize("on", [5e-6, 0.1e-3])
 def test_a_clearance_that_is_not_the_drawn_gap_is_told(on):
-    with pytest.warns(AccuracyWarning, match=r"clearance is 10 um, which .* as .* are drawn"):
+    with pytest.warns(
+        AccuracyWarning, match=r"clearance is 10 um in the run, but .* as .* are drawn"
+    ):
         bore(on)
 
 

@@ -58,7 +58,7 @@ def rows(*numbers, **more):
          r"joint\.frequency: got frequency together with a single stiffness"),
         ([(*JOINT, "frequency", None)], r"joint: got a table without 'frequency', expected .*100"),
         ([(*JOINT, "frequency", "2 MHz")], r"joint\.frequency: got 2 MHz, expected .*to 1 MHz"),
-        ([(*JOINT, "loss_factor", 0.1)], r"loss_factor: got loss_factor together with a table"),
+        ([(*JOINT, "loss_factor", 0.1)], r"joint\.loss_factor: got loss_factor together with a table"),
         ([(*JOINT, "modulus", "1 GPa")], r"joint\.modulus: got modulus together with a table"),
         ([(*JOINT, "table", 1, "modulus", None)],
          r"joint\.table\[1\]: got shear_modulus with a thickness"),

@@ -450,7 +450,7 @@ MISTAKES_OFF_AXIS = {
     ),
     "bore aside": (
         ((BORE, BORE.replace("20 um", "192 um")),),
-        ("8 um of clearance around the armature", "8.889 um aside", "touch the iron"),
+        ("8 um of clearance around the armature", "aside by 8.889 um", "touch the iron"),
     ),
     "narrow ring": (
         ((NARROW, NARROW.replace("200", "8")), (", eccentricity: 20 um", "")),

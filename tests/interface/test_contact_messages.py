@@ -236,7 +236,7 @@ def test_a_size_that_is_too_coarse_is_named_with_one_that_does():
 
     text = str(caught.value)
     assert text.startswith("bodies.pin.mesh.size: mesh_step: pin.step: element 7 (tet10): got 2 mm")
-    found = re.search(r"bodies\.pin\.mesh\.size: (\S+ \S+) \(tried", caught.value.hint)
+    found = re.search(r"bodies\.pin\.mesh\.size: (\S+ \S+) \(tested", caught.value.hint)
     assert found is not None
     size = parse_quantity(found[1], LENGTH, "size")
     assert size == pytest.approx(1e-3, rel=1e-12)
@@ -258,7 +258,7 @@ def test_a_thin_walled_tube_of_a_step_file(tmp_path: Path):
         meshed_for_case("tube", MeshSizing(size=2e-3), mesher)
 
     assert caught.value.where.startswith("bodies.tube.mesh.size: mesh_step: ")
-    found = re.search(r"bodies\.tube\.mesh\.size: (\S+ \S+) \(tried", caught.value.hint)
+    found = re.search(r"bodies\.tube\.mesh\.size: (\S+ \S+) \(tested", caught.value.hint)
     assert found is not None, caught.value.hint
     assert parse_quantity(found[1], LENGTH, "size") < 1.5e-3
 

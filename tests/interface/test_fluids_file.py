@@ -344,7 +344,7 @@ def test_paths_follow_the_rules_of_other_files(tmp_path):
         ("nothing.csv", "does not exist"),
         (".", "a folder"),
         ("large.csv", "at most 5 MB"),
-        ("binary.csv", "no text"),
+        ("binary.csv", "not text"),
     ):
         with pytest.raises(ValidationError, match=words):
             read_file(name, tmp_path)

@@ -344,7 +344,11 @@ WRONG = [
     ("peak_force,", "wall_time,", "one of"),
     ("points: 2}", "points: 2}\n  variant: dry", "only strokes have variants"),
     ("points: 2}", "points: 2}\n  level: reducd", "reduced"),
-    (f"{SPEED}: {{from: 0.3 m/s, to: 0.6 m/s}}", "run.levels.0: {values: [full]}", "one level"),
+    (
+        f"{SPEED}: {{from: 0.3 m/s, to: 0.6 m/s}}",
+        "run.levels.0: {values: [full]}",
+        "a single level",
+    ),
 ]
 
 

@@ -255,7 +255,7 @@ class TestFailures:
             ([{"network.fluid.gas_fraction": "1 %"}], ["impacts"], "'network.fluid: n-heptane'"),
             ([{"network.components.spring": "none", PRELOAD: "1 N"}], ["impacts"], "contain"),
             ([{"": "1"}], ["impacts"], "keys joined"),
-            ([{"run.variants.0": "wet"}], ["impacts"], "one variant"),
+            ([{"run.variants.0": "wet"}], ["impacts"], "a single variant"),
             (
                 [
                     {"network.components.magnet.force.1": "4 N"},

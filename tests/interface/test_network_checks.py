@@ -202,7 +202,7 @@ WRONG = {
         {**VALVE, "coil": Coil(), "a": Driver(), "b": Driver()},
         [*JOINED, ["coil.terminals", "a.terminals", "b.terminals"]],
         "a.terminals and b.terminals and coil.terminals in one circuit",
-        "its own driver",
+        "driver of its own",
     ),
     "reserved name": ({"ground": RigidMass(mass=1.0)}, [], "the name 'ground'", "rename"),
     "no moving body": (

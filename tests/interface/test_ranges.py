@@ -390,7 +390,7 @@ def test_a_line_far_from_its_pressure_says_both_speeds_and_the_error():
     assert text.startswith("'line': at the start the pressure")
     slow, fast = (float(gassy.sound_speed(p)) for p in (1e5, 400e5))
     assert f"{slow:.4g} m/s, but waves at 400 bar run at {fast:.4g} m/s" in text
-    assert f"up to {100 * (1 - slow / fast):.2g} % off" in text
+    assert f"wrong by up to {100 * (1 - slow / fast):.2g} %" in text
 
 
 def test_numbers_of_ranges_are_written_as_people_write_them():

@@ -134,7 +134,7 @@ def test_a_run_that_ends_in_the_contact_says_so_everywhere(lonely_study: ImpactS
     row = next(iter(study_told(study))).rows[0]
     assert all(cell.endswith(" (cut off)") for cell in row[1:4])
     assert row[4] == "–"
-    assert "cut off in contact" in answer_line(study)
+    assert "the run ends in contact" in answer_line(study)
     assert "still in contact when the record ends" in answer(study)
 
     numbers = json.loads(json.dumps(IMPACT.to_json(study), allow_nan=False))["levels"]["reduced"]

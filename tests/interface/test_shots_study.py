@@ -244,7 +244,7 @@ def test_statistics_are_of_all_shots_or_of_none():
 def test_quantiles_of_few_shots_are_doubted():
     found = dropped(restitution=[0.9, 0.8, 0.7])
     (note,) = shot_notes(["shots.restitution.q05", "shots.restitution.median"], found)
-    assert note.startswith("3 shots are too few for their 5 % quantile, which takes 20.")
+    assert note.startswith("3 shots are too few for their 5 % quantile, which needs 20.")
     many = dropped(restitution=np.linspace(0.7, 0.9, 20).tolist())
     assert shot_notes(["shots.restitution.q05"], many) == ()
     assert np.isnan(value("shots.restitution.standard_error", dropped(restitution=[0.9])))
@@ -306,13 +306,13 @@ WRONG = [
         "optimise",
         f"{CLEARANCE}: {{values: [2 um, 3 um]}}",
         "shots.seed: {values: [1, 2]}",
-        "luckiest",
+        "most favourable draw",
     ),
     (
         "optimise",
         f"{CLEARANCE}: {{values: [2 um, 3 um]}}",
         "shots.count: {values: [4, 9]}",
-        "luckiest",
+        "most favourable draw",
     ),
 ]
 

@@ -211,7 +211,7 @@ class TestSteps:
         assert main([*words, "--no-check-steps", "--json", numbers]) == 0
         found = json.loads(Path(numbers).read_text())
         assert (found["halvings"], found["step_changes"]) == ([0.0] * 4, [None] * 4)
-        assert "was not checked" in next(steps_texts(klack.load_result(out).record))
+        assert "unchecked" in next(steps_texts(klack.load_result(out).record))
 
     def test_points_with_and_without_a_check_are_not_taken_for_each_other(self):
         tree = klack.load_case(SMALL).tree
@@ -324,7 +324,7 @@ WRONG = [
     ("points: 8", "points: 0", "1 or more"),
     ("points: 8", "kind: file", "without a file"),
     ("sd: 3 um", "sd: 0 um", "more than 0"),
-    ("lift:", "the lift:", "a word of letters"),
+    ("lift:", "the lift:", "letters, digits and _"),
     ("part: {fixed: 10 um}", "part: {fixed: blue}", "a number with its unit"),
 ]
 

@@ -174,7 +174,7 @@ def test_defaults_limits_and_units_are_told():
     text = (DOCS / "reference" / "case-keys.md").read_text(encoding="utf-8")
 
     assert "| `reduced_step` | time [s], as `40 us` | 20 ns | above 0 |" in text
-    assert "| `poisson` | number without unit, as `0.3` | *required* |" in text
+    assert "| `poisson` | number without a unit, as `0.3` | *required* |" in text
     assert re.search(r"\| `count` \| whole number \| .* \| at least 1 \|", text)
 
 

@@ -44,7 +44,7 @@ def test_the_energy_balance_closes_and_its_entries_are_those_of_the_page(result)
     assert result.books.relative_residual <= 1e-12
     shaft, relief, drain, leak = numbers(
         PAGE,
-        r"of ([\d.]+) J of the shaft the relief valve turns ([\d.]+) J into heat, the drain "
+        r"([\d.]+) J of shaft work the relief valve turns ([\d.]+) J into heat, the drain "
         r"([\d.]+) J and the leakage of the pump ([\d.]+) J",
     )
     losses = result.books.losses

@@ -410,7 +410,9 @@ def test_a_contact_on_a_few_angles_is_doubted_once():
         watch.see(0, 0.0, 0.0 * few)
     watch.see(1, 50.0, few)
     watch.see(1, 20.0, many)  # past the peak
-    with pytest.warns(AccuracyWarning, match=r"'opening' is so short that 5 of 24 angles .* 39"):
+    with pytest.warns(
+        AccuracyWarning, match=r"'opening' is so short that only 5 of 24 angles .* 39"
+    ):
         watch.see(1, 0.0, 0.0 * few)
 
 

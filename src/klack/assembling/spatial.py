@@ -464,7 +464,7 @@ def _check_bore(
             )
         if drawn > nominal and abs(drawn - guide.clearance) > max(nominal, _AS_DRAWN * drawn):
             warnings.warn(
-                f"{at}: the clearance is {format_si(guide.clearance, 'm')}in the run, but "
+                f"{at}: the clearance is {format_si(guide.clearance, 'm')} in the run, but "
                 f"{format_si(drawn, 'm', 3)} as '{name}' and '{on[0]}' are drawn, with radii of "
                 f"{radii}. Try: the drawn value for guides.{name}.clearance, or one radius for "
                 "both drawings.",

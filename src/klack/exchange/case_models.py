@@ -155,6 +155,7 @@ def _of_valve(case: ValveCase, progress: Progress, threads: int | None, alone: b
     require_axial(case, "the export of models")
     valve = build_valve(case, progress, threads=threads)
     provenance = _provenance(case, {name: body.mesh for name, body in valve.bodies.items()})
+    rows = valve.network.rows()
     bodies, step = tuple(valve.reduced.values()), case.run.fine_step
     refuse_if(
         not bodies,
@@ -165,7 +166,6 @@ def _of_valve(case: ValveCase, progress: Progress, threads: int | None, alone: b
     )
     if alone:
         return CaseModels(bodies=bodies, pair=None, provenance=provenance, step=step)
-    rows = valve.network.rows()
     parts = valve.network.components
     meetings = find_meetings(valve.network)
     contacts: list[ContactPair] = []

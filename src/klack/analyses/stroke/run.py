@@ -291,7 +291,7 @@ def _begin(case: ValveCase, after: StrokeStudy | None, name: Variant) -> Network
 
 
 def _other_case(case: ValveCase, after: StrokeStudy | None) -> Iterator[str]:
-    """A doubt where a run goes on in another valve than the one that it continues."""
+    """A doubt where a run continues another one in a different valve."""
     if after is None:
         return
     parts = case.network.components
@@ -315,7 +315,7 @@ def _other_case(case: ValveCase, after: StrokeStudy | None) -> Iterator[str]:
     if differ:
         more = f" and {len(differ) - _NAMED} more" if len(differ) > _NAMED else ""
         yield (
-            f"the run goes on in another valve: {', '.join(differ[:_NAMED])}{more} differ from the "
+            f"the run continues in a different valve: {', '.join(differ[:_NAMED])}{more} differ from the "
             "case of the result that it continues, whose state is taken as it is: speeds, gaps and "
             "forces may jump there. Try: the same case for another duration; what changes "
             "during a stroke belongs into tables over time."

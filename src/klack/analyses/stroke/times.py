@@ -131,7 +131,7 @@ def lift_times(
 
     A stroke begins where 10 % of the lift from the end at rest are passed, and ends where the body
     comes back below them; between two records the displacement is a straight line.  In a run that
-    goes on from another one, the stroke that is under way at its start comes before longer ones.
+    continues another one, the stroke that is under way at its start comes before longer ones.
 
     Parameters
     ----------
