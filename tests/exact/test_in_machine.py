@@ -471,7 +471,7 @@ MISTAKES = {
     f"receiver: {{{PLATE}, {MISSING}}}\n  ears: {{a: [1 m, 2 m]}}": "ears",
     f"receiver: {{{PLATE}, {MISSING}}}\n  ears: {{a: [0 m, 0 m, -1 m]}}": "above the plate",
     f"receiver: {{{PLATE}, {MISSING}}}\n  elements: {{clip: {{stiffness: {{z: 1 N/um}}}}}}": "clip",
-    f"receiver: {{{PLATE}, {MISSING}}}\n  elements: {{flange: {{}}}}": "how stiff",
+    f"receiver: {{{PLATE}, {MISSING}}}\n  elements: {{flange: {{}}}}": "(the stiffness)",
     f"receiver: {{{PLATE}, {MISSING}}}\n  elements: {{flange: {{stiffness: 1 N/um}}}}": "stiffness",
     f"receiver: {{{PLATE}, {MISSING}}}\n"
     "  elements: {flange: {stiffness: {z: 1 N/um}, damping: {x: 1 N*s/m}}}": "is rigid",

@@ -193,7 +193,7 @@ BROKEN = {
     "mounts: {flange: {surface: housing.top}}": "which is not held",
     "mounts: {flange: {surface: housing.rim}, clip: {surface: housing.rim}}": "belongs to mount",
     "mounts: {flange: {surface: housing.rim}}\n  reactions: {magnet: pole.top}": "magnet",
-    "mounts: {flange: {surface: housing.rim}}\n  reactions: {spring: needle.tip}": "which is not held",
+    "mounts: {flange: {surface: housing.rim}}\n  reactions: {spring: needle.tip}": "is not held",
     "reactions: {spring: pole.top}": "reactions without mounts",
     "passages: {feed: {direction: across}}": "passages without mounts",
     "mounts: {flange: {surface: housing.rim}}\n  passages: {pipe: {direction: across}}": "pipe",

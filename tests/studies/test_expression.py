@@ -431,8 +431,8 @@ def test_an_unknown_name_and_a_name_twice_are_errors():
     for name, text, known, words in (
         ("x", "2 * radus", "radius", "did you mean 'radius'"),
         ("x", "2", "x", "which is also a parameter"),
-        ("max", "2", "x", "which is a function or pi too"),
-        ("x", "2 * pi", "pi", "'pi', which is a function or pi too"),
+        ("max", "2", "x", "which is also a function or pi"),
+        ("x", "2 * pi", "pi", "'pi', which is also a function or pi"),
     ):
         with pytest.raises(InputError, match=words):
             ordered({name: Expression.parse(text)}, {known})

@@ -1,5 +1,6 @@
 """Peak and hold: the usual driver of an injector."""
 
+from math import inf
 from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
@@ -60,10 +61,9 @@ class PeakHold(TimedDriver):
             expected="a current above the band of the hold",
             hint="for a driver without a peak use type 'two-point'.",
         )
-        inside = self.peak_until is None or (
-            self.start < self.peak_until and (self.end is None or self.peak_until < self.end)
-        )
-        if not inside:
+        if self.peak_until is not None and not (
+            self.start < self.peak_until < (inf if self.end is None else self.end)
+        ):
             raise CaseProblem(
                 ("peak_until",),
                 got=format_si(self.peak_until, "s"),

@@ -315,9 +315,9 @@ def _other_case(case: ValveCase, after: StrokeStudy | None) -> Iterator[str]:
     if differ:
         more = f" and {len(differ) - _NAMED} more" if len(differ) > _NAMED else ""
         yield (
-            f"the run continues in a different valve: {', '.join(differ[:_NAMED])}{more} differ from the "
-            "case of the result that it continues, whose state is taken as it is: speeds, gaps and "
-            "forces may jump there. Try: the same case for another duration; what changes "
+            f"the run continues in a different valve: {', '.join(differ[:_NAMED])}{more} differ "
+            "from the case of the result that it continues, whose state is used unchanged: speeds, "
+            "gaps and forces may jump there. Try: the same case for another duration; what changes "
             "during a stroke belongs into tables over time."
         )
 
