@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import App, Parameter
 
 from klack import __version__
-from klack.analyses.catalogue import commands
+from klack.analyses.catalogue import analysis_in, commands
+from klack.analyses.ending import REPORTS, beside_result, write_reports
 from klack.analyses.impact.command import run_case
 from klack.cli.about import about
 from klack.cli.compare import compare
@@ -276,8 +277,6 @@ def report(
     wanted: Shown = SHOWN,
 ) -> int:
     """Write report.html and report.pdf of a stored result."""
-    from klack.analyses.catalogue import analysis_in
-    from klack.analyses.ending import REPORTS, beside_result, write_reports
     from klack.analyses.incomplete import missing_in
     from klack.analyses.json_results import command_json
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from klack.analyses.catalogue import load_result
 from klack.analyses.ending import is_result
 from klack.errors import InputError, refuse_if
 from klack.terminal.options import WANTED, Components, Out, Wanted, imported
@@ -265,7 +266,6 @@ def _export_stored(source: Path, to: str, out: Path | None, wanted: Wanted) -> t
         hint="models, decks and fields come from the case: give the case file or its name; "
         "vtk of a stroke in three dimensions takes --impact.",
     )
-    from klack.analyses.catalogue import load_result
     from klack.analyses.incomplete import missing_in
 
     folder = out if out is not None else source
@@ -423,7 +423,6 @@ def _parquet_is_for_studies(got: str) -> InputError:
 
 
 def _export_point(source: Path, point: int | None, out: Path | None) -> tuple[str, Written]:
-    from klack.analyses.catalogue import load_result
     from klack.analyses.study.point_case import case_of_point
     from klack.analyses.study.record import StudyRecord
 
@@ -490,7 +489,6 @@ def _export_fields(case: "Case", folder: Path, choice: Choice, wanted: Wanted) -
 def _export_stored_impact(
     source: Path, out: Path | None, choice: Choice, own: "OwnComponents", wanted: Wanted
 ) -> tuple[str, Written]:
-    from klack.analyses.catalogue import load_result
     from klack.analyses.stroke.record import StrokeStudy
     from klack.case.any_case import read_valve_case
     from klack.exchange.results.spatial_series import write_spatial_series

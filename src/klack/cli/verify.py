@@ -2,9 +2,10 @@
 
 import sys
 from collections.abc import Iterator, Sequence
+from itertools import chain
 from pathlib import Path
 from textwrap import fill
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from cyclopts import Parameter
 
@@ -12,10 +13,17 @@ from klack.terminal.options import SHOWN, Shown
 from klack.terminal.output import require_file_target
 from klack.terminal.progress import show_progress
 from klack.terminal.tables import print_table
-from klack.verification.check import COVERS, GROUPS
-
-if TYPE_CHECKING:
-    from klack.verification import Check
+from klack.verification.check import (
+    COVERS,
+    GROUPS,
+    Check,
+    deviation_text,
+    headroom_text,
+    iterate_checks,
+    number_text,
+    summary,
+    tolerance_text,
+)
 
 __all__ = ["verify"]
 
@@ -33,25 +41,22 @@ def print_groups() -> None:
         print(fill(sentence, _WIDTH, initial_indent=f"{group:<{width}}", subsequent_indent=indent))
 
 
-def print_checks(checks: Sequence["Check"], *, every: bool = False, to_stderr: bool) -> None:
+def print_checks(checks: Sequence[Check], *, every: bool = False, to_stderr: bool) -> None:
     """Print a row per group, then the failed checks and the closest, or all of them.
 
     A check needs its name, its source and five numbers: too wide for 100 columns, and too many
     rows to find the one that matters.
     """
-    from klack.verification.check import summary
-
     groups = dict.fromkeys(check.group for check in checks)
     rows = [_row(group, [check for check in checks if check.group == group]) for group in groups]
     print_table(f"{summary(checks)}\n", _COLUMNS, rows, left=2, to_stderr=to_stderr)
     stream = sys.stderr if to_stderr else sys.stdout
-    for line in _all_lines(checks) if every else _worst_lines(checks):
+    lines = chain.from_iterable(map(_lines, checks)) if every else _worst_lines(checks)
+    for line in lines:
         print(line, file=stream)
 
 
-def _row(group: str, checks: Sequence["Check"]) -> tuple[str, ...]:
-    from klack.verification.check import headroom_text
-
+def _row(group: str, checks: Sequence[Check]) -> tuple[str, ...]:
     failed = sum(not check.passed for check in checks)
     compared = [check for check in checks if check.tolerance > 0 and check.passed]
     by_headroom = sorted(compared, key=lambda check: check.headroom)
@@ -66,12 +71,7 @@ def _row(group: str, checks: Sequence["Check"]) -> tuple[str, ...]:
     )
 
 
-def _all_lines(checks: Sequence["Check"]) -> Iterator[str]:
-    for check in checks:
-        yield from _lines(check)
-
-
-def _worst_lines(checks: Sequence["Check"]) -> Iterator[str]:
+def _worst_lines(checks: Sequence[Check]) -> Iterator[str]:
     for check in checks:
         if not check.passed:
             yield from _lines(check)
@@ -83,14 +83,7 @@ def _worst_lines(checks: Sequence["Check"]) -> Iterator[str]:
         yield from _lines(check)
 
 
-def _lines(check: "Check") -> Iterator[str]:
-    from klack.verification.check import (
-        deviation_text,
-        headroom_text,
-        number_text,
-        tolerance_text,
-    )
-
+def _lines(check: Check) -> Iterator[str]:
     verdict = "ok" if check.passed else "FAILED"
     name = f"{check.group}: {check.name}"
     indent = " " * 8
@@ -133,7 +126,6 @@ def verify(
         print_groups()
         return 0
     from klack.analyses.json_results import command_json
-    from klack.verification import iterate_checks
     from klack.verification.run_conditions import run_conditions
 
     require_file_target("--html", html)
