@@ -185,7 +185,9 @@ def test_the_pair_of_a_valve_says_what_it_leaves_out(tmp_path, capsys):
     assert main(["export", *words, "body", "--out", str(tmp_path / "body")]) == 0
     other = capsys.readouterr().out
 
-    left_out = said.split("Not in the models, yours to add: ")[1].split(" Written")[0].split(", ")
+    left_out = (
+        said.split("Not in the models, to be added by you: ")[1].split(" Written")[0].split(", ")
+    )
     assert {"spring", "guide", "coil", "driver", "feed", "sac", "nozzle"} <= set(left_out)
     assert not {"needle", "housing", "pole", "seat", "opening"} & set(left_out)
     assert "yours to add" not in other

@@ -570,7 +570,9 @@ def test_a_second_run_says_how_far_it_is_of_the_whole(folder_jobs, sleeping):
 
     assert dict(earlier.spent) == {"mesh": 2.0, "modes": 6.0, "report": 4.0}
     assert share == pytest.approx(5.0 / 12.0, rel=1e-12)
-    assert words == "modes (2 of 3), 50 % of it; 5 s so far; about 7 s left, as the last time"
+    assert (
+        words == "modes (2 of 3), 50 % of it; 5 s so far; about 7 s left, judging by the last run"
+    )
     assert (alone, alone_words) == (None, "modes, 50 %; 5 s so far")
 
 

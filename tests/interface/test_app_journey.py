@@ -145,7 +145,7 @@ def begin_with_an_empty_folder(walk: Walk, folder: Path) -> None:
 
 
 def duplicate_and_note(walk: Walk, folder: Path) -> None:
-    walk.presses(f"Duplicate {VALVE}", "The copy is placed beside it")
+    walk.presses(f"Duplicate {VALVE}", "The copy is placed in it")
     walk.presses("Make", f"impact, {COPY}")
     walk.finds((folder / COPY).read_text() == (folder / VALVE).read_text(), "a copy is the same")
     walk.presses(f"Note {COPY}", f"Note on {COPY}")
@@ -209,7 +209,7 @@ def a_conflict_on_saving(walk: Walk, folder: Path) -> None:
     area.fill(saved + "# mine\n")
     walk.sees("valid impact, not saved")
     file.write_text(saved + "# theirs\n")
-    walk.presses("Save", "The file was changed by another program")
+    walk.presses("Save", "Another program has changed the file")
     walk.finds(file.read_text() == saved + "# theirs\n", "what others wrote stays")
     walk.finds("# mine" in area.input_value(), "and mine is still there to be copied")
     walk.presses("Discard changes", "valid impact, saved")
@@ -335,8 +335,8 @@ def move_pin_hear(walk: Walk, folder: Path) -> None:
 def kill_in_the_middle(walk: Walk, folder: Path, serve: Callable[[Path], Served]) -> None:
     """A run and a text that is not saved outlive a server that is killed."""
     walk.goes("/", f"impact, {COPY}")
-    walk.presses(f"Duplicate {COPY}", "The copy is placed beside it")
-    walk.types("Name", "case-3", "The copy is placed beside it", key="Tab")
+    walk.presses(f"Duplicate {COPY}", "The copy is placed in it")
+    walk.types("Name", "case-3", "The copy is placed in it", key="Tab")
     walk.presses("Make", "impact, valve/case-3.yaml")
     walk.presses(f"Run {COPY}", f"klack impact {COPY}")
     walk.goes("/case?path=valve/case-3.yaml", "valid impact, saved")
@@ -399,7 +399,7 @@ def two_browsers(walk: Walk, browser: Any, folder: Path) -> None:
         other.sees("Another page holds unsaved text of this case.")
         other.presses("Save", "valid impact, saved")
         walk.finds((folder / COPY).read_text() == text + "# two\n", "the second saved first")
-        walk.presses("Save", "The file was changed by another program")
+        walk.presses("Save", "Another program has changed the file")
         walk.goes("/", f"impact, {COPY} · edited, not saved")
         walk.goes(address, "valid impact, not saved")
         walk.finds("# one" in areas[0].input_value(), "the text of the first is not lost")

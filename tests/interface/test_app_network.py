@@ -261,7 +261,7 @@ def test_a_value_typed_while_the_text_is_no_yaml_waits_until_it_is(editor):
     editor.wait_for_selector("text=not valid, not saved")
     box.fill("61 N")
     box.press("Enter")
-    editor.wait_for_selector("text=The value is written once the text can be read")
+    editor.wait_for_selector("text=The value is written as soon as the text can be read")
     assert box.input_value() == "61 N"
     editor.get_by_label("case file, YAML").fill(first)
     require_text(editor, first.replace(f"preload: {was}", "preload: 61 N"))

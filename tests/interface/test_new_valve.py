@@ -251,7 +251,7 @@ def raised(text: str, by: float) -> str:
 @pytest.mark.parametrize(
     ("change", "what", "grade", "words"),
     [
-        ({"held": ()}, "support", "error", "held nowhere"),
+        ({"held": ()}, "support", "error", "the housing is not held"),
         ({"held": ("seat",)}, "support", "error", "contact face is held"),
         ({"needle_contact": ""}, "contact face of the needle", "error", "none"),
         ({"needle_contact": "top"}, "overlap", "error", "in common"),
@@ -289,7 +289,7 @@ def test_a_needle_drawn_elsewhere_is_moved_to_the_touch(tables, tmp_path):
         needle = part_of_table("needle", raised(EXAMPLES["needle"], by))
         found = review(PLAN, {**tables, "needle": needle}, tmp_path / "case.yaml")
         assert word in graded(found, "good")["gap"]
-        assert "touch at the contact faces alone" in graded(found, "good")["overlap"]
+        assert "touch only at the contact faces" in graded(found, "good")["overlap"]
 
 
 def test_a_sharp_edge_that_touches_is_in_doubt(tables, tmp_path):

@@ -519,7 +519,7 @@ class Explorer:
                     key,
                     got="a key without a slider",
                     expected="one of the sliders",
-                    hint="change it in the case, and open that.",
+                    hint="change it in the case, and open the case.",
                 )
             changes |= dict.fromkeys(slider.places, written(slider, value))
         kind: Any = type(self._case)

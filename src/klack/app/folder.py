@@ -37,7 +37,7 @@ _LEFT_OUT = ("node_modules", "__pycache__", "site-packages")
 _CASE_ENDINGS = (".yaml", ".yml")
 _CHOOSE = "choose one in the list of cases and results; the file may have been moved or removed."
 _RENAME = "take another name."
-_NOT_OURS = "remove or rename it: klack app makes a folder of this name of its own."
+_NOT_OURS = "remove or rename it: klack app makes its own folder of this name."
 _NO_WRITING = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO)
 _STEP_ENDINGS = (".step", ".stp")
 _ENDINGS = (*_CASE_ENDINGS, *_STEP_ENDINGS)
@@ -79,7 +79,7 @@ class OpenFolder:
             raise InputError(
                 f"FOLDER {_shown(str(self.path))}",
                 got="a name that is not UTF-8, which no browser can show",
-                expected="a folder whose path is text in UTF-8",
+                expected="a folder whose path is UTF-8 text",
                 hint="rename it.",
             )
 
@@ -161,7 +161,7 @@ class OpenFolder:
         try:
             return self.read(relative, largest=LARGEST_CASE).decode("utf-8")
         except UnicodeDecodeError:
-            raise _refused(relative, "bytes that are no text in UTF-8") from None
+            raise _refused(relative, "bytes that are not UTF-8 text") from None
 
     def write(self, relative: str, text: str) -> None:
         """Replace or make a text file, whole at every moment."""
@@ -221,7 +221,7 @@ class OpenFolder:
         path = PurePosixPath(relative)
         for place in (path, *path.parents[:-1]):
             if (self.path / place).is_symlink():
-                raise _refused(str(place), "a link", "remove it, or move what it names here.")
+                raise _refused(str(place), "a link", "remove the link, or move its target here.")
 
     def keep(self, name: str, data: bytes | None) -> None:
         """Replace a file of the application; None removes it."""
@@ -277,10 +277,10 @@ class OpenFolder:
         if not self.path.is_dir():
             raise InputError(
                 f"folder {self.path}",
-                got="nothing there any more",
-                expected="the folder that klack app has opened",
-                hint="give it its former name, or start klack app with its new one. This page "
-                "keeps what you type in it.",
+                got="a folder that no longer exists",
+                expected="the folder opened by klack app",
+                hint="restore its former name, or start klack app with the new one. This page "
+                "keeps your text until then.",
             )
 
 
@@ -367,7 +367,7 @@ def _too_large(relative: str, size: int, largest: int) -> InputError:
     return InputError(
         f"file {relative[:200]!r}",
         got=f"{size} bytes",
-        expected=f"no more than {largest}",
+        expected=f"at most {largest}",
         hint="is it a mesh or a result? A case names such files and stays small.",
     )
 
@@ -379,8 +379,11 @@ def _failed(relative: str, error: OSError) -> InputError:
     return InputError(
         f"file {relative[:200]!r}",
         got=error.strerror or str(error),
-        expected="room on the disk, and the right to read and write there",
-        hint="make room, or change the rights, then try again; keep the page open until then.",
+        expected="free disk space, and permission to read and write there",
+        hint=(
+            "free some space, or change the permissions, then try again; keep the page open "
+            "until then."
+        ),
     )
 
 

@@ -232,13 +232,13 @@ class Guard:
         """Status and words of a refusal, whatever else is shown."""
         host = _headers(scope, b"host")
         if len(host) != 1 or not self._access.is_own_host(host[0]):
-            return 421, "This server is not called by that name."
+            return 421, "This server does not answer to that host name."
         origin = _headers(scope, b"origin")
         is_reading = scope["type"] == "http" and scope["method"] in _SAFE
         if origin and not (len(origin) == 1 and self._access.is_own_origin(origin[0])):
-            return 403, "A page of another origin asked."
+            return 403, "The request came from a page of another origin."
         if not origin and not is_reading:
-            return 403, "The request does not say from which page it comes."
+            return 403, "The request does not state its origin."
         if scope["type"] == "websocket" and not self._has_session(scope):
             return 403, _NO_TOKEN
         length, largest = _headers(scope, b"content-length"), self._largest_of(scope)
@@ -281,14 +281,14 @@ class Guard:
         try:
             body = await _body(receive, _LONGEST_LOGIN)
         except _TooLarge:
-            await _refuse(scope, send, 413, "More than a password.")
+            await _refuse(scope, send, 413, "The request is longer than a password.")
             return
         given = parse_qs(body.decode("utf-8", "replace")).get("password", [""])[0]
         assert self._access.gate is not None
         if self._access.gate.opens(given):
             await self._enter(send, target)
         else:
-            told = "That is not the password. Wait a second, try again."
+            told = "Wrong password. Wait a second, then try again."
             await _ask_password(send, 403, f'<p role="alert">{told}</p>')
 
     async def _hand_on(self, scope: Scope, receive: Receive, send: Send) -> None:

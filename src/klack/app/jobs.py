@@ -116,7 +116,7 @@ class Job:
         times = [*self.before.values()]
         share = fraction or min(max(now - self.since, 0.0) / max(times[ahead], 1e-9), 1.0)
         left = sum(times[ahead + 1 :]) + times[ahead] * (1.0 - share)
-        words.append(f"about {duration_text(left)} left, as the last time")
+        words.append(f"about {duration_text(left)} left, judging by the last run")
         return 1.0 - left / max(sum(times), 1e-9), "; ".join(words)
 
 
@@ -161,7 +161,7 @@ class Jobs:
         if len(running) >= _MOST_RUNNING:
             raise _refused(f"{len(running)} runs at a time", f"at most {_MOST_RUNNING}")
         if any(job.out == out for job in running):
-            raise _refused(f"a run that writes to {out}, beside another", "one at a time")
+            raise _refused(f"a second run that writes to {out}", "one at a time")
         name = time.strftime("%Y%m%d-%H%M%S-") + secrets.token_hex(4)
         job = Job(name=name, command=command, case=case, out=out, started=time.time(), study=study)
         arguments = [command, str(path), "--out", str(self._folder.path / out), *options]
@@ -181,8 +181,10 @@ class Jobs:
             raise InputError(
                 f"run of {case}",
                 got=error.strerror or str(error),
-                expected="room on the disk, and the right to write there",
-                hint="make room, or change the rights of the folder, then run it again.",
+                expected="free disk space, and permission to write there",
+                hint=(
+                    "free some space, or change the permissions of the folder, then run it again."
+                ),
             ) from None
         return job
 
@@ -355,7 +357,7 @@ def _points(told: Any) -> PointCount | None:
 def _curve(told: Mapping[str, Any]) -> SoFar:
     x, y = (np.asarray(told[key], dtype=float) for key in ("x", "y"))
     if x.ndim != 1 or x.shape != y.shape:
-        raise ValueError("x and y of one length")
+        raise ValueError("x and y of equal length")
     words = {key: str(told[key]) for key in ("title", "x_label", "name")}
     return SoFar(x=x, y=y, dots=bool(told["dots"]), **words)
 

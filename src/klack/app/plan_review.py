@@ -78,7 +78,7 @@ def _case_lines(
     yield "reduction:"
     yield "  correction: consistent  # local law of exactly what the kept modes miss"
     modes = ", ".join(f"{body}: {{count: {count}}}" for body, count in _MODES.items())
-    yield f"  modes: {{{modes}}}  # klack advise tells how many a target takes"
+    yield f"  modes: {{{modes}}}  # klack advise states how many a target needs"
     yield "run:"
     yield "  levels: [reduced]  # add full or interface to compare"
     yield f"  duration: {duration * 1e6:.3g} us"
@@ -124,11 +124,11 @@ def _body(
     yield "    mesh:"
     yield f"      size: {_length(sizes.size)}"
     yield (
-        f"      contact: {{size: {_length(sizes.contact)}, extent: {_length(sizes.extent)}}}"
-        "  # estimated; the result says what the contact needs"
+        f"      contact: {{size: {_length(sizes.contact)}, extent: {_length(sizes.extent)}}}  # "
+        "estimated; the result states what the contact needs"
     )
     if profiles is None:
-        yield "      grading: 0.6  # coarse soon: solids are expensive"
+        yield "      grading: 0.6  # coarsens quickly: solids are expensive"
     yield f"    damping: {{loss_factor: {_LOSS}}}  # of steel parts 0.1 to 0.5 %; an assumption"
     if body == "housing":
         yield "    fixed:"
@@ -214,7 +214,9 @@ def review(plan: ValvePlan, parts: Mapping[str, Part], place: Path) -> Review:
     try:
         meeting = _meeting(plan, parts, materials, numbers)
     except KlackError as error:
-        findings.append(_error("contact faces", str(error), "choose two that face.", _FACES))
+        findings.append(
+            _error("contact faces", str(error), "choose two faces that face each other.", _FACES)
+        )
         return Review(findings=tuple(findings))
     findings += _placing(plan, parts, meeting, numbers)
     sizes = {body: _element_sizes(plan, parts[body], meeting) for body in BODIES}
@@ -259,13 +261,13 @@ def _sizes_of_parts(parts: Mapping[str, Part]) -> Iterator[Finding]:
 
 def _missing(plan: ValvePlan) -> tuple[Finding, ...]:
     found = [
-        _error(f"contact face of the {body}", "none", "choose the face that touches.", _FACES)
+        _error(f"contact face of the {body}", "none", "choose the face that makes contact.", _FACES)
         for body in BODIES
         if not plan.of(body, "contact")
     ]
     if not plan.held:
         advice = "choose the faces by which the housing is held."
-        found.append(_error("support", "the housing is held nowhere", advice, _FACES))
+        found.append(_error("support", "the housing is not held", advice, _FACES))
     if plan.housing_contact in plan.held:
         found.append(_error("support", "the contact face is held", "hold another face.", _FACES))
     return tuple(found)
@@ -296,7 +298,7 @@ def _masses(parts: Mapping[str, Part], materials: Mapping[str, Material]) -> Ite
     if plausible.MOVING_MASS.is_usual(mass):
         yield _good("mass", words)
     else:
-        advice = "compare with a scale or the CAD program; check the unit of the file."
+        advice = "weigh the part, or compare with the CAD program; check the unit of the file."
         yield _doubt("mass", words, advice, _PARTS)
 
 
@@ -414,10 +416,13 @@ def _placing(
         yield _good("gap", words)
     common = overlap(parts, -drawn + numbers["gap"] + _CLEAR)
     if common:
-        advice = "check the contact faces: another pair touches first; or the unit of a file."
+        advice = (
+            "check the contact faces, because another pair touches first, and the units of the "
+            "files."
+        )
         yield _error("overlap", common, advice, _FACES)
     else:
-        yield _good("overlap", "none: the bodies touch at the contact faces alone")
+        yield _good("overlap", "none: the bodies touch only at the contact faces")
     yield _first_touch(meeting)
 
 

@@ -118,7 +118,7 @@ def _bound(host: str, port: int) -> socket.socket:
             f"--host {host} --port {port}",
             got=f"an error: {error}",
             expected="an address of this machine with a free port",
-            hint="leave --port out: a free one is taken.",
+            hint="leave --port out: a free port is then used.",
         ) from None
     return bound
 
@@ -217,7 +217,7 @@ def _add_files(outer: FastAPI, state: State) -> None:
     async def sound(name: str) -> Response:
         wav = state.sounds.get(name.removesuffix(".wav"))
         if wav is None:
-            return PlainTextResponse("this sound is not kept any more\n", 404)
+            return PlainTextResponse("this sound is no longer kept\n", 404)
         return Response(wav, media_type="audio/wav", headers={"cache-control": "no-store"})
 
     async def points(path: str = "", known: str = "") -> Response:
@@ -228,7 +228,7 @@ def _add_files(outer: FastAPI, state: State) -> None:
     async def scene(name: str) -> Response:
         packed = state.scenes.get(name.removesuffix(".json"))
         if packed is None:
-            return PlainTextResponse("this scene is not kept any more\n", 404)
+            return PlainTextResponse("this scene is no longer kept\n", 404)
         headers = {"content-encoding": "gzip", "cache-control": "no-store"}
         return Response(packed, media_type="application/json", headers=headers)
 

@@ -76,7 +76,7 @@ def _tidy(held: HeldFolder) -> None:
 def _words(head: bytes) -> str:
     """Beginning of a file that is not STEP, for its sender."""
     text = head[:24].decode("utf-8", errors="replace").split("\n")[0]
-    return repr(text) if text.isprintable() else "bytes that are no text"
+    return repr(text) if text.isprintable() else "bytes that are not text"
 
 
 def _refused(got: str) -> InputError:
@@ -139,7 +139,7 @@ class Notes:
                 "note",
                 got=f"more than {LONGEST_NOTE} characters",
                 expected=f"at most {LONGEST_NOTE}",
-                hint="make it shorter, or write a file beside the case.",
+                hint="make it shorter, or write a file next to the case.",
             )
         self._change("notes.json", of, text)
 

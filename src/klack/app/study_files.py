@@ -54,7 +54,7 @@ def _outside(named: str) -> InputError:
     return InputError(
         "study: case",
         got=f"{named[:200]!r}",
-        expected="a case file below the folder of the application, and no link",
+        expected="a case file below the folder of the application that is not a link",
         hint="name one relative to the file of the study, or choose one here.",
     )
 
@@ -172,15 +172,15 @@ def points_source(state: State, out: str) -> PointsSource:
         raise InputError(
             f"result {out[:200]!r}",
             got="no study",
-            expected="the folder of a study below that of the application",
+            expected="the folder of a study below the folder of the application",
             hint="choose a study in the list of results.",
         )
     if job.state == "done":
         raise InputError(
             f"result {out[:200]!r}",
-            got="nothing there any more",
+            got="a result that no longer exists",
             expected="the result of a study that has ended",
-            hint="start the study again; the list of cases has it.",
+            hint="start the study again from the list of cases.",
         )
     return PointsSource(folder=None, job=job, is_live=True, mark="")
 

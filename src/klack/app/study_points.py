@@ -283,7 +283,7 @@ def _doubts(
             kind = kinds.setdefault(text, min(len(kinds), _LISTED))
             found.append((place, kind))
     texts = list(kinds)[:_LISTED]
-    return [*texts, "A doubt; klack export --to csv has its words."], found
+    return [*texts, "A doubt; klack export --to csv writes its text."], found
 
 
 def _failures(failures: Sequence[str], failed: NDArray[np.bool_]) -> dict[str, Any]:

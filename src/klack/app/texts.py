@@ -68,7 +68,7 @@ _TYPED = re.compile(r"\d[\d.]*(?:e-?\d+)?(?: ?%| [A-Za-z][A-Za-z0-9*/^]*)|[A-Za-
 _TAKEN = ("true", "false", "null", "yes", "no", "on", "off", "nan", "inf")
 _WORDS = {"minimise", "maximise"}
 _DESIGNS = {
-    "sobol": "an even cover; better a power of two",
+    "sobol": "even coverage; preferably a power of two",
     "latin-hypercube": "each parameter evenly",
     "saltelli": "which parameter causes the scatter: points times (2 + number of parameters)",
     "morris": "which parameters matter at all: points times (1 + number of parameters)",
@@ -224,7 +224,7 @@ def study_text(choice: StudyChoice, case_text: str, case_path: str) -> str:
     for key, (low, high) in choice.ranges.items():
         known = today.get(key)
         if known is None:
-            raise _refused(key[:80], "a key that the case has no number at", "one of the list", "")
+            raise _refused(key[:80], "a key without a number in the case", "one of the list", "")
         name = known.label.replace(" ", "_") if known.also else key
         lines.append(
             f"    {_as_yaml(name)}: {{from: {_as_yaml(low)}, to: {_as_yaml(high)}}}"
@@ -233,7 +233,7 @@ def study_text(choice: StudyChoice, case_text: str, case_path: str) -> str:
         if known.also:
             linked += [f"    {'.'.join(map(str, place))}: {name}" for place in known.places]
     if linked:
-        lines += ["  linked:  # what always has the same value", *linked]
+        lines += ["  linked:  # keys that always have the same value", *linked]
     measures = dict.fromkeys((*choice.measures, *choice.objectives))
     of = {item.name: item.measure for item in kind_of(case).measures(case, measures)}
     lines.append("  measures:")

@@ -192,7 +192,7 @@ class Plans:
                     f"drawing of the {body}",
                     got=f"{len(plan.of(body, 'table'))} characters",
                     expected=f"at most {_LONGEST}",
-                    hint="bring such a body as STEP file or as mesh.",
+                    hint="provide such a body as a STEP file or a mesh.",
                 )
         self._folder.keep(_FILE, json.dumps(asdict(plan)).encode())
 

@@ -82,7 +82,7 @@ class Worker:
 def _dead(code: int | None) -> InputError:
     return InputError(
         "computation",
-        got=f"an end of its process ({code})",
+        got=f"a process that ended ({code})",
         expected="an answer",
         hint="try again; with a smaller model if the memory of this machine is exhausted.",
     )

@@ -19,7 +19,7 @@ _PACKAGES = (
 def about(*, wanted: Shown = SHOWN) -> int:
     """Show versions of klack and its libraries, processor, solvers and folders.
 
-    For the report of a fault: copy all of it.
+    In a bug report, include the whole output.
     """
     from klack.analyses.json_results import command_json
     from klack.machine.cache.result_cache import result_cache

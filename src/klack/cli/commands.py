@@ -57,13 +57,13 @@ def app(
     host: Annotated[
         str,
         Parameter(
-            help="Address to listen on. Other machines can connect only with another one than "
-            "this, and with a password; what is sent is not encrypted."
+            help="Address to listen on. With the default only this machine can connect; any "
+            "other address requires a password, and the traffic is not encrypted."
         ),
     ] = "127.0.0.1",
     password_file: Annotated[
         Path | None,
-        Parameter(help="File whose first line is the password, for another --host."),
+        Parameter(help="File whose first line is the password; required with another --host."),
     ] = None,
     browser: Annotated[
         bool, Parameter(name="--open", help="Open the address in the browser.")
@@ -71,7 +71,7 @@ def app(
 ) -> int:
     """Show cases, runs and results of a folder in the browser, with live sliders.
 
-    Serves this machine alone, at an address with a random token. Runs continue when it is stopped.
+    Serves only this machine, at an address with a random token. Runs continue when it stops.
     """
     refuse_if(
         not 0 <= port <= 65535,
@@ -129,11 +129,11 @@ def cache(
     clear: Annotated[bool, Parameter(negative="", help="Delete everything in it.")] = False,
     json: Json = None,
 ) -> int:
-    """Show where results are kept for later runs, and how much; KLACK_CACHE=off turns that off.
+    """Show the folder and size of the cache of results; KLACK_CACHE=off turns the cache off.
 
     KLACK_CACHE names another folder.
-    KLACK_CACHE_SIZE is the size at which the oldest results go (5 GB).
-    Meshes, modes and static solutions are kept, under a key of all that matters.
+    Above KLACK_CACHE_SIZE (5 GB) the oldest results are deleted.
+    Meshes, modes and static solutions are kept, under a hash of everything they depend on.
     Deleting them costs nothing but time.
     """
     from klack.analyses.json_results import command_json
@@ -226,8 +226,8 @@ def inspect(
 ) -> int:
     """Show surfaces and sets of CAD or a mesh, rows of a matrix, inputs and outputs of an FMU.
 
-    Of a case: its parameters and expressions in SI, the components of included parts, and the
-    bodies, checked as a run checks them; of a valve, what moves, what meets, and a first speed.
+    For a case: its parameters and expressions in SI, the components of included parts, and the
+    bodies, checked as in a run; for a valve also moving parts, contacts and a first speed.
     """
     from klack.analyses.inspection import inspect_case, inspect_file
     from klack.case.reader import shipped_cases
@@ -267,7 +267,7 @@ def _show(file: str, parts: "Iterable[tuple[str, tuple[Row, ...]]]", wanted: Sho
 def report(
     result: Annotated[
         Path,
-        Parameter(name="RESULT", help="Folder that another command of klack wrote."),
+        Parameter(name="RESULT", help="Folder written by another command of klack."),
     ],
     /,
     *,
@@ -323,7 +323,7 @@ def schema(
         ),
     ] = Path("-"),
 ) -> int:
-    """Print the JSON schema of case files, for editors that check while one types, or results."""
+    """Print the JSON schema of case files, for editors that check as you type, or of results."""
     require_json_target(json)
     write_json(json, _schema_of(kind))
     return 0
@@ -342,14 +342,15 @@ def _schema_of(kind: str) -> dict[str, Any]:
 def warm(
     *,
     clear: Annotated[
-        bool, Parameter(negative="", help="Delete what is there, and compile all of it.")
+        bool,
+        Parameter(negative="", help="Delete the compiled functions first, and compile all again."),
     ] = False,
     wanted: Shown = SHOWN,
 ) -> int:
-    """Compile ahead what strokes, impacts and derivatives need, once per processor and version.
+    """Compile in advance what strokes, impacts and derivatives need; once per processor.
 
     Without it the first command compiles, for half a minute to a minute.
-    What is there already is not compiled again.
+    Functions that are compiled already are kept.
     NUMBA_CACHE_DIR names another folder for compiled functions.
     """
     from klack.analyses.json_results import command_json

@@ -36,7 +36,7 @@ _Case = Annotated[
 
 def compare(
     result: Annotated[
-        Path, Parameter(name="RESULT", help="Folder that klack impact, stroke or shots wrote.")
+        Path, Parameter(name="RESULT", help="Folder written by klack impact, stroke or shots.")
     ],
     /,
     *,
@@ -46,9 +46,9 @@ def compare(
             name="--measurement",
             consume_multiple=True,
             negative="",
-            help="Recording of the valve, or of a sensor on a body, for results of klack impact, "
-            "stroke and shots; several files make one set. VARIANT=FILE for another variant than "
-            "the first: dry=FILE.",
+            help="Recording of the valve, or of a sensor on a body, for results of klack "
+            "impact, stroke and shots; several files make one set. VARIANT=FILE for a variant "
+            "other than the first: dry=FILE.",
         ),
     ] = None,
     variant: Annotated[list[str] | None, Parameter(name="--variant", show=False)] = None,
@@ -213,7 +213,7 @@ def _low_pass_in(case: Path, study: "ImpactStudy", sensor: _Sensor) -> "LowPass 
         f"--case {case}",
         got=f"no output '{name}'",
         expected=f"an output of the same name, one of: {', '.join(outputs) or 'none'}",
-        hint="its low pass is used; leave --case out for that of the result.",
+        hint="its low pass is used; without --case the one of the result.",
     )
     low_pass = outputs[name].low_pass
     return None if low_pass is None else low_pass.filter

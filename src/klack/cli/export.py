@@ -82,11 +82,11 @@ class Choice:
         Literal["body", "pair"] | None,
         Parameter(
             name="--part",
-            help="body: each linear body alone; pair: all bodies with contacts and films. "
+            help="body: each linear body by itself; pair: all bodies with contacts and films. "
             "[default: both]",
         ),
     ] = None
-    body: Annotated[str | None, Parameter(name="--body", help="One body alone. [default: all]")] = (
+    body: Annotated[str | None, Parameter(name="--body", help="Only this body. [default: all]")] = (
         None
     )
     fmi: Annotated[
@@ -104,7 +104,7 @@ class Choice:
     ] = None
     level: Annotated[
         Literal["reduced", "full"] | None,
-        Parameter(name="--level", help="Whose fields vtk shows. [default: reduced]"),
+        Parameter(name="--level", help="Level whose fields vtk shows. [default: reduced]"),
     ] = None
     frames: Annotated[
         int | None, Parameter(name="--frames", help="Number of frames for vtk. [default: 50]")
@@ -117,7 +117,8 @@ class Choice:
         ),
     ] = None
     variant: Annotated[
-        str | None, Parameter(name="--variant", help="Its variant. [default: the first one]")
+        str | None,
+        Parameter(name="--variant", help="Variant of that stroke. [default: the first one]"),
     ] = None
     step: Annotated[
         str | None,
@@ -134,12 +135,13 @@ class Choice:
         str | None,
         Parameter(
             name="--penalty",
-            help='Its contact pressure per overclosure, "1e9 MPa/mm". [default: 300 E* / element '
-            "size]",
+            help='Contact pressure per overclosure of the calculix deck, "1e9 MPa/mm". '
+            "[default: 300 E* / element size]",
         ),
     ] = None
     run: Annotated[
-        bool, Parameter(name="--run", negative="", help="Run CalculiX too (it must be installed).")
+        bool,
+        Parameter(name="--run", negative="", help="Run CalculiX as well, which must be installed."),
     ] = False
     time_limit: Annotated[
         str | None, Parameter(name="--time-limit", help='Stop that run after this long, "20 min".')
@@ -224,7 +226,7 @@ def export(
         hint="run klack stroke first, and give the folder that it names at the end.",
     )
     if to == "parquet":
-        raise _parquet_is_for_studies(f"'{source}', which is no stored result")
+        raise _parquet_is_for_studies(f"'{source}', which is not a stored result")
 
     from klack.case.any_case import load_any_case
 
@@ -346,7 +348,7 @@ def _export_models(
         progress(to, 1.0)
     lines = [*map(_described, (*bodies, *pair))]
     if pair and every.outside:
-        lines.append(f"Not in the models, yours to add: {', '.join(every.outside)}")
+        lines.append(f"Not in the models, to be added by you: {', '.join(every.outside)}")
     return replace(made, lines=(*lines, *made.lines))
 
 
@@ -430,7 +432,7 @@ def _export_point(source: Path, point: int | None, out: Path | None) -> tuple[st
     if not isinstance(study, StudyRecord):
         raise InputError(
             str(source),
-            got="no result of a study",
+            got="a folder without the result of a study",
             expected="the folder of klack study or klack optimise",
             hint="give the folder that the command names at the end.",
         )
@@ -497,7 +499,7 @@ def _export_stored_impact(
         choice.level is not None,
         "--level",
         got="it with the result of a stroke",
-        expected="no level: the motion is that of the recorded modes",
+        expected="no level: the motion comes from the recorded modes",
         hint="leave --level out.",
     )
     study = load_result(source)

@@ -27,8 +27,8 @@ _Out = Annotated[
     Path | None,
     Parameter(
         name="--out",
-        help="File to write; its ending says what: .html, the page; .svg, the schematic of a "
-        "valve. [default: NAME.html in the current folder]",
+        help="File to write; its extension selects the content: .html, the page; .svg, the "
+        "schematic of a valve. [default: NAME.html in the current folder]",
     ),
 ]
 _Unit = Annotated[
@@ -182,7 +182,7 @@ def _ending(out: Path | None) -> str:
     refuse_if(
         ending not in _ENDINGS,
         f"--out {out}",
-        got=f"the ending '{ending}'" if ending else "a name without an ending",
+        got=f"the extension '{ending}'" if ending else "a name without an extension",
         expected=" or ".join(_ENDINGS),
         hint=f"--out {Path(str(out)).with_suffix(_PAGE).name}",
     )
@@ -237,7 +237,7 @@ _NONE = "-"
 def _component_tables(types: "Sequence[DescribedType]") -> Iterator[TextTable]:
     """Ports and keys of every type, then equations and sources; what is optional in brackets."""
     yield TextTable(
-        title="Component types: what may be left out is in brackets",
+        title="Component types; optional ports and keys are in brackets",
         columns=("type", "what it is", "ports", "keys"),
         rows=[(item.word, _summary(item), _ports(item), _keys(item.keys)) for item in types],
         left=4,

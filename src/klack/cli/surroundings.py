@@ -106,7 +106,7 @@ _WORDS: Mapping[int, str] = {
     errno.EFBIG: "a file exceeds the size limit of the system.\nTry: ulimit -f unlimited.",
     errno.EMFILE: "too many files are open.\nTry: ulimit -n 4096.",
     errno.ENFILE: "too many files are open.\nTry: close other programs.",
-    errno.ENAMETOOLONG: "a file name is too long for the system.\nTry: a shorter one.",
+    errno.ENAMETOOLONG: ("a file name is too long for the system.\nTry: a shorter name."),
     errno.ELOOP: "symbolic links form a loop.\nTry: the target itself.",
     errno.EIO: "the disk or the network drive failed.\nTry: another folder (--out).",
 }

@@ -603,7 +603,7 @@ class SceneView {
     if (!this.bodies.length) { this.view.hidden = true; return; }
     const context = this.context();
     if (!context) {
-      this.over.append(el('p', {class: 'ks-said', text: 'This browser has no WebGL 2: the bodies cannot be drawn. Names of faces and numbers stand beside.'}));
+      this.over.append(el('p', {class: 'ks-said', text: 'This browser has no WebGL 2: the bodies cannot be drawn. Names of faces and numbers are listed next to it.'}));
       this.renderer = null;
       return;
     }
@@ -1180,7 +1180,7 @@ class SceneView {
       this.sizeText.textContent = `Largest displacement ${number(100 * this.state.share, 2)} % of the overall size; a mode has no amplitude of its own.`;
     } else {
       this.state.factor = Math.max((this.unit || 1) * 10 ** ((position - 50) / 35), 0);
-      this.sizeText.textContent = Math.abs(this.state.factor - 1) < 0.01 ? 'Displacements in true size' : `Displacements ${number(this.state.factor, 2)} times as large`;
+      this.sizeText.textContent = Math.abs(this.state.factor - 1) < 0.01 ? 'Displacements at true scale' : `Displacements ${number(this.state.factor, 2)} times as large`;
     }
     this.place();
   }

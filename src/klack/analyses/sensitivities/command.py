@@ -60,7 +60,7 @@ def sensitivities(
     component: Components = None,
     wanted: Wanted = WANTED,
 ) -> int:
-    """Derivatives with parameters: of a stroke by exact tangents, of an impact by differences."""
+    """Derivatives by parameters: of a stroke with exact tangents, of an impact with differences."""
     if study is not None:
         require_files("--study", [study])
 

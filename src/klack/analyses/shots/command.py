@@ -58,7 +58,7 @@ def shots(
     component: Components = None,
     wanted: WantedResult = WANTED_RESULT,
 ) -> int:
-    """Drop or actuate the valve many times: is the highest rebound the one of a centred impact?"""  # noqa: D400
+    """Drop or actuate the valve many times: does a centred impact rebound highest?"""  # noqa: D400
     if count is not None:
         require_positive("--shots", count, "shots")
     if seed is not None:

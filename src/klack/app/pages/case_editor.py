@@ -238,7 +238,7 @@ class _Editor:
         if change.told is not None:
             change.told(str(error))
             return
-        words = "The value is written once the text can be read. " if change.is_late else ""
+        words = "The value is written as soon as the text can be read. " if change.is_late else ""
         with self._form:
             show_error(KlackError(f"{words}{error}"))
 
@@ -442,8 +442,8 @@ class _Editor:
             now = await asyncio.to_thread(self._state.folder.case_text, self._case)
             if now not in (self._saved, text):
                 self._message.set_text(
-                    "The file was changed by another program since it was opened. Copy what you "
-                    "need, then Discard changes."
+                    "Another program has changed the file since it was opened. Copy what you "
+                    "need, then press Discard changes."
                 )
                 return False
             await asyncio.to_thread(self._state.folder.write, self._case, text)
@@ -486,7 +486,7 @@ class _Editor:
                 self._message.set_text(f"Not run.\n{found.error}")
                 return
             if found.kind == "study":
-                self._message.set_text("Not run: this is a study, and its button is above.")
+                self._message.set_text("Not run: this is a study; use its button above.")
                 return
             if text != self._text:  # typed on meanwhile
                 self._message.set_text("Not run: the text has changed meanwhile. Press Run again.")

@@ -107,7 +107,7 @@ class NetworkPanel:
         self._picture.style(f"width: {width}; max-width: {self._width:.0f}px")
         words = f"{self._port}: click the port to connect it with, or choose it in the list below."
         if self._is_old and self._drawn:
-            self._told.set_text("This text cannot be drawn: the picture is that of an earlier one.")
+            self._told.set_text("This text cannot be drawn: the picture shows an earlier version.")
         else:
             self._told.set_text(words if self._port else _HINT)
         self._cancel.set_visibility(bool(self._port))
@@ -160,7 +160,13 @@ class NetworkPanel:
                     button("Remove", self._remove, of=part.name)
             plain(part.meaning, "p").classes("k-soft")
             if part.is_included:
-                plain("It stands in an included part, whose own file has its keys.", "p")
+                plain(
+                    (
+                        "This component is in an included part; its keys are in the file of that "
+                        "part."
+                    ),
+                    "p",
+                )
         written = [item for item in part.fields if item.written]
         for item in written:
             field_row(item, _NAME)
@@ -272,7 +278,7 @@ class NetworkPanel:
 
         with _Dialog(f"Rename {old}", "Rename", rename):
             _line("Name", now, "name", start=old)
-            plain("Connections and all else that names it get the new name as well.", "p")
+            plain("Connections and all other references get the new name as well.", "p")
 
     async def _choose_next(self, name: str) -> None:
         names = [part.name for part in self._view.parts]

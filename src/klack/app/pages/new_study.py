@@ -64,15 +64,15 @@ class _NewStudy:
         """Three lists and a button."""
         with ui.element("section").classes("k-section"):
             heading("What varies")
-            plain(
-                "Tick numbers of the case; write the ends of a range with their unit.", "p"
-            ).classes("k-soft")
+            plain("Tick numbers of the case; write both ends of a range with a unit.", "p").classes(
+                "k-soft"
+            )
             self._show_list(self._offer.parameters, self._show_parameters)
         with ui.element("section").classes("k-section"):
             heading("What is computed")
             plain(
-                "Objectives are what klack optimise searches for, and they define the front: one "
-                "to four.",
+                "Objectives are the goals of klack optimise, and they define the front: one to "
+                "four.",
                 "p",
             ).classes("k-soft")
             self._show_list(self._offer.measures, self._show_measures)

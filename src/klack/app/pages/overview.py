@@ -237,10 +237,10 @@ class _Overview:
             more = f" and {len(found.odd) - _NAMED} more" if len(found.odd) > _NAMED else ""
             plain(f"Left out: {', '.join(found.odd[:_NAMED])}{more}.", "p").classes("k-error")
         if not found.is_whole:
-            plain("This folder contains more than klack app looks at.", "p").classes("k-error")
+            plain("This folder contains more files than klack app reads.", "p").classes("k-error")
         if not self._state.folder.path.is_dir():
             plain(
-                f"The folder {self._state.folder.path} no longer exists. Give it back its former "
+                f"The folder {self._state.folder.path} no longer exists. Restore its former "
                 "name, or start klack app with the new one.",
                 "p",
             ).classes("k-error").props("role=alert")
@@ -255,7 +255,7 @@ class _Overview:
         cases = self._shown(self._found.cases)
         if not cases:
             if self._found.cases:
-                plain("No case has this in its name.", "p").classes("k-soft")
+                plain("No case name contains this text.", "p").classes("k-soft")
             return
         await self._show_rows(cases, self._checked, self._show_case)
 
@@ -345,7 +345,7 @@ class _Overview:
 
         self._ask(
             f"Duplicate {case}",
-            "The copy is placed beside it, so the files that it names are found.",
+            "The copy is placed in the same folder, so the files that it names are found.",
             {},
             "",
             f"{path.stem}-2",
@@ -397,7 +397,9 @@ class _Overview:
             compare = link("Compare two", "#").props("id=k-compare aria-disabled=true")
         if not results:
             compare.delete()
-            words = "No result has this in its name." if self._sought else "None yet: run a case."
+            words = (
+                "No result name contains this text." if self._sought else "None yet: run a case."
+            )
             plain(words, "p").classes("k-soft")
             return
         self._chosen = [name for name in self._chosen if name in results]

@@ -36,8 +36,8 @@ _OF_STEP = (
     "with the other, both in the coordinates of the assembly."
 )
 _OF_TABLE = (
-    "In mm. Each row: r, z, name of the surface that leads there; for an arc also r and z of its "
-    "centre. The first row is the start, and the outline closes itself."
+    "In mm. Each row: r, z, name of the surface that leads there; for an arc also r and z of "
+    "its centre. The first row is the start; the outline is closed automatically."
 )
 _MODELS = {
     "half": "their half sections: seconds, fine elements at the contact",
@@ -228,7 +228,8 @@ class PartsStep:
         with self._models, ui.element("div").classes("k-sheet k-pad k-stack k-below"):
             if shown == "solid":
                 plain(
-                    "Computed as solids, in minutes: not both parts are turned around z.", "p"
+                    ("Computed as solids, in minutes: at least one part is not turned around z."),
+                    "p",
                 ).classes("k-soft")
                 return
             choice_field(

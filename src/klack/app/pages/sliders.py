@@ -121,7 +121,9 @@ class _Sliders:
                     self._show_slider(slider)
         if fixed:
             with ui.element("details"):
-                plain(f"{len(fixed)} that need a new mesh or new laws", "summary").classes("k-pad")
+                plain(f"{len(fixed)} that require a new mesh or new laws", "summary").classes(
+                    "k-pad"
+                )
                 for slider in fixed:
                     with ui.element("div").classes("k-field"):
                         plain(slider.label, "div")

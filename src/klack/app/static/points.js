@@ -193,7 +193,7 @@
         make("div", { class: "k-head" }, make("h2", { text: "All parameters and measures" }), this.told,
           make("button", { type: "button", class: "k-btn", text: "Clear the selection",
             onclick: () => { this.brushes.clear(); this.page = 0; this.select(); this.showRanges(); } })),
-        make("p", { class: "k-soft", text: "Drag along an axis, or across the chart above: only the points that pass there stay in all views. A click on an axis removes its range." }),
+        make("p", { class: "k-soft", text: "Drag along an axis, or across the chart above: only the points within that range stay in all views. Click an axis to remove its range." }),
         make("div", { class: "k-scroll", tabindex: "0" }, this.lines),
         make("details", { ontoggle: () => this.showRanges() }, make("summary", { text: "Ranges as numbers" }), this.ranges));
       this.listenLines();
@@ -245,7 +245,7 @@
         const words = { cancelled: "stopped", lost: "ended without a result or a message", failed: "failed" };
         this.tell(`${words[job.state] || job.state}; the points so far are kept`, job.state === "failed" ? "out" : "fair");
       } else {
-        this.tell(study && !study.feasible ? "complete; no point keeps all bounds" : "complete", study && !study.feasible ? "fair" : "good");
+        this.tell(study && !study.feasible ? "complete; no point meets all bounds" : "complete", study && !study.feasible ? "fair" : "good");
       }
       this.progress.hidden = !running;
       const share = running ? Math.round(100 * (job.done !== null && job.most ? job.done / job.most : job.fraction)) : 0;
@@ -312,7 +312,7 @@
     showChosen() {
       const { chosen } = this.parts, k = this.place.get(this.chosen);
       if (k === undefined) {
-        chosen.replaceChildren(make("p", { class: "k-soft", text: "Click a point, or a number in the table: its values beside today's, its click, its case file." }));
+        chosen.replaceChildren(make("p", { class: "k-soft", text: "Click a point, or a number in the table: its values next to today's, its click, its case file." }));
         return;
       }
       const rows = this.study.columns.map(column => make("tr", {},

@@ -70,7 +70,7 @@ class Dimension:
 
     @property
     def number(self) -> bool:
-        """Whether this can be a number without unit."""
+        """Whether this can be a number without a unit."""
         return self.plain and (_NONE, _NONE) in self.turns
 
     def times(self, other: "Dimension") -> "Dimension":
