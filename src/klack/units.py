@@ -605,6 +605,8 @@ def format_si(value: float, unit: str, digits: int = 4) -> str:
     """
     if unit in ("", "-"):
         return f"{value:.{digits}g}"
+    if value == 0 and unit == "m":
+        return "0 um"  # no length of a valve is told in metres
     if value == 0 or not isfinite(value):
         return f"{value:g} {unit}"
     rounded = abs(float(f"{value:.{digits}g}"))

@@ -289,7 +289,7 @@ def bricks_case(folder: Path) -> Path:
 def test_a_case_shows_of_a_file_only_the_solids_that_a_body_takes(tmp_path: Path, capsys):
     assert main(["inspect", str(bricks_case(tmp_path))]) == 0
     told, impact = " ".join(capsys.readouterr().out.split()).split("case: impact")
-    assert "contact pin.END_UPPER on block.END_LOWER: gap 0 m, starts with 1 m/s" in impact
+    assert "contact pin.END_UPPER on block.END_LOWER: gap 0 um, starts with 1 m/s" in impact
     pin, block = told.split("block what")
     # a cube of 1 mm: its inertia is m a^2 / 6 about each axis
     inertia = f"inertia {0.00785 / 6:.5g} g mm^2 about the axis, {0.00785 / 6:.5g} g mm^2 across"
@@ -396,13 +396,13 @@ def test_a_valve_shows_travels_pairs_and_a_first_speed(tmp_path: Path, capsys):
     assert main(["inspect", str(tmp_path / "free.yaml")]) == 0
 
     shown = " ".join(capsys.readouterr().out.split())
-    assert "needle 1.25 g, travels from 0 m (seat) to 60 um (pole)" in shown
-    assert "armature 1.6 g, travels from 0 m (seat and rest) to 100 um (pole)" in shown
+    assert "needle 1.25 g, travels from 0 um (seat) to 60 um (pole)" in shown
+    assert "armature 1.6 g, travels from 0 um (seat and rest) to 100 um (pole)" in shown
     assert (
-        "gap 0 m, opens to 60 um, at most 100 um if it continues in flight" in shown
+        "gap 0 um, opens to 60 um, at most 100 um if it continues in flight" in shown
     )  # the needle to the pole
     assert "carry needle.collar on armature.top: gap 40 um, opens to 40 um" in shown
-    assert "rest armature.bottom on needle.ring: gap 0 m, opens to 40 um" in shown
+    assert "rest armature.bottom on needle.ring: gap 0 um, opens to 40 um" in shown
     both = "springs 1.54 mJ, pressures 0 J on 2.85 g with armature over 60 um"
     assert f"needle 1.04 m/s: {both}" in shown
     assert "on 1.6 g over 100 um; faster, because needle pushes it at first" in shown

@@ -100,7 +100,7 @@ def test_an_armature_that_would_pass_through_its_pole_is_refused_with_both_gaps(
         rows_of(MAGNET)
 
     assert "take up to 300 um (components.stop.gap: 300 um)" in caught.value.got
-    assert "0 m to 4 mm" in caught.value.expected
+    assert "0 um to 4 mm" in caught.value.expected
     rows_of(MAGNET.replace("gap: 300 um", "gap: 60 um"))  # it may just touch
 
 
@@ -138,7 +138,7 @@ def test_an_armature_that_no_stop_holds_ends_the_run_with_its_name_and_time():
         simulate_network(rows, duration=4e-3, step=100e-9)
 
     (text,) = [one for one in told if "'coil'" in one]
-    assert "leaves the range of the magnet of 'coil', from 0 m to 4 mm" in text
+    assert "leaves the range of the magnet of 'coil', from 0 um to 4 mm" in text
     # 5 N and 60 to 100 um of way against a magnet of some 10 N: within a millisecond or two
     assert 0.1e-3 < moment(end.value) < 4e-3
 

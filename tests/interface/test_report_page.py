@@ -55,7 +55,7 @@ def test_contents_lead_to_every_part(impact_content: Content):
     assert links == parts
     titles = [title for _, title in parts]
     assert titles[: len(impact_content.sections)] == [s.title for s in impact_content.sections]
-    assert titles[-3:] == ["What the words mean", "Limits", "How to compute it again"]
+    assert titles[-3:] == ["Glossary", "Limits", "Reproducing this result"]
 
 
 def test_next_steps_are_commands_that_exist(impact_study: ImpactStudy):
@@ -94,7 +94,7 @@ def test_steps_that_need_an_unknown_case_are_left_out():
 
     assert [shlex.split(step.command) for step in steps] == [["klack", "noise", "$(reboot); x"]]
     assert "klack noise &#39;&lt;b&gt;&#39;" in render_html(content.placed(result="<b>", case=""))
-    assert "What next" not in render_html(content.placed())
+    assert "Next steps" not in render_html(content.placed())
 
 
 def one_chart_each(count: int, panels: int = 2) -> Content:

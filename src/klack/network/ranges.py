@@ -345,7 +345,7 @@ def _check_pressure(rows: Rows, limit: LimitRow) -> None:
 
 
 def range_text(limit: LimitRow) -> str:
-    """Range of the law as text: "from 0 m to 4 mm", "above 0 mm^3", "up to 500 bar (source)"."""
+    """Range of the law as text: "from 0 um to 4 mm", "above 0 mm^3", "up to 500 bar (source)"."""
     low, high = limit.valid
     text = f"from {value_text(low, limit.unit)} to {value_text(high, limit.unit)}"
     if high == inf:

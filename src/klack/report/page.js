@@ -99,7 +99,7 @@ const fold = document.getElementById("fold");
 fold.addEventListener("click", () => {
   const open = parts.some(part => !part.open);
   unfold(open);
-  fold.textContent = open ? "Fold all" : "Unfold all";
+  fold.textContent = open ? "Collapse all" : "Expand all";
 });
 for (const link of document.querySelectorAll(".contents a")) {
   link.addEventListener("click", () => { document.getElementById(link.hash.slice(1)).open = true; });

@@ -60,7 +60,7 @@ def quantity(value: float, unit: str, digits: int = 4) -> str:
     if not isfinite(value):
         return _NONE if value != value else "∞"
     if value == 0.0:
-        return f"0{_space(unit)}"
+        return f"0{_space('µm' if unit == 'm' else unit)}"
     if unit in ("kg", "kg/s"):
         return quantity(1e3 * value, unit[1:], digits)
     pure = _PURE_POWER.fullmatch(unit)
