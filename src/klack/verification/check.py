@@ -209,11 +209,11 @@ COVERS = {
     "revolution, tube, rod, beam; and the direct solvers against each other.",
     "contact": "Static contact of meshed bodies: Hertz, patch test, gap between curved faces, "
     "local law, reciprocity.",
-    "reduction": "What a reduced body keeps of the full one: static compliance, receptance, "
-    "mass, and what truncation misses.",
+    "reduction": "Reduced bodies against full ones: static compliance, receptance, mass, and "
+    "the error of truncation.",
     "integrator": "Time integration of reduced bodies: exact modes, order of convergence, energy "
     "and momentum.",
-    "impact": "Reduced impacts against closed and tabulated solutions: Hertz, St Venant, "
+    "impact": "Reduced impacts against closed-form and tabulated solutions: Hertz, St Venant, "
     "needle on a spring, Zener; a bar that bounces, at all levels.",
     "transient": "Full-order impact with set-valued contact: rods, a blocked bar, a sphere on a "
     "thick block.",
@@ -222,8 +222,8 @@ COVERS = {
     "friction": "Coulomb friction between the faces: partial slip, oblique impacts, seats, jams.",
     "plasticity": "Faces that yield: one point, spheres and a seat on finite elements, running-in, "
     "impacts in time.",
-    "off-axis": "A needle in space: films that tilt, films in its guide, magnet and seat, drops "
-    "and starts in a network, faces that rub.",
+    "off-axis": "A needle in three dimensions: tilting films, films in its guide, magnet and "
+    "seat, drops and starts in a network, faces with friction.",
     "spectra": "Spectra of pulses, Parseval, and one-third-octave bands of IEC 61260-1.",
     "vibration": "Mobility, force on the support, energy injected, plates, and radiation of "
     "pistons.",
@@ -233,21 +233,21 @@ COVERS = {
     "radiation": "Sound of moving surfaces by boundary elements: spheres, cylinders, small rigid "
     "bodies.",
     "measurement": "Lift sensor, differentiation and impacts found in records of exact flights.",
-    "measured": "Measurements of others: strain pulses of struck bars, oblique impacts of spheres, "
-    "bounces in liquids, waves in rock, a magnet.",
-    "mechanics": "Mass, spring, friction, gravity and forces in the time loop, against closed "
-    "motions.",
-    "mechanical-parts": "Nonlinear springs, surge, rubber, LuGre friction and levers "
-    "against closed and independent solutions.",
+    "measured": "Published measurements: strain pulses of struck bars, oblique impacts of "
+    "spheres, bounces in liquids, waves in rock, a magnet.",
+    "mechanics": "Mass, spring, friction, gravity and forces in the time loop, against "
+    "closed-form motions.",
+    "mechanical-parts": "Nonlinear springs, surge, rubber, LuGre friction and levers against "
+    "closed-form and independent solutions.",
     "fluids": "Density, sound speed and viscosity against reference data; gas, vapour, and "
     "the table of the kernel.",
     "fluid-data": "Fluids against published values over temperature and pressure, and their "
     "viscosity under pressure.",
     "hydraulics": "Orifices, gaps, seats, annuli, chambers and inertances against closed formulas.",
     "hydraulic-parts": "Check and relief valves, accumulators, pumps, spool edges, fittings, "
-    "walls: formulas, and small networks integrated apart.",
+    "walls: formulas, and small networks integrated independently.",
     "pneumatics": "Gas: flow laws of ISO 6358, vessels that fill and empty, and networks "
-    "integrated apart.",
+    "integrated independently.",
     "lines": "Water hammer: Joukowsky, echoes, laminar friction of Zielke, cavities, energy, "
     "junctions, turbulent lines, local properties.",
     "films": "Squeeze films between faces: Reynolds' equation, impulse, fall, series "
@@ -259,19 +259,19 @@ COVERS = {
     "drivers": "Coils in time: currents, switchings inside steps, eddy currents, motion, energy.",
     "output-stage": "Coils behind an output stage: boost capacitor, recuperation, diodes, "
     "clamp, a second shot.",
-    "control": "Sensors, PID, hysteresis, state machines and functions of the user, against exact "
+    "control": "Sensors, PID, hysteresis, state machines and user functions, against exact "
     "recursions.",
     "network": "A whole valve in one time loop: energy balance of all domains, restart, step "
-    "sizes, one law after the other.",
+    "sizes, and single laws.",
     "cases": "Case files: units by their definitions, expressions, included parts of networks.",
-    "heat": "Heat networks and warm-up: exact decays, pulses, Modelica's examples, copper that "
-    "heats itself, and every stroke of a warm-up computed.",
-    "operating-point": "Where a valve rests: springs, magnets, restrictions and both together "
-    "against solutions by hand, networks of SciPy, and runs that stay there.",
-    "linearisation": "Linear models of valves: closed forms, Routh's boundary, pipes by delay "
-    "theory, reciprocity, and small motions in time.",
-    "exchange": "What goes out to other programs and comes back: meshes, matrices, state space, "
-    "FMI.",
+    "heat": "Heat networks and warm-up: exact decays, pulses, Modelica's examples, self-heating "
+    "copper, and a warm-up with every stroke computed.",
+    "operating-point": "Valves at rest: springs, magnets, restrictions and their combinations "
+    "against solutions by hand, networks in SciPy, and runs that stay at rest.",
+    "linearisation": "Linear models of valves: closed forms, Routh's boundary, pipes with "
+    "delays, reciprocity, and small motions in time.",
+    "exchange": "Exports to other programs and their results read back: meshes, matrices, state "
+    "space, FMI.",
 }
 """Group -> what it covers, in one sentence."""
 

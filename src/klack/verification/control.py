@@ -26,7 +26,7 @@ from klack.verification.drivers import linear_coil
 __all__ = ["checks"]
 
 MASS, SAMPLE = 3e-3, 20e-6  # [kg], [s]
-RECURSION = "recursion of the sampled plant with a held output, exact, written apart"
+RECURSION = "recursion of the sampled plant with a held output, exact, coded independently"
 
 _RESISTANCE = 1.5
 _INDUCTANCE = 60.0**2 * (1.0 / 2e7 + 1.0 / 2e8)  # of the coil of klack.verification.drivers

@@ -1,4 +1,4 @@
-"""Valves by characteristic, accumulators, pumps: closed formulas, and networks written apart."""
+"""Valves by characteristic, accumulators, pumps: closed formulas, independently coded networks."""
 
 from collections.abc import Iterator
 from math import exp, pi, sqrt, tan

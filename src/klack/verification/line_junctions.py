@@ -33,7 +33,7 @@ _TABLE = fluid_table(HEPTANE, AMBIENT.pressure)
 SPEED = Line(length=1.0, diameter=1e-3, friction="none").wave_speed(HEPTANE, BEFORE)
 
 SCATTERING = "shares 2 Y/sum Y of the pressure, Y = A/(rho a); Wylie & Streeter 1993, ch. 3"
-APART = "method of characteristics written apart: delays and parallel impedances"
+APART = "method of characteristics coded independently: delays and parallel impedances"
 
 
 def line_junctions() -> list[Check]:
@@ -328,7 +328,7 @@ def _cavity() -> list[Check]:
             expected=0.0,
             computed=float(np.max(np.abs(computed - expected))) / JUMP,
             tolerance=3e-9,
-            source="discrete vapour cavity of the method of characteristics, written apart",
+            source="discrete vapour cavity of the method of characteristics, coded independently",
             curve=ComparedCurve(
                 x_label="time [us]",
                 y_label="pressure [bar]",
@@ -341,7 +341,7 @@ def _cavity() -> list[Check]:
             expected=float(np.count_nonzero(expected <= vapour * (1.0 - 1e-12))),
             computed=float(np.count_nonzero(computed <= vapour * (1.0 - 1e-9))),
             tolerance=5e-14,
-            source="discrete vapour cavity of the method of characteristics, written apart",
+            source="discrete vapour cavity of the method of characteristics, coded independently",
         ),
         check(
             "cavity at a closed end, energy that does not balance [-]",

@@ -92,7 +92,7 @@ def _nodal(current: float, gap: float) -> tuple[float, float]:
 
 def _at_rest() -> list[Check]:
     circuit, out = _e_core().circuit(), []
-    source = "node potentials of Froehlich's iron, SciPy fsolve, written apart"
+    source = "node potentials of Froehlich's iron, SciPy fsolve, coded independently"
     for current, gap in ((0.0, 100e-6), (1.5, 100e-6), (6.0, 20e-6)):
         state = static_state(circuit, current=current, gap=gap)
         linkage, through = _nodal(current, gap)
@@ -260,7 +260,7 @@ def _voltage_step() -> list[Check]:
         step=end / steps,
         lift=speed * np.linspace(0.0, end, steps + 1),
     )
-    source = "two equations of flux, SciPy LSODA, written apart"
+    source = "two equations of flux, SciPy LSODA, coded independently"
     return [
         check(
             "24 V on iron with a damping ring and a moving gap: current after 400 us [A]",

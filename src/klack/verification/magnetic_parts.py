@@ -332,7 +332,7 @@ def _flux_density(
 
 
 def _nonlinear() -> Iterator[Check]:
-    source = "nonlinear diffusion in 400 finite volumes, SciPy BDF, written apart"
+    source = "nonlinear diffusion in 400 finite volumes, SciPy BDF, coded independently"
     for field, words in ((20.0, "weak"), (600.0, "medium"), (8000.0, "saturating")):
         for t, expected, computed, most in zip(
             _TIMES,

@@ -430,7 +430,7 @@ def _kernel() -> Check:
         float(history.force.max()),
         float(force.max()),
         1e-13,
-        "the impact kernel of klack, written apart: 60 modes, 1e9 N/m before 1e-9 m/N",
+        "the impact kernel of klack, coded independently: 60 modes, 1e9 N/m before 1e-9 m/N",
         curve=ComparedCurve(
             x_label="time [us]",
             y_label="force [N]",

@@ -30,7 +30,7 @@ FACE, SMALL = 50e-6, 30e-6  # [m^2]
 RATIO = (2.0 / (K + 1.0)) ** (K / (K - 1.0))
 NOZZLE = sqrt(K / R) * (2.0 / (K + 1.0)) ** ((K + 1.0) / (2.0 * (K - 1.0)))
 REFERENCE = 1e5 / (R * 293.15) * sqrt(293.15)
-SOURCE = "the same equations written apart, integrated by SciPy DOP853, rtol 1e-11"
+SOURCE = "the same equations coded independently, integrated by SciPy DOP853, rtol 1e-11"
 WIDE = "steps of 1.28 us"
 
 
