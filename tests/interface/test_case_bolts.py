@@ -10,6 +10,7 @@ from draws import each
 from pages import HOW_TO, blocks, changed_case, numbers
 from ruamel.yaml import YAML
 
+from klack import run_many
 from klack.analyses.impact.analysis import IMPACT
 from klack.analyses.impact.content import report_content
 from klack.analyses.impact.run import run_impact
@@ -228,3 +229,8 @@ def test_a_stroke_that_may_open_the_joint_has_the_same_doubt(tmp_path):
         (event,) = found.variants["dry"].result.events[:1]
         assert event.peak_force > 10.0  # so twice of it is more than 20 N
         assert any("the joint may open" in note for note in found.warnings) == opens
+
+    preloads = {"bodies.housing.bolts.flange.preload": ["5 kN", "20 N"]}
+    points = run_many(tmp_path / "case.yaml", preloads, ["seat.peak_force"])
+    told = [any("the joint may open" in note for note in notes) for notes in points.warnings]
+    assert told == [False, True]

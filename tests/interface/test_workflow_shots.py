@@ -322,7 +322,7 @@ def test_doubts_of_a_shot_stay_with_it_in_the_log(model, draws, alone, tmp_path,
         assert [again.done[index].doubts for index in (0, 1)] == [("it is off by 2e-3",)] * 2
         outcomes = (*(again.done[index] for index in (0, 1)), alone[2])
     dropped = DroppedShots(draws=(), outcomes=outcomes, alone=alone[3])
-    assert shot_doubts(dropped) == ("2 of 3 shots, first shot 0: it is off by 2e-3",)
+    assert shot_doubts(CASE, dropped) == ("2 of 3 shots, first shot 0: it is off by 2e-3",)
 
 
 def test_no_shot_begins_inside_the_wall(model):

@@ -1,6 +1,6 @@
 """Bolted joints of a case: pressure, stiffness, what lifts them, and their doubts."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import sqrt
@@ -25,7 +25,7 @@ from klack.mesh.mesh import Mesh
 from klack.mesh.solid_joint import flat_solid_joint
 from klack.units import format_si
 
-__all__ = ["BoltedJoint", "bolted_joints", "struck_bolts"]
+__all__ = ["BoltedJoint", "bolted_joints", "opening_doubts", "struck_bolts"]
 
 _ACROSS = 8  # elements along an end of a half section
 _ON_FACE, _ON_END = 400.0, 100.0  # squares of an element's size on the joint of solids, on an end
@@ -202,6 +202,12 @@ def struck_bolts(case: CaseFile, peak: float) -> tuple[BoltedJoint, ...]:
     return tuple(
         replace(joint, peak=peak) for name in case.bodies for joint in bolted_joints(case, name)
     )
+
+
+def opening_doubts(case: CaseFile, peaks: Iterable[float]) -> tuple[str, ...]:
+    """That impacts with these peak forces [N] may open bolted joints."""
+    joints = struck_bolts(case, max((peak for peak in peaks if peak == peak), default=0.0))
+    return tuple(filter(None, (joint.opening_doubt for joint in joints)))
 
 
 @lru_cache(maxsize=20)

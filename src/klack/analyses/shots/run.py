@@ -34,6 +34,7 @@ from klack.analyses.shots.one_shot import (
 )
 from klack.analyses.shots.record import RuleVerdict, ShotColumns, ShotsStudy
 from klack.analyses.workers import LoggedWork, answer, grouped_doubts, unwrapped
+from klack.assembling.bolts import opening_doubts
 from klack.case.guide import CaseGuide, LinearGuideLaw
 from klack.case.placed_errors import tells_place
 from klack.case.schema import Case
@@ -136,7 +137,7 @@ def run_shots(
             *dict.fromkeys([*model.notes, *notes]),
             *_unfinished(shots),
             *_worn(shots),
-            *shot_doubts(dropped),
+            *shot_doubts(case, dropped),
         ),
     )
 
@@ -383,8 +384,8 @@ def _unfinished(shots: ShotColumns) -> tuple[str, ...]:
     )
 
 
-def shot_doubts(dropped: DroppedShots) -> tuple[str, ...]:
-    """Doubts of single shots, like ones once; and energy from nowhere."""
+def shot_doubts(case: Case, dropped: DroppedShots) -> tuple[str, ...]:
+    """Doubts of single shots, like ones once; energy from nowhere, and joints that may open."""
     notes = [f"The centred shot: {doubt}" for doubt in dropped.alone.doubts]
     notes += grouped_doubts(((item.index, item.doubts) for item in dropped.outcomes), "shots")
     residual = float(np.max(np.abs(dropped.shots.energy_residual)))
@@ -393,4 +394,5 @@ def shot_doubts(dropped: DroppedShots) -> tuple[str, ...]:
             f"The energy balance of one shot has a residual of {residual:.1e}. Try: a "
             "shorter shots.step."
         )
-    return tuple(notes)
+    peaks = (*dropped.shots.peak_force, *dropped.centric.peak_force)
+    return (*notes, *opening_doubts(case, peaks))

@@ -32,7 +32,7 @@ from klack.analyses.stroke.stairs import line_ends
 from klack.analyses.stroke.step_check import CheckedSteps, checked_steps, not_checked, watched
 from klack.analyses.stroke.times import all_lift_times
 from klack.assembling.body_summary import BodySummary, summarise_body
-from klack.assembling.bolts import struck_bolts
+from klack.assembling.bolts import opening_doubts
 from klack.assembling.valve import Valve, build_valve
 from klack.case.any_case import read_valve_case
 from klack.case.levels import Variant
@@ -139,11 +139,10 @@ def stroke_notes(
     at_rest = [rest_note(name, variant.result, roles) for name, variant in variants.items()]
     moving = [moving_note(name, variant.result) for name, variant in variants.items()]
     peaks = [event.peak_force for v in variants.values() for event in v.result.events]
-    bolts = struck_bolts(case, max(peaks, default=0.0))
     return (
         *controller_notes(case),
         *told_once(warned),
-        *filter(None, (joint.opening_doubt for joint in bolts)),
+        *opening_doubts(case, peaks),
         *begun,
         *filter(None, [*at_rest, *moving]),
         *_record_notes(case, variants),

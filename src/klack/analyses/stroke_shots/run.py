@@ -33,6 +33,7 @@ from klack.analyses.stroke_shots.record import (
     VariantShots,
 )
 from klack.analyses.workers import LoggedWork, grouped_doubts
+from klack.assembling.bolts import opening_doubts
 from klack.assembling.valve import Valve, build_valve
 from klack.case.levels import Variant
 from klack.case.placed_errors import tells_place
@@ -125,9 +126,22 @@ def run_stroke_shots(
         variants=found,
         schematic=schematic_svg(case.network.network()),
         warnings=tuple(
-            dict.fromkeys([*notes, *missing_notes(found), *_doubts(wanted, count, log)])
+            dict.fromkeys(
+                [
+                    *notes,
+                    *missing_notes(found),
+                    *_doubts(wanted, count, log),
+                    *opening_doubts(case, _peaks(found)),
+                ]
+            )
         ),
     )
+
+
+def _peaks(found: Mapping[str, VariantShots]) -> Iterator[float]:
+    for shots in found.values():
+        for columns in shots.stops.values():
+            yield from columns.peak_force
 
 
 def _keys(variants: Sequence[Variant], count: int) -> Iterator[tuple[str, int]]:

@@ -255,7 +255,7 @@ def _shots(case: Case, bodies: ImpactBodies, names: list[str], progress: Progres
     given, model = shots_of(case), shot_model(case, bodies, progress)
     with shot_log(None, "") as log:
         found = drop_shots(case, model, given.count, given.seed, 1, log, progress)
-    notes = (*model.notes, *shot_doubts(found), *shot_notes(names, found))
+    notes = (*model.notes, *shot_doubts(case, found), *shot_notes(names, found))
     pair = bodies.placed.pair
     modes = " + ".join(map(str, model.modes))
     return _Point(

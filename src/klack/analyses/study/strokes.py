@@ -3,6 +3,7 @@
 The time loop runs outside of the interpreter, so that threads share meshes, modes and laws.
 """
 
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -38,6 +39,7 @@ from klack.analyses.study.measures import (
     told_until,
 )
 from klack.assembling.body_summary import BodySummary
+from klack.assembling.bolts import opening_doubts
 from klack.assembling.valve import Valve, build_valve, filled_network
 from klack.case.any_case import CaseTree
 from klack.case.placed_errors import tells_place
@@ -45,7 +47,7 @@ from klack.case.points import PointValue, case_at, checked_parts
 from klack.case.study import CaseStudy
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import END_STOP, FLEXIBLE_BODY, ValveRoles, find_roles
-from klack.errors import KlackError, refuse_if
+from klack.errors import AccuracyWarning, KlackError, refuse_if
 from klack.input.problem import Key
 from klack.machine.cores import available_cores
 from klack.machine.memory import require_memory
@@ -292,6 +294,8 @@ def _stroke_of(
     )
     if run.failure is not None:
         raise run.failure
+    for doubt in opening_doubts(case, (event.peak_force for event in run.variant.result.events)):
+        warnings.warn(doubt, AccuracyWarning, stacklevel=2)
     steps = UNCHECKED
     if run.steps is not None:
         steps = PointSteps(*run.steps.certificate(case.run.accuracy))
