@@ -463,7 +463,7 @@ COMPLAINTS = {
     "clamp": ({"decay": "clamp"}, "the Zener or avalanche voltage of the clamp"),
     "overlap": (
         {"shots": (Shot(start=0.0, end=0.5e-3), Shot(start=0.4e-3, end=0.9e-3))},
-        "a start from 0.0005 s on",
+        "a start from 500 us on",
     ),
     "backwards": ({"shots": (Shot(start=0.5e-3, end=0.4e-3),)}, "an end after it"),
     "peak too long": ({"peak_duration": 0.4e-3}, "less than the 300 us of a shot"),

@@ -59,7 +59,7 @@ def test_a_run_that_goes_on_in_another_valve_says_so(tmp_path):
 
     assert "another valve" not in notes(text)
     told = notes(text.replace("preload: 12 N", "preload: 13 N"))
-    assert "another valve: network.components.spring differ" in told
+    assert "different valve: network.components.spring differ" in told
 
 
 def test_times_of_a_run_that_goes_on_are_those_of_the_whole_run(tmp_path):
