@@ -102,7 +102,7 @@ def test_parameters_are_resolved_in_si():
         (
             "[network.components.stop.gap]",
             "[network.components.stop.gap, network.components.seat.gap]",
-            r"gaps.key\[1\]: got network.components.seat.gap = 0 m, expected the same as",
+            r"gaps.key\[1\]: got network.components.seat.gap = 0 um, expected the same as",
         ),
         ("profile: [preload]", "profile: [prelod]", r"profile\[0\]: .*did you mean 'preload'"),
         ("network.ambient.temperature, lower: 10 degC", "title, lower: 1", r"expected a key of"),
