@@ -69,6 +69,7 @@ class _Guide:
         self._proposed = Proposal()  # faces, and why these
         self._writing, self._turn = asyncio.Lock(), asyncio.Lock()
         self._is_checking = False  # the step that is shown has not its answer yet
+        self._waiting = 0  # changes whose parts are not read, or whose faces are not proposed yet
 
     def build(self) -> None:
         with ui.element("nav").classes("k-steps") as steps:
@@ -195,21 +196,21 @@ class _Guide:
     # ----------------------------------------------------------------------- what is seen
 
     def _show_steps(self) -> None:
-        furthest = self._furthest()
+        furthest, is_off_now = self._furthest(), self._is_checking or self._waiting > 0
         for number, found in enumerate(self._steps):
             found.props["aria-current"] = "step" if number == self._plan.step else "false"
         for found, is_off in (
             *((found, number > furthest) for number, found in enumerate(self._steps[:_LAST])),
-            (self._steps[_LAST], furthest < _LAST or self._is_checking),
+            (self._steps[_LAST], furthest < _LAST or is_off_now),
             (self._back, self._plan.step == 0),
-            (self._next, self._plan.step >= furthest or self._is_checking),
+            (self._next, self._plan.step >= furthest or is_off_now),
         ):
             set_off(is_off, found)
         self._next.set_visibility(self._plan.step < _LAST)
         missing = ("choose two parts that can be read", "choose both contact faces and a held face")
         stuck = self._plan.step == furthest < 2
         why = f"To continue, {missing[furthest]}." if stuck else ""
-        if self._is_checking and not self._plan.step:
+        if self._waiting and furthest:
             why = "Looking for the faces that meet; solids are meshed for that, in seconds ..."
         self._why.set_text(why)
 
@@ -244,12 +245,17 @@ class _Guide:
         """Read the bodies again; missing faces lose their choice."""
         for body in bodies:
             self._facts.pop(body, None)
+        self._waiting += 1
         self._show_steps()
         self._parts.show_facts()
         async with self._turn:
-            await self._read_parts()
-            self._parts.show_facts()
-            await self._propose()
+            try:
+                if self._waiting == 1:  # the last change reads the parts for all
+                    await self._read_parts()
+                    self._parts.show_facts()
+                    await self._propose()
+            finally:
+                self._waiting -= 1
             if self._plan.step:  # another step is shown by now, of what was read before
                 await self._show()
             else:
@@ -267,14 +273,10 @@ class _Guide:
         await self.keep(plan.with_faces(known))
         if self._plan != self._plan.with_proposal(none):
             return
-        self._is_checking = True
-        self._show_steps()
         try:
             found = await self._state.shapes.call("proposal", sources, self.model)
         except (KlackError, OSError) as error:
             found = Proposal(words=f"No faces are proposed: {error}")
-        finally:
-            self._is_checking = False
         if self._plan == self._plan.with_proposal(none):  # none was chosen meanwhile
             self._proposed = found
             await self.keep(self._plan.with_proposal(found))
