@@ -83,20 +83,20 @@ def _where_to(domain: str, port: str) -> str:
 
 def _check_motion(components: Mapping[str, Component], node: Node) -> None:
     bodies = [str(joint) for joint in node.having(Role.MOTION)]
-    if node.word and bodies:
-        raise CaseProblem(
-            ("connections", node.index),
-            got=f"{_and(bodies)} connected to the ground",
-            expected="a body or the ground, not both at one point",
-            hint="fix the body in its definition, or support it by a stiff spring.",
-        )
-    if len(bodies) > 1:
-        raise CaseProblem(
-            ("connections", node.index),
-            got=f"{len(bodies)} bodies at one point: {_and(bodies)}",
-            expected="one body and the components that act on it",
-            hint="put an end stop or a spring between the bodies, or make them one body.",
-        )
+    refuse_key_if(
+        node.word and bodies,
+        ("connections", node.index),
+        got=f"{_and(bodies)} connected to the ground",
+        expected="a body or the ground, not both at one point",
+        hint="fix the body in its definition, or support it by a stiff spring.",
+    )
+    refuse_key_if(
+        len(bodies) > 1,
+        ("connections", node.index),
+        got=f"{len(bodies)} bodies at one point: {_and(bodies)}",
+        expected="one body and the components that act on it",
+        hint="put an end stop or a spring between the bodies, or make them one body.",
+    )
     refuse_key_if(
         not node.word and not bodies,
         ("connections", node.index),
@@ -110,13 +110,13 @@ def _check_pressure(components: Mapping[str, Component], node: Node) -> None:
     prescribed = [str(joint) for joint in node.having(Role.PRESSURE)]
     prescribed += [node.word] if node.word else []
     volumes = [str(joint) for joint in node.having(Role.COMPLIANCE)]
-    if len(prescribed) > 1:
-        raise CaseProblem(
-            ("connections", node.index),
-            got=f"{len(prescribed)} pressures at one node: {_and(prescribed)}",
-            expected="one pressure",
-            hint="put an orifice or a line between them.",
-        )
+    refuse_key_if(
+        len(prescribed) > 1,
+        ("connections", node.index),
+        got=f"{len(prescribed)} pressures at one node: {_and(prescribed)}",
+        expected="one pressure",
+        hint="put an orifice or a line between them.",
+    )
     if prescribed and volumes:
         raise CaseProblem(
             ("connections", node.index),
@@ -173,13 +173,13 @@ def _check_temperature(components: Mapping[str, Component], node: Node) -> None:
     prescribed = [str(joint) for joint in node.having(Role.TEMPERATURE)]
     prescribed += [node.word] if node.word else []
     stores = [str(joint) for joint in node.having(Role.HEAT_STORE)]
-    if len(prescribed) > 1 or (prescribed and stores):
-        raise CaseProblem(
-            ("connections", node.index),
-            got=f"{_and([*prescribed, *stores])} at one node",
-            expected="one prescribed temperature, or heat capacities",
-            hint="put a thermal-conductance or a convection between them.",
-        )
+    refuse_key_if(
+        len(prescribed) > 1 or (prescribed and stores),
+        ("connections", node.index),
+        got=f"{_and([*prescribed, *stores])} at one node",
+        expected="one prescribed temperature, or heat capacities",
+        hint="put a thermal-conductance or a convection between them.",
+    )
 
 
 def _check_drive(components: Mapping[str, Component], node: Node) -> None:
@@ -193,28 +193,28 @@ def _check_drive(components: Mapping[str, Component], node: Node) -> None:
         raise _no_driver(key, _and(coils))
     if not coils:
         raise _no_coil(key, _and(drivers))
-    if len(drivers) > 1 or len(coils) > 1:
-        raise CaseProblem(
-            key,
-            got=f"{_and([*drivers, *coils])} in one circuit",
-            expected="one driver and one coil",
-            hint="give every coil a driver of its own, with equal settings if you like; coils of "
-            "one magnetic-network without 'circuit' are in series.",
-        )
+    refuse_key_if(
+        len(drivers) > 1 or len(coils) > 1,
+        key,
+        got=f"{_and([*drivers, *coils])} in one circuit",
+        expected="one driver and one coil",
+        hint="give every coil a driver of its own, with equal settings if you like; coils of "
+        "one magnetic-network without 'circuit' are in series.",
+    )
 
 
 def _check_feed(node: Node) -> None:
     sources = [str(joint) for joint in node.having(Role.FEEDS)]
     drivers = [str(joint) for joint in node.having(Role.FED)]
     others = [str(joint) for joint in node.joints if str(joint) not in (*sources, *drivers)]
-    if len(sources) != 1 or not drivers or others:
-        raise CaseProblem(
-            ("connections", node.index),
-            got=f"{_and([*sources, *drivers, *others])} at one node",
-            expected="one boost-capacitor, and the port 'supply' of each boost-driver that draws "
-            "from it",
-            hint="write [capacitor.outlet, first_driver.supply, second_driver.supply].",
-        )
+    refuse_key_if(
+        len(sources) != 1 or not drivers or others,
+        ("connections", node.index),
+        got=f"{_and([*sources, *drivers, *others])} at one node",
+        expected="one boost-capacitor, and the port 'supply' of each boost-driver that draws "
+        "from it",
+        hint="write [capacitor.outlet, first_driver.supply, second_driver.supply].",
+    )
 
 
 def _no_driver(key: tuple[str | int, ...], coil: str) -> CaseProblem:
