@@ -259,7 +259,9 @@ def test_a_full_disk_is_named_as_such(folder, monkeypatch):
 
     monkeypatch.setattr(app_folder, "synchronise", full)
 
-    with pytest.raises(InputError, match="No space left on device, expected free disk space") as refused:
+    with pytest.raises(
+        InputError, match="No space left on device, expected free disk space"
+    ) as refused:
         folder.write("case.yaml", "typed")
     assert "reload" not in str(refused.value)  # the text is in the page alone
 
