@@ -28,6 +28,7 @@ from klack.control.pid import PidController
 from klack.control.sensor import Sensor
 from klack.errors import AccuracyWarning, InputError
 from klack.mechanics.controlled_force import ControlledForce
+from klack.mechanics.end_stop import EndStop
 from klack.mechanics.force import ConstantForce, ForceOverTime
 from klack.mechanics.force_over_stroke import ForceOverStroke
 from klack.mechanics.friction import GuideFriction
@@ -45,6 +46,7 @@ from klack.network.component import Component
 from klack.network.network import Network
 from klack.network.relaxation import relaxed
 from klack.network.step_function import evaluate
+from klack.simulation.impact_events import arm_doubts
 from klack.simulation.network_run import simulate_network
 
 pytestmark = pytest.mark.filterwarnings("ignore::klack.network.checks.LooseBodyWarning")
@@ -555,3 +557,24 @@ def test_the_page_shows_the_code_that_runs():
     lines = {line.split("#")[0].strip() for line in source.splitlines()}
     for block in blocks[:3]:
         assert {line.strip() for line in block.splitlines()} <= lines
+
+
+@pytest.mark.parametrize(
+    ("far", "words"), [(20e-3, "0.5 times the true ones"), (-20e-3, "not recognised"), (10e-3, "")]
+)
+def test_a_stop_at_another_arm_is_doubted(far, words):
+    """Impacts have the speed of the first arm: half of that of an arm twice as long."""
+    law = {"kind": "linear", "stiffness": 1e8}
+    lever = Lever(
+        effective_mass=3e-3, arms={"near": 10e-3, "far": far}, speed=np.copysign(1.0, far)
+    )
+    parts = {"lever": lever, "stop": EndStop(gap=10e-6, law=law, restitution=0.5)}
+    rows = Network(parts, [["ground", "stop.upper"], ["lever.far", "stop.lower"]]).rows()
+    doubts = [*arm_doubts(rows)]
+    assert words in doubts[0] if words else doubts == []
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        found = simulate_network(rows, duration=60e-6, start="free")
+    assert [doubt for doubt in doubts if doubt in map(str, (w.message for w in told))] == doubts
+    speeds = {20e-3: [1.0], -20e-3: [], 10e-3: [1.0]}
+    assert [e.approach_speed for e in found.events] == pytest.approx(speeds[far], rel=1e-6)

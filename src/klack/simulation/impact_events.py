@@ -4,7 +4,7 @@
 does not grow with time.  Where the run is cut into parts changes nothing, not even the last bit.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from math import isfinite, nan
 from typing import Any
@@ -24,12 +24,13 @@ from klack.simulation.rest import (
     rest_time,
 )
 
-__all__ = ["ROTATION", "ImpactFinder", "judged"]
+__all__ = ["ROTATION", "ImpactFinder", "arm_doubts", "judged"]
 
 
 _PAUSE_STEPS = 100  # a film is not recorded while its force passes through zero: so many fine steps
 _PAUSE_SHARE = 0.04  # or this share of the time to rest, whichever is longer
 _STRIKES = 1e-6  # [m/s] closing speed at the start: less is rest
+_SAME_ARM = 1e-6  # of the ratio of two arms
 _BEND = 0.25  # of what other forces do between two records: more from one to the next is a jump
 
 _KNOWN = 3.0  # of the records after a contact: none is needed
@@ -207,6 +208,31 @@ class ImpactFinder:
             restitution=-after / before,
             energy_loss=0.5 * self._mass[c] * (before**2 - after**2),
         )
+
+
+def arm_doubts(rows: Rows) -> Iterator[str]:
+    """Doubts about stops at another arm of a lever than the first, whose speed is recorded."""
+    owner = {handle: row for row in rows.bodies for handle in row.ports}
+    for row in rows.interfaces:
+        for handle in {row.upper, row.lower} & owner.keys():
+            lever = owner[handle]
+            body = lever.body
+            if lever.course is not None or body.momentum is not None or not body.rigid_count:
+                continue
+            ratio = port_mobility(handle, lever) * body.mass
+            if abs(ratio - 1.0) < _SAME_ARM:
+                continue
+            first, here = body.port_names[0], body.port_names[lever.ports.index(handle)]
+            effect = (
+                f"their speeds are {1.0 / ratio:.3g} times the true ones"
+                if ratio > 0.0
+                else "they are not recognised"
+            )
+            yield (
+                f"impacts on '{row.component}' are recorded with the speed of the arm '{first}' of "
+                f"'{lever.component}', but the stop is at '{here}': {effect}. Forces are right. "
+                f"Try: give '{here}' as the first of the arms, with effective_mass there."
+            )
 
 
 def judged(
