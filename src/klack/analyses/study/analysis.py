@@ -261,7 +261,7 @@ def study_told(record: StudyRecord) -> Iterator[TextTable | str]:
         if not fitted.reason:
             yield TextTable(
                 title=f"Shares of the variance of {fitted.measure} from its surrogate (with the "
-                "possible effect of its error)",
+                "effect of its error)",
                 columns=("parameter", *SHARE_COLUMNS),
                 rows=[[name, *index_cells(fitted, k)] for k, name in enumerate(fitted.parameters)],
             )
