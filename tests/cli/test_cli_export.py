@@ -190,4 +190,4 @@ def test_the_pair_of_a_valve_says_what_it_leaves_out(tmp_path, capsys):
     )
     assert {"spring", "guide", "coil", "driver", "feed", "sac", "nozzle"} <= set(left_out)
     assert not {"needle", "housing", "pole", "seat", "opening"} & set(left_out)
-    assert "yours to add" not in other
+    assert "to be added by you" not in other

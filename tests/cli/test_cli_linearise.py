@@ -146,7 +146,7 @@ def test_a_boost_driver_is_told_to_be_no_part_of_the_model(capsys):
     assert linearise(str(path), "--no-report", "--quiet", "--out", "out") == 0
 
     said = " ".join(capsys.readouterr().err.split())
-    assert "the driver 'driver' switches to and fro" in said
+    assert "the driver 'driver' switches repeatedly" in said
     assert "the capacitor, diodes and switches of the driver 'driver' are not part" in said
 
 

@@ -203,7 +203,7 @@ def test_the_free_valve_moves_as_a_mass_at_low_frequencies(design, study):
 def test_a_force_without_a_place_is_an_error(study, case):
     """It names all of them and the key."""
     noise = case.noise.model_copy(update={"reactions": None})
-    with pytest.raises(InputError, match=r"noise\.reactions: got no place .*spring.*guide"):
+    with pytest.raises(InputError, match=r"noise\.reactions: got no surface .*spring.*guide"):
         stroke_sources(study, case=case.model_copy(update={"noise": noise}))
 
 

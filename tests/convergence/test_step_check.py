@@ -503,7 +503,7 @@ def test_a_continued_run_has_a_reason_and_no_number_and_keeps_the_steps():
     assert {change.reason for change in after.reference.changes} == {"no other run"}
     assert all(isnan(change.time) for change in after.reference.changes)
     (note,) = after.warnings
-    assert "the time steps were not checked: the run continues another one" in note
+    assert "the time steps were not checked: the run continues another run" in note
     step = first.reference.result.sizes.step
     whole = run(6e-4, step=step, coarse=first.reference.result.sizes.coarse, check_steps=False)
     assert after.reference.result.sizes.step == step

@@ -212,7 +212,7 @@ def test_doubts_of_an_impact_are_notes_of_its_point(ball, tmp_path):
 """
     record = klack.run_study(ball, write(tmp_path, text)).record
     single = klack.run_impact(changed(ball, record, 0), ["reduced"]).record
-    own = [note for note in single.warnings if "for comparison only" not in note]
+    own = [note for note in single.warnings if "only for comparison" not in note]
     assert own
     assert set(own) <= set(record.notes[0].splitlines())
     assert "at 1 point" in record.model

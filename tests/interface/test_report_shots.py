@@ -538,7 +538,8 @@ def test_the_answers_are_those_of_the_numbers():
     assert f"the highest of 40 rebounds is stroke {int(np.argmin(OFF))}," in highest
     assert "the most centred one." in highest
     assert not any(
-        "% of dry" in t for t in stroke_answers(study_report(variants={"dry": variant("dry", 1.0)}))
+        "% of the dry scatter" in t
+        for t in stroke_answers(study_report(variants={"dry": variant("dry", 1.0)}))
     )
 
 
@@ -562,7 +563,12 @@ def test_the_report_says_what_the_numbers_say(tmp_path):
     content = STROKE_SHOTS.content(study_report())
     page = unescape(re.sub(r"<[^>]+>", " ", render_html(content)))
 
-    for words in ("40 strokes, independent", "is 40 % of dry", "Placement at touch", "highest"):
+    for words in (
+        "40 strokes, independent",
+        "is 40 % of the dry scatter",
+        "Placement at touch",
+        "highest",
+    ):
         assert words in page
     assert "<b>A valve</b>" in page  # as text, not as a tag
     assert render_pdf(content).startswith(b"%PDF")
