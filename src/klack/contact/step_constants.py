@@ -81,7 +81,7 @@ LOG_SERIES_BELOW: Annotated[
 SEPARATED: Annotated[
     float, "C", "gap over the deepest indentation at which a contact forgets its approach speed"
 ] = 0.1
-SLOWEST: Annotated[float, "C", "[m/s] least approach speed of a damped law beside films"] = 1e-3
+SLOWEST: Annotated[float, "C", "[m/s] least approach speed of a damped law"] = 1e-3
 LEAST_WAY: Annotated[float, "C", "[m] least way of the gap over the step of onset"] = 1e-30
 SWEEPS: Annotated[int, "C", "over several contacts in a step"] = 500
 SETTLED: Annotated[
