@@ -247,7 +247,7 @@ def test_a_file_of_a_hundred_megabytes_is_told_and_not_read(browser, server, fol
     page = browser.new_page()
     page.set_default_timeout(LONG)
     page.goto(server.address)
-    page.locator(".k-row", has_text="100000000 bytes, expected no more than 1000000").wait_for()
+    page.locator(".k-row", has_text="100000000 bytes, expected at most 1000000").wait_for()
     page.get_by_role("button", name="Duplicate huge.yaml").click()
     page.locator(".q-notification", has_text="100000000 bytes").wait_for()
     huge.unlink()

@@ -200,7 +200,7 @@ def test_a_magnet_pulls_the_needle_of_a_stroke_aside():
     assert result.books.supplies["coil side force"] != 0.0
     assert [panel.y.label for panel in axis_over_time_chart(study).panels][-1] == "side force"
     limits = dict(stroke_content(study).limits)
-    assert "only 'coil' and 'restriction' act across the axis" in limits["Contact"]
+    assert "only 'coil' and 'restriction' also act across the axis" in limits["Contact"]
 
 
 @pytest.mark.slow
