@@ -208,7 +208,7 @@ class Part:
                 hint="suppress small fillets and threads in the CAD program, or write the case.",
             )
         return PartFacts(
-            words=f"{count}{size} mm, {self.volume * 1e9:.5g} mm^3, {len(shown)} faces",
+            words=f"{count}{size} mm, {self.volume * 1e9:.5g} mm^3, {len(shown)} named faces",
             faces=faces if self.profiles is not None else (),
             solid_faces=solid_faces,
             not_turned=self.not_turned,

@@ -31,7 +31,6 @@ from klack.app.state import State
 from klack.app.valve_plan import BODIES, STEPS, ValvePlan
 from klack.errors import InputError, KlackError
 from klack.materials.library import MATERIALS, MaterialEntry
-from klack.report.wording import spelled
 from klack.units import format_si
 
 __all__ = ["new_valve_page"]
@@ -291,7 +290,7 @@ class _Guide:
 
     async def _show_faces(self) -> None:
         faces = {body: self._faces_of(body) for body in BODIES}
-        step = FacesStep(faces, lambda: self._plan, self.keep, spelled(self._proposed.words))
+        step = FacesStep(faces, lambda: self._plan, self.keep, self._proposed.words)
         step.build()
 
         async def drawn() -> None:
@@ -397,7 +396,7 @@ class _Guide:
             plain(_TITLES[finding.grade]).classes(f"k-badge {_GRADES[finding.grade]}")
             with ui.element("div"):
                 plain(finding.what, "div").classes("k-title")
-                plain(spelled(finding.words), "div").classes("k-soft")
+                plain(finding.words, "div").classes("k-soft")
                 if finding.advice:
                     plain(f"Try: {finding.advice}", "div")
             if finding.grade != "good":
@@ -435,7 +434,7 @@ class _Guide:
                 message.set_text(str(error))
             errors = [f for f in found.findings if f.grade == "error"]
             if errors:
-                message.set_text("\n".join(spelled(f"{f.what}: {f.words}") for f in errors))
+                message.set_text("\n".join(f"{f.what}: {f.words}" for f in errors))
             text.set_text(found.text or "No case: see the checks.")
             set_off(not found.text, write, *others)
 

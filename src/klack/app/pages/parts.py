@@ -23,7 +23,6 @@ from klack.app.pages.frame import (
 )
 from klack.app.pages.scene import Scene
 from klack.app.valve_plan import BODIES, EXAMPLES, ValvePlan
-from klack.report.wording import spelled
 
 __all__ = ["FacesStep", "PartsStep"]
 
@@ -212,9 +211,7 @@ class PartsStep:
                     if found.not_turned
                     else "a body of revolution around z"
                 )
-                plain(spelled(f"{found.words}; {turned}"), "p").classes("k-read").props(
-                    "role=status"
-                )
+                plain(f"{found.words}; {turned}", "p").classes("k-read").props("role=status")
 
     def _show_models(self) -> None:
         facts = [self._facts().get(body) for body in BODIES]
@@ -328,7 +325,7 @@ class FacesStep:
                     face.name if face.place in ("", face.name) else f"{face.place}: {face.name}",
                     "div",
                 )
-                plain(spelled(face.words), "small").classes("k-soft")
+                plain(face.words, "small").classes("k-soft")
             now = self._plan().roles.get(name, "")
 
             async def change(role: str) -> None:
