@@ -53,7 +53,7 @@ def app(
     ] = Path(),
     /,
     *,
-    port: Annotated[int, Parameter(help="Port to listen on. [default: a free one]")] = 0,
+    port: Annotated[int, Parameter(help="Port to listen on; 0 for a free one.")] = 0,
     host: Annotated[
         str,
         Parameter(
