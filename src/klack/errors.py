@@ -85,7 +85,10 @@ class MissingExtraError(KlackError, ImportError):
 
 
 def refuse_if(wrong: object, where: str, *, got: str, expected: str, hint: str) -> None:
-    """Raise :class:`InputError` where a value from the user cannot be used."""
+    """Raise :class:`InputError` where a value from the user cannot be used.
+
+    The texts are made at every call: not for each key, port or step, nor with a search for names.
+    """
     if wrong:
         raise InputError(where, got=got, expected=expected, hint=hint)
 

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from klack.control.memory import Memory, remembered
-from klack.input.problem import nearest, refuse_key_if
+from klack.input.problem import CaseProblem, nearest, refuse_key_if
 from klack.input.section import Name, Number, Section
 from klack.units import Time
 
@@ -71,13 +71,13 @@ class StateMachine(Section):
         )
         for i, state in enumerate(self.states):
             for j, way in enumerate(state.transitions):
-                refuse_key_if(
-                    way.to not in names or way.to == state.name,
-                    ("states", i, "transitions", j, "to"),
-                    got=f"'{way.to}'",
-                    expected=f"another state: {', '.join(n for n in names if n != state.name)}",
-                    hint=nearest(way.to, names, "add the state."),
-                )
+                if way.to not in names or way.to == state.name:
+                    raise CaseProblem(
+                        ("states", i, "transitions", j, "to"),
+                        got=f"'{way.to}'",
+                        expected=f"another state: {', '.join(n for n in names if n != state.name)}",
+                        hint=nearest(way.to, names, "add the state."),
+                    )
         return self
 
     def used(self) -> tuple[str, ...]:

@@ -23,8 +23,8 @@ from pydantic.fields import FieldInfo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from klack.errors import InputError, refuse_if
-from klack.input.problem import CaseProblem, nearest, one_of, refuse_key_if
+from klack.errors import InputError
+from klack.input.problem import CaseProblem, nearest, one_of
 
 __all__ = [
     "Computed",
@@ -118,46 +118,46 @@ class Section(BaseModel):
                     on_key=True,
                 )
             own = known[key]  # a key whose default is another value says with null that it is off
-            refuse_key_if(
-                value[key] is None and own.get_default() is None and info.context is not None,
-                (key,),
-                got="nothing",
-                expected=f"{key}: {(own.description or '').rstrip('.')}",
-                hint=f"write its value, or remove '{key}'.",
-            )
+            if value[key] is None and own.get_default() is None and info.context is not None:
+                raise CaseProblem(
+                    (key,),
+                    got="nothing",
+                    expected=f"{key}: {(own.description or '').rstrip('.')}",
+                    hint=f"write its value, or remove '{key}'.",
+                )
         for key, field in known.items():
-            refuse_key_if(
-                field.is_required() and key not in value,
-                (),
-                got=f"no key '{key}'",
-                expected=f"{key}: {(field.description or '').rstrip('.')}",
-                hint=f"add '{key}' here; klack schema describes every key.",
-            )
+            if field.is_required() and key not in value:
+                raise CaseProblem(
+                    (),
+                    got=f"no key '{key}'",
+                    expected=f"{key}: {(field.description or '').rstrip('.')}",
+                    hint=f"add '{key}' here; klack schema describes every key.",
+                )
         return value
 
     def _exactly_one(self, names: tuple[str, ...], what: str) -> str:
         """The only key among ``names`` that is given; raise if none or several are."""
         given = [name for name in names if getattr(self, name) is not None]
-        refuse_key_if(
-            len(given) != 1,
-            (),
-            got=f"{' and '.join(given)} together" if given else "none of them",
-            expected=f"exactly one of {one_of(names)} ({what})",
-            hint=f"keep one of {one_of(given)}." if given else f"add one, e.g. {names[0]}.",
-        )
+        if len(given) != 1:
+            raise CaseProblem(
+                (),
+                got=f"{' and '.join(given)} together" if given else "none of them",
+                expected=f"exactly one of {one_of(names)} ({what})",
+                hint=f"keep one of {one_of(given)}." if given else f"add one, e.g. {names[0]}.",
+            )
         return given[0]
 
     def _refuse_with(self, names: tuple[str, ...], chosen: str, why: str) -> Self:
         """Raise if one of ``names`` is given, for which ``chosen`` has no use."""
         for name in names:
-            refuse_key_if(
-                getattr(self, name) is not None,
-                (name,),
-                got=f"{name} together with {chosen}",
-                expected=f"no {name}: {why}",
-                hint=f"remove {name}.",
-                on_key=True,
-            )
+            if getattr(self, name) is not None:
+                raise CaseProblem(
+                    (name,),
+                    got=f"{name} together with {chosen}",
+                    expected=f"no {name}: {why}",
+                    hint=f"remove {name}.",
+                    on_key=True,
+                )
         return self
 
 
@@ -209,13 +209,13 @@ def refuse_lfs_pointer(path: Path) -> None:
             start = stream.read(len(_LFS_POINTER))
     except OSError:
         return
-    refuse_if(
-        start == _LFS_POINTER,
-        str(path),
-        got="a git-LFS pointer: a placeholder for a file that was not downloaded",
-        expected="the file itself",
-        hint="run 'git lfs pull' in its repository, or download the file by hand.",
-    )
+    if start == _LFS_POINTER:
+        raise InputError(
+            str(path),
+            got="a git-LFS pointer: a placeholder for a file that was not downloaded",
+            expected="the file itself",
+            hint="run 'git lfs pull' in its repository, or download the file by hand.",
+        )
 
 
 def instead_of_file(path: Path) -> str:

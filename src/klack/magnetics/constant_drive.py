@@ -124,13 +124,13 @@ def driven(network: Network, currents: Mapping[str, float]) -> Network:
     """
     coils = coils_of(network)
     for name, current in currents.items():
-        refuse_if(
-            name not in coils,
-            "current",
-            got=f"the coil '{name}'",
-            expected=f"one of: {one_of(coils)}" if coils else "a valve with a coil",
-            hint=nearest(name, coils, "name a solenoid of the case."),
-        )
+        if name not in coils:
+            raise InputError(
+                "current",
+                got=f"the coil '{name}'",
+                expected=f"one of: {one_of(coils)}" if coils else "a valve with a coil",
+                hint=nearest(name, coils, "name a solenoid of the case."),
+            )
         refuse_if(
             not 0.0 <= current < np.inf,
             f"current of '{name}'",

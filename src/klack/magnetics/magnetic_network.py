@@ -130,15 +130,15 @@ class MagneticNetwork(Component):
         for name, element in self.elements.items():
             if isinstance(element, CoilElement):
                 circuit = element.circuit or ""
-                refuse_key_if(
-                    circuit not in wound,
-                    ("elements", name, "circuit"),
-                    got=f"'{circuit}'",
-                    expected=f"one of circuits: {one_of(self.circuits)}"
-                    if self.circuits
-                    else "no circuit, because 'circuits' is empty",
-                    hint=nearest(circuit, self.circuits, "add it to circuits, or leave it out"),
-                )
+                if circuit not in wound:
+                    raise CaseProblem(
+                        ("elements", name, "circuit"),
+                        got=f"'{circuit}'",
+                        expected=f"one of circuits: {one_of(self.circuits)}"
+                        if self.circuits
+                        else "no circuit, because 'circuits' is empty",
+                        hint=nearest(circuit, self.circuits, "add it to circuits, or leave it out"),
+                    )
                 wound[circuit].append(name)
         for name, coils in wound.items():
             refuse_key_if(

@@ -96,13 +96,13 @@ class FlexibleBody(Component):
         """
         names = [(port_map or {}).get(point, point) for point in self.points]
         for point, name in zip(self.points, names, strict=True):
-            refuse_key_if(
-                name not in reduced.port_names,
-                ("points",),
-                got=f"'{point}', but the reduced body '{reduced.name}' has no port '{name}'",
-                expected=f"one of: {one_of(reduced.port_names)}",
-                hint=nearest(name, reduced.port_names, "reduce the body with this surface."),
-            )
+            if name not in reduced.port_names:
+                raise CaseProblem(
+                    ("points",),
+                    got=f"'{point}', but the reduced body '{reduced.name}' has no port '{name}'",
+                    expected=f"one of: {one_of(reduced.port_names)}",
+                    hint=nearest(name, reduced.port_names, "reduce the body with this surface."),
+                )
         if self.speed and not reduced.rigid_count:
             raise CaseProblem(
                 ("speed",),

@@ -14,7 +14,7 @@ from typing import TypeVar
 
 from klack.control.controlled import Controlled
 from klack.control.law import Law
-from klack.errors import InputError, refuse_if
+from klack.errors import InputError
 from klack.input.problem import nearest, one_of
 from klack.input.section import instead_of_file
 from klack.mechanics.fmu_child import ADVANCE, FORCE, RUN
@@ -144,13 +144,13 @@ def _joined(
     where, sensors = f"{fmu.path.name}: inputs", component.sensors
     taken: dict[str, tuple[str, float]] = {}
     for sensor, name in joined.items():
-        refuse_if(
-            sensor not in sensors,
-            where,
-            got=f"the sensor '{sensor}'",
-            expected=f"one of: {one_of(sensors) if sensors else 'no sensors'}",
-            hint=nearest(sensor, sensors, "describe it under 'sensors'."),
-        )
+        if sensor not in sensors:
+            raise InputError(
+                where,
+                got=f"the sensor '{sensor}'",
+                expected=f"one of: {one_of(sensors) if sensors else 'no sensors'}",
+                hint=nearest(sensor, sensors, "describe it under 'sensors'."),
+            )
         variable = _named(fmu, f"input for the sensor '{sensor}'", name, _reals(fmu, "input"))
         taken[sensor] = (name, _size(fmu, sensors[sensor].unit, variable))
     names = {name for name, _ in taken.values()}
@@ -191,13 +191,13 @@ def _require_settable(fmu: FmuDescription, parameters: Mapping[str, float]) -> N
         if v.variability != "constant" and v.causality in ("parameter", "local", "output")
     ]
     for name in parameters:
-        refuse_if(
-            name not in settable,
-            f"{fmu.path.name}: parameters",
-            got=f"'{name}'",
-            expected=f"one of: {one_of(settable) if settable else 'no parameters'}",
-            hint=nearest(name, settable, "inspect it with: fmpy info."),
-        )
+        if name not in settable:
+            raise InputError(
+                f"{fmu.path.name}: parameters",
+                got=f"'{name}'",
+                expected=f"one of: {one_of(settable) if settable else 'no parameters'}",
+                hint=nearest(name, settable, "inspect it with: fmpy info."),
+            )
 
 
 def _reals(fmu: FmuDescription, causality: str) -> list[FmuVariable]:

@@ -145,14 +145,14 @@ class ImportedFmu(Component):
             and item.causality in ("parameter", "structuralParameter", "local", "output")
             and item.kind != "other"
         ]
-        refuse_key_if(
-            name not in names,
-            ("parameters", name),
-            got=f"'{name}'",
-            expected=f"a parameter or start value of {self.file.name}: {_some(names)}",
-            hint=nearest(name, names, "inspect it with: fmpy info."),
-            on_key=True,
-        )
+        if name not in names:
+            raise CaseProblem(
+                ("parameters", name),
+                got=f"'{name}'",
+                expected=f"a parameter or start value of {self.file.name}: {_some(names)}",
+                hint=nearest(name, names, "inspect it with: fmpy info."),
+                on_key=True,
+            )
 
     def add_rows(self, rows: Rows) -> None:
         """Add one element with its own instance of the FMU."""

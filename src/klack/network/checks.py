@@ -44,21 +44,21 @@ def _check_dangling(components: Mapping[str, Component], nodes: Iterable[Node]) 
                 continue
             if port.role is Role.COIL:
                 raise _no_driver(("components", component), f"{component}.{name}")
-            refuse_key_if(
-                port.role is Role.FEEDS,
-                ("components", component),
-                got=f"the boost capacitor {component}.{name} without a driver",
-                expected="boost-drivers that draw from it",
-                hint=f"join them: [{component}.{name}, driver.supply], or remove it.",
-            )
-            refuse_key_if(
-                port.role is Role.FED,
-                ("components", component),
-                got="a boost-driver without a capacitor",
-                expected="capacitance, boost_voltage and recharge_power, or its port 'supply' "
-                "joined to a boost-capacitor",
-                hint=f"write [capacitor.outlet, {component}.{name}] among the connections.",
-            )
+            if port.role is Role.FEEDS:
+                raise CaseProblem(
+                    ("components", component),
+                    got=f"the boost capacitor {component}.{name} without a driver",
+                    expected="boost-drivers that draw from it",
+                    hint=f"join them: [{component}.{name}, driver.supply], or remove it.",
+                )
+            if port.role is Role.FED:
+                raise CaseProblem(
+                    ("components", component),
+                    got="a boost-driver without a capacitor",
+                    expected="capacitance, boost_voltage and recharge_power, or its port 'supply' "
+                    "joined to a boost-capacitor",
+                    hint=f"write [capacitor.outlet, {component}.{name}] among the connections.",
+                )
             if port.role is Role.VOLTAGE:
                 raise _no_coil(("components", component), f"{component}.{name}")
             raise CaseProblem(
@@ -83,40 +83,41 @@ def _where_to(domain: str, port: str) -> str:
 
 def _check_motion(components: Mapping[str, Component], node: Node) -> None:
     bodies = [str(joint) for joint in node.having(Role.MOTION)]
-    refuse_key_if(
-        node.word and bodies,
-        ("connections", node.index),
-        got=f"{_and(bodies)} connected to the ground",
-        expected="a body or the ground, not both at one point",
-        hint="fix the body in its definition, or support it by a stiff spring.",
-    )
-    refuse_key_if(
-        len(bodies) > 1,
-        ("connections", node.index),
-        got=f"{len(bodies)} bodies at one point: {_and(bodies)}",
-        expected="one body and the components that act on it",
-        hint="put an end stop or a spring between the bodies, or make them one body.",
-    )
-    refuse_key_if(
-        not node.word and not bodies,
-        ("connections", node.index),
-        got=f"{node}: nothing there has a mass",
-        expected="a port of one body, or the ground",
-        hint="add the body that they act on to this list; springs in series need one in between.",
-    )
+    if node.word and bodies:
+        raise CaseProblem(
+            ("connections", node.index),
+            got=f"{_and(bodies)} connected to the ground",
+            expected="a body or the ground, not both at one point",
+            hint="fix the body in its definition, or support it by a stiff spring.",
+        )
+    if len(bodies) > 1:
+        raise CaseProblem(
+            ("connections", node.index),
+            got=f"{len(bodies)} bodies at one point: {_and(bodies)}",
+            expected="one body and the components that act on it",
+            hint="put an end stop or a spring between the bodies, or make them one body.",
+        )
+    if not node.word and not bodies:
+        raise CaseProblem(
+            ("connections", node.index),
+            got=f"{node}: nothing there has a mass",
+            expected="a port of one body, or the ground",
+            hint="add the body that they act on to this list; springs in series need one in "
+            "between.",
+        )
 
 
 def _check_pressure(components: Mapping[str, Component], node: Node) -> None:
     prescribed = [str(joint) for joint in node.having(Role.PRESSURE)]
     prescribed += [node.word] if node.word else []
     volumes = [str(joint) for joint in node.having(Role.COMPLIANCE)]
-    refuse_key_if(
-        len(prescribed) > 1,
-        ("connections", node.index),
-        got=f"{len(prescribed)} pressures at one node: {_and(prescribed)}",
-        expected="one pressure",
-        hint="put an orifice or a line between them.",
-    )
+    if len(prescribed) > 1:
+        raise CaseProblem(
+            ("connections", node.index),
+            got=f"{len(prescribed)} pressures at one node: {_and(prescribed)}",
+            expected="one pressure",
+            hint="put an orifice or a line between them.",
+        )
     if prescribed and volumes:
         raise CaseProblem(
             ("connections", node.index),
@@ -132,13 +133,13 @@ def _check_pressure(components: Mapping[str, Component], node: Node) -> None:
 
 def _refuse_forced_flow(components: Mapping[str, Component], node: Node, pressure: str) -> None:
     for joint in node.joints:
-        refuse_key_if(
-            _is_flow_source(components, joint),
-            ("connections", node.index),
-            got=f"{joint}, which forces a flow, at the prescribed pressure {pressure}",
-            expected="a flow into a volume, whose pressure can respond",
-            hint="connect it to a chamber; at a prescribed pressure it has no effect.",
-        )
+        if _is_flow_source(components, joint):
+            raise CaseProblem(
+                ("connections", node.index),
+                got=f"{joint}, which forces a flow, at the prescribed pressure {pressure}",
+                expected="a flow into a volume, whose pressure can respond",
+                hint="connect it to a chamber; at a prescribed pressure it has no effect.",
+            )
 
 
 def _is_flow_source(components: Mapping[str, Component], joint: Joint) -> bool:
@@ -173,13 +174,13 @@ def _check_temperature(components: Mapping[str, Component], node: Node) -> None:
     prescribed = [str(joint) for joint in node.having(Role.TEMPERATURE)]
     prescribed += [node.word] if node.word else []
     stores = [str(joint) for joint in node.having(Role.HEAT_STORE)]
-    refuse_key_if(
-        len(prescribed) > 1 or (prescribed and stores),
-        ("connections", node.index),
-        got=f"{_and([*prescribed, *stores])} at one node",
-        expected="one prescribed temperature, or heat capacities",
-        hint="put a thermal-conductance or a convection between them.",
-    )
+    if len(prescribed) > 1 or (prescribed and stores):
+        raise CaseProblem(
+            ("connections", node.index),
+            got=f"{_and([*prescribed, *stores])} at one node",
+            expected="one prescribed temperature, or heat capacities",
+            hint="put a thermal-conductance or a convection between them.",
+        )
 
 
 def _check_drive(components: Mapping[str, Component], node: Node) -> None:
@@ -193,28 +194,28 @@ def _check_drive(components: Mapping[str, Component], node: Node) -> None:
         raise _no_driver(key, _and(coils))
     if not coils:
         raise _no_coil(key, _and(drivers))
-    refuse_key_if(
-        len(drivers) > 1 or len(coils) > 1,
-        key,
-        got=f"{_and([*drivers, *coils])} in one circuit",
-        expected="one driver and one coil",
-        hint="give every coil a driver of its own, with equal settings if you like; coils of "
-        "one magnetic-network without 'circuit' are in series.",
-    )
+    if len(drivers) > 1 or len(coils) > 1:
+        raise CaseProblem(
+            key,
+            got=f"{_and([*drivers, *coils])} in one circuit",
+            expected="one driver and one coil",
+            hint="give every coil a driver of its own, with equal settings if you like; coils of "
+            "one magnetic-network without 'circuit' are in series.",
+        )
 
 
 def _check_feed(node: Node) -> None:
     sources = [str(joint) for joint in node.having(Role.FEEDS)]
     drivers = [str(joint) for joint in node.having(Role.FED)]
     others = [str(joint) for joint in node.joints if str(joint) not in (*sources, *drivers)]
-    refuse_key_if(
-        len(sources) != 1 or not drivers or others,
-        ("connections", node.index),
-        got=f"{_and([*sources, *drivers, *others])} at one node",
-        expected="one boost-capacitor, and the port 'supply' of each boost-driver that draws "
-        "from it",
-        hint="write [capacitor.outlet, first_driver.supply, second_driver.supply].",
-    )
+    if len(sources) != 1 or not drivers or others:
+        raise CaseProblem(
+            ("connections", node.index),
+            got=f"{_and([*sources, *drivers, *others])} at one node",
+            expected="one boost-capacitor, and the port 'supply' of each boost-driver that draws "
+            "from it",
+            hint="write [capacitor.outlet, first_driver.supply, second_driver.supply].",
+        )
 
 
 def _no_driver(key: tuple[str | int, ...], coil: str) -> CaseProblem:
@@ -252,13 +253,13 @@ def check_rows(rows: Rows) -> None:
         hint="add the needle as a component.",
     )
     for interface in rows.interfaces:
-        refuse_key_if(
-            interface.gap < -_TOUCHING,
-            ("components", interface.component),
-            got=f"a gap of {format_si(interface.gap, 'm')} at the start: already closed",
-            expected="a gap of 0 or more",
-            hint="start in contact (gap 0): a preload then compresses the stop.",
-        )
+        if interface.gap < -_TOUCHING:
+            raise CaseProblem(
+                ("components", interface.component),
+                got=f"a gap of {format_si(interface.gap, 'm')} at the start: already closed",
+                expected="a gap of 0 or more",
+                hint="start in contact (gap 0): a preload then compresses the stop.",
+            )
     _check_driven(rows)
     _check_node_rows(rows)
     _check_junctions(rows)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from klack.input.problem import CaseProblem, nearest, one_of, refuse_key_if
+from klack.input.problem import CaseProblem, nearest, one_of
 from klack.network.component import Component
 from klack.network.port import Port, Role
 
@@ -77,13 +77,13 @@ def _node(
     ports: Mapping[str, Mapping[str, Port]],
     seen: dict[str, int],
 ) -> Node:
-    refuse_key_if(
-        len(connection) < 2,
-        ("connections", index),
-        got=f"only {connection[0]}" if connection else "an empty connection",
-        expected="two ports or more, or a port and ground or ambient",
-        hint="list all ports that meet: [needle.tip, spring.end].",
-    )
+    if len(connection) < 2:
+        raise CaseProblem(
+            ("connections", index),
+            got=f"only {connection[0]}" if connection else "an empty connection",
+            expected="two ports or more, or a port and ground or ambient",
+            hint="list all ports that meet: [needle.tip, spring.end].",
+        )
     joints: list[Joint] = []
     words: list[str] = []
     for place, text in enumerate(connection):
@@ -102,20 +102,20 @@ def _node(
     domains |= {word: of_ambient if word == "ambient" else RESERVED[word] for word in words}
     if {"hydraulic", "pneumatic"} <= set(domains.values()):
         raise _mixed_fluids(index, domains)
-    refuse_key_if(
-        len(set(domains.values())) > 1,
-        ("connections", index),
-        got=" with ".join(f"{name} ({domain})" for name, domain in domains.items()),
-        expected="ports of one domain",
-        hint="a component of two domains has a port in each: connect them one by one.",
-    )
-    refuse_key_if(
-        not joints,
-        ("connections", index),
-        got=f"no port other than {one_of(words)}",
-        expected="at least one port of a component",
-        hint="remove the connection, or add the missing port.",
-    )
+    if len(set(domains.values())) > 1:
+        raise CaseProblem(
+            ("connections", index),
+            got=" with ".join(f"{name} ({domain})" for name, domain in domains.items()),
+            expected="ports of one domain",
+            hint="a component of two domains has a port in each: connect them one by one.",
+        )
+    if not joints:
+        raise CaseProblem(
+            ("connections", index),
+            got=f"no port other than {one_of(words)}",
+            expected="at least one port of a component",
+            hint="remove the connection, or add the missing port.",
+        )
     domain = next(iter(domains.values()))
     return Node(index, domain, tuple(joints), words[0] if words else "")
 
@@ -140,13 +140,13 @@ def _joint(key: tuple[str | int, ...], text: str, ports: Mapping[str, Mapping[st
             expected="component.port, or one of the words ground, ambient",
             hint=nearest(text, RESERVED, f"write the port as well, e.g. {_example(text, ports)}."),
         )
-    refuse_key_if(
-        component not in ports,
-        key,
-        got=f"'{text}', but there is no component '{component}'",
-        expected=f"a port of one of: {one_of(ports)}",
-        hint=nearest(component, ports, "add the component, or correct its name."),
-    )
+    if component not in ports:
+        raise CaseProblem(
+            key,
+            got=f"'{text}', but there is no component '{component}'",
+            expected=f"a port of one of: {one_of(ports)}",
+            hint=nearest(component, ports, "add the component, or correct its name."),
+        )
     known = ports[component]
     if name not in known:
         full = [f"{component}.{port}" for port in known]

@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 import scipy
 
-from klack.input.problem import CaseProblem, refuse_key_if
+from klack.input.problem import CaseProblem
 from klack.network.rows import AMBIENT, LimitRow, Rows
 from klack.units import format_si
 
@@ -290,13 +290,13 @@ def _check_motion(rows: Rows, limit: LimitRow, travel: Travel) -> None:
     least, below = travel.lowest(factors)
     most, above = travel.highest(factors)
     slack = _ROUNDING * abs(limit.start)
-    refuse_key_if(
-        not low - slack <= limit.start <= high + slack,
-        ("components", limit.component, *([limit.key] if limit.key else [])),
-        got=f"{value_text(limit.start, limit.unit)} at the start",
-        expected=f"a {limit.quantity} in the range of {limit.law}, {range_text(limit)}",
-        hint=limit.advice,
-    )
+    if not low - slack <= limit.start <= high + slack:
+        raise CaseProblem(
+            ("components", limit.component, *([limit.key] if limit.key else [])),
+            got=f"{value_text(limit.start, limit.unit)} at the start",
+            expected=f"a {limit.quantity} in the range of {limit.law}, {range_text(limit)}",
+            hint=limit.advice,
+        )
     for way, stops, is_out in (
         (least, below, limit.start + least < low - slack),
         (most, above, limit.start + most > high + slack),
@@ -327,21 +327,21 @@ def _check_pressure(rows: Rows, limit: LimitRow) -> None:
     row = rows.nodes[limit.node]
     start, highest = row.at_start, float(row.pressure.max())
     key = ("ambient",) if limit.node == AMBIENT else ("components", limit.component)
-    refuse_key_if(
-        highest > limit.usable[1],
-        key,
-        got=f"a pressure of {value_text(highest, 'Pa')}",
-        expected=f"at most {value_text(limit.usable[1], 'Pa')}; {limit.law} is described "
-        f"{range_text(limit)}",
-        hint=limit.advice,
-    )
-    refuse_key_if(
-        row.prescribed and start < limit.valid[0],
-        key,
-        got=f"a pressure of {value_text(start, 'Pa')} at the start",
-        expected=f"{limit.law}, {range_text(limit)}",
-        hint=limit.advice,
-    )
+    if highest > limit.usable[1]:
+        raise CaseProblem(
+            key,
+            got=f"a pressure of {value_text(highest, 'Pa')}",
+            expected=f"at most {value_text(limit.usable[1], 'Pa')}; {limit.law} is described "
+            f"{range_text(limit)}",
+            hint=limit.advice,
+        )
+    if row.prescribed and start < limit.valid[0]:
+        raise CaseProblem(
+            key,
+            got=f"a pressure of {value_text(start, 'Pa')} at the start",
+            expected=f"{limit.law}, {range_text(limit)}",
+            hint=limit.advice,
+        )
 
 
 def range_text(limit: LimitRow) -> str:

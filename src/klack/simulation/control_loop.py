@@ -166,13 +166,13 @@ class ControlLoop:
     def _column(self, row: ControllerRow, i: int) -> tuple[int, float]:
         key = ("components", row.component, "sensors", row.sensors[i])
         name, unit = present_name(row.channels[i], self._names), row.units[i]
-        refuse_key_if(
-            name not in self._names,
-            (*key, "channel"),
-            got=f"'{name}'",
-            expected="a recorded channel: a displacement, velocity, force, pressure or current",
-            hint=nearest(name, self._names, f"available are: {', '.join(self._names)[:600]}."),
-        )
+        if name not in self._names:
+            raise CaseProblem(
+                (*key, "channel"),
+                got=f"'{name}'",
+                expected="a recorded channel: a displacement, velocity, force, pressure or current",
+                hint=nearest(name, self._names, f"available are: {', '.join(self._names)[:600]}."),
+            )
         column = self._names.index(name)
         si = self._units[column]
         if si in _OTHER:
