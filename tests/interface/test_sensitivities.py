@@ -228,6 +228,12 @@ class TestCommand:
         assert code == 2
         assert words in capsys.readouterr().err
 
+    def test_refuses_a_controller_before_any_stroke(self, capsys, monkeypatch):
+        monkeypatch.setattr("klack.analyses.sensitivities.slopes.one_variant", None)
+        case = SMALL.with_name("controlled_valve.yaml")
+        assert main(["sensitivities", str(case), "--parameter", PRELOAD, "-q"]) == 2
+        assert "a run with a controller" in capsys.readouterr().err
+
     def test_refuses_a_case_without_parameters(self, capsys):
         assert main(["sensitivities", str(SMALL), "-q"]) == 2
         assert "--parameter" in capsys.readouterr().err

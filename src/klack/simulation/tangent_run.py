@@ -70,7 +70,14 @@ from klack.simulation.tangent_numbers import (
 )
 from klack.units import format_si
 
-__all__ = ["DIRECTIONS", "TangentRun", "Touch", "compile_tangents", "run_tangents"]
+__all__ = [
+    "DIRECTIONS",
+    "TangentRun",
+    "Touch",
+    "compile_tangents",
+    "require_differentiable",
+    "run_tangents",
+]
 
 Lanes = NDArray[np.float64]
 """Numbers with derivatives: value, stretch of the steps, directions."""
@@ -296,6 +303,16 @@ def run_tangents(
         For a component that calls Python or an FMU, and for a direction in which the numbers of
         the network do not change smoothly.
     """
+    require_differentiable(rows)
+    sizes = sizes or step_sizes(rows, accuracy, step=step, coarse=coarse)
+    begin = process_time()
+    running = _Running(rows, directions, sizes, duration, record, start)
+    found = running.run(progress)
+    return replace(found, cpu_time=process_time() - begin)
+
+
+def require_differentiable(rows: Rows) -> None:
+    """Raise InputError for a network whose run has no derivatives."""
     refuse_if(
         has_python_steps(rows),
         "sensitivities",
@@ -304,11 +321,29 @@ def run_tangents(
         hint="run klack study with a few values of each parameter, which calls the unchanged "
         "program.",
     )
-    sizes = sizes or step_sizes(rows, accuracy, step=step, coarse=coarse)
-    begin = process_time()
-    running = _Running(rows, directions, sizes, duration, record, start)
-    found = running.run(progress)
-    return replace(found, cpu_time=process_time() - begin)
+    driven = [row.component for row in rows.bodies if row.course is not None]
+    if driven:
+        raise InputError(
+            f"components.{driven[0]}",
+            got="derivatives of a run with a prescribed motion",
+            expected="bodies moved by forces",
+            hint="use differences of runs (klack study).",
+        )
+    if rows.controllers:
+        raise InputError(
+            f"components.{rows.controllers[0].component}",
+            got="derivatives of a run with a controller",
+            expected="a valve without controllers",
+            hint="use differences of runs (klack study), or a driver without signals.",
+        )
+    if rows.waves:
+        raise InputError(
+            f"components.{rows.waves[0].component}.properties",
+            got="derivatives of a run with a line of local properties",
+            expected="properties: fixed",
+            hint="use differences of runs (klack study), or properties: fixed with the "
+            "working pressure.",
+        )
 
 
 def compile_tangents(rows: Rows, *, step: float | None = None) -> None:
@@ -329,29 +364,6 @@ class _Running:
         record: float,
         start: Literal["rest", "free"],
     ) -> None:
-        driven = [row.component for row in rows.bodies if row.course is not None]
-        if driven:
-            raise InputError(
-                f"components.{driven[0]}",
-                got="derivatives of a run with a prescribed motion",
-                expected="bodies moved by forces",
-                hint="use differences of runs (klack study).",
-            )
-        if rows.controllers:
-            raise InputError(
-                f"components.{rows.controllers[0].component}",
-                got="derivatives of a run with a controller",
-                expected="a valve without controllers",
-                hint="use differences of runs (klack study), or a driver without signals.",
-            )
-        if rows.waves:
-            raise InputError(
-                f"components.{rows.waves[0].component}.properties",
-                got="derivatives of a run with a line of local properties",
-                expected="properties: fixed",
-                hint="use differences of runs (klack study), or properties: fixed with the "
-                "working pressure.",
-            )
         self.rows, self.directions, self.sizes = rows, tuple(directions), sizes
         self.grid = grid_of(duration, sizes, record)
         network = compile_network(rows, sizes)

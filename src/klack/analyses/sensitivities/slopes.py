@@ -53,9 +53,14 @@ from klack.machine.progress import Progress
 from klack.network.rows import Rows
 from klack.signals.sampled import TimeSeries
 from klack.simulation.network_result import NetworkResult
-from klack.simulation.network_run import has_python_steps
 from klack.simulation.tangent_numbers import Direction
-from klack.simulation.tangent_run import DIRECTIONS, TangentRun, compile_tangents, run_tangents
+from klack.simulation.tangent_run import (
+    DIRECTIONS,
+    TangentRun,
+    compile_tangents,
+    require_differentiable,
+    run_tangents,
+)
 
 __all__ = ["SlopeRunner", "has_slope", "measured", "moved_forces", "transported"]
 
@@ -251,8 +256,8 @@ class SlopeRunner:
     def tangents(self) -> list[TangentRun]:
         """Runs with derivatives, each for some directions."""
         run, rows, found = self.valve.case.run, self.rows({}), list[TangentRun]()
-        if not has_python_steps(rows):
-            compile_tangents(rows, step=run.fine_step)
+        require_differentiable(rows)
+        compile_tangents(rows, step=run.fine_step)
         begin = process_time()
         directions = [self._direction(item) for item in self.space.varied]
         self.runs_time = process_time() - begin
@@ -292,6 +297,7 @@ class SlopeRunner:
 
     def check_steps(self) -> None:
         """Halve all steps as often as the stroke in the middle requires, and warn of the rest."""
+        require_differentiable(self.rows({}))  # before any stroke
         run = one_variant(self.valve, self.roles, self.name, self.clock)
         self.halvings = run.variant.halvings
 
