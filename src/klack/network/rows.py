@@ -560,6 +560,11 @@ class Rows:
     coils: dict[int, tuple[int, int]] = field(default_factory=dict)
 
     @property
+    def owners(self) -> dict[int, BodyRow]:
+        """Body of each handle that is a port of one."""
+        return {handle: row for row in self.bodies for handle in row.ports}
+
+    @property
     def in_fluid(self) -> set[int]:
         """Ports that pressures and flows push."""
         return {wall.port for wall in self.walls} | {p for row in self.branches for p in row.ports}

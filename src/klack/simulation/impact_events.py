@@ -101,7 +101,7 @@ class ImpactFinder:
     """
 
     def __init__(self, rows: Rows, start: float, step: float) -> None:
-        owner = {handle: row for row in rows.bodies for handle in row.ports}
+        owner = rows.owners
         self._stops = [row.component for row in rows.interfaces]
         self._bodies = [
             tuple(owner[h] if h != GROUND else None for h in (row.upper, row.lower))
@@ -212,7 +212,7 @@ class ImpactFinder:
 
 def arm_doubts(rows: Rows) -> Iterator[str]:
     """Doubts about stops at another arm of a lever than the first, whose speed is recorded."""
-    owner = {handle: row for row in rows.bodies for handle in row.ports}
+    owner = rows.owners
     for row in rows.interfaces:
         for handle in {row.upper, row.lower} & owner.keys():
             lever = owner[handle]
@@ -271,7 +271,7 @@ def judged(
     after
         The same for a run that continues this one.
     """
-    owner = {handle: row for row in rows.bodies for handle in row.ports}
+    owner = rows.owners
     stops = {row.component: c for c, row in enumerate(rows.interfaces)}
     share = np.zeros((len(stops), len(stops)))
     meeting: list[set[str]] = []

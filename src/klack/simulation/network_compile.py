@@ -498,7 +498,7 @@ def _interfaces(
     rows: Rows, port_of: Mapping[int, int], bodies: Bodies
 ) -> tuple[Interfaces, InterfaceState]:
     count = len(rows.interfaces)
-    owner = {handle: row for row in rows.bodies for handle in row.ports}
+    owner = rows.owners
     kind = np.full(count, NO_LAW, np.int64)
     law0, alpha = np.zeros(count, np.int64), np.zeros(count)
     law = [np.zeros(0)]

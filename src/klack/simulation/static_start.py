@@ -994,7 +994,7 @@ class _Balance:
             settled = begin_faces(interfaces.law, int(interfaces.law0[c]), deep)
             interfaces.gap0[c] += settled
             now.gap[c] += settled
-        owner = {handle: row for row in rows.bodies for handle in row.ports}
+        owner = rows.owners
         for c, touching in enumerate(rows.interfaces):
             pair = (owner.get(touching.upper), owner.get(touching.lower))
             chi = resting_dissipation(touching, pair, -float(now.gap[c] + now.e[c]))

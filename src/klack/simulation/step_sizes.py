@@ -146,7 +146,7 @@ def _is_whole(number: float) -> bool:
 
 
 def _middle(rows: Rows, h: float, near: int) -> int:
-    owner = {handle: row for row in rows.bodies for handle in row.ports}
+    owner = rows.owners
     shortest = inf
     for row in rows.interfaces:
         if row.law is not None:

@@ -407,7 +407,7 @@ class _Running:
             (),
         )
         interfaces = rows.interfaces
-        owner = {handle: row for row in rows.bodies for handle in row.ports}
+        owner = rows.owners
         self.pause = [
             longest_period((owner.get(row.upper), owner.get(row.lower))) for row in interfaces
         ]
@@ -666,7 +666,7 @@ class _Found:
 
 
 def _masses(rows: Rows) -> dict[str, float]:
-    owner = {handle: row for row in rows.bodies for handle in row.ports}
+    owner = rows.owners
     return {
         row.component: effective_mass((owner.get(row.upper), owner.get(row.lower)))
         for row in rows.interfaces
