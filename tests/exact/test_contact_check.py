@@ -378,7 +378,7 @@ def test_noise_of_an_impact_says_that_its_faces_were_new():
 
     told = [note for note in source.notes if "first on new faces" in note]
     assert len(told) == 1
-    assert f"takes {100 * share:.2g} % of the energy" in told[0]
+    assert f"dissipates {100 * share:.2g} % of the energy" in told[0]
     worn = replace(study.levels["reduced"], energies=energies | {"plastic": 0.0})
     (after,) = impact_sources(replace(study, levels={"reduced": worn}))
     assert not any("new faces" in note for note in after.notes)

@@ -145,7 +145,7 @@ def begin_with_an_empty_folder(walk: Walk, folder: Path) -> None:
 
 
 def duplicate_and_note(walk: Walk, folder: Path) -> None:
-    walk.presses(f"Duplicate {VALVE}", "The copy is placed in it")
+    walk.presses(f"Duplicate {VALVE}", "The copy is placed in the same folder")
     walk.presses("Make", f"impact, {COPY}")
     walk.finds((folder / COPY).read_text() == (folder / VALVE).read_text(), "a copy is the same")
     walk.presses(f"Note {COPY}", f"Note on {COPY}")
@@ -335,8 +335,8 @@ def move_pin_hear(walk: Walk, folder: Path) -> None:
 def kill_in_the_middle(walk: Walk, folder: Path, serve: Callable[[Path], Served]) -> None:
     """A run and a text that is not saved outlive a server that is killed."""
     walk.goes("/", f"impact, {COPY}")
-    walk.presses(f"Duplicate {COPY}", "The copy is placed in it")
-    walk.types("Name", "case-3", "The copy is placed in it", key="Tab")
+    walk.presses(f"Duplicate {COPY}", "The copy is placed in the same folder")
+    walk.types("Name", "case-3", "The copy is placed in the same folder", key="Tab")
     walk.presses("Make", "impact, valve/case-3.yaml")
     walk.presses(f"Run {COPY}", f"klack impact {COPY}")
     walk.goes("/case?path=valve/case-3.yaml", "valid impact, saved")

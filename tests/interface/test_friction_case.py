@@ -67,7 +67,7 @@ def test_jumps_that_depend_on_the_step_are_told(tmp_path, static, doubted):
         certify=False,
     ).levels["interface"]
     assert (abs(other.measures.restitution - level.measures.restitution) > 0.002) == doubted
-    assert any("depends on the step" in doubt for doubt in level.doubts) == doubted
+    assert any("depend on the step" in doubt for doubt in level.doubts) == doubted
 
 
 def test_the_record_tells_what_the_impact_would_be_without(both, tmp_path):

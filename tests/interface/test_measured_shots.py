@@ -190,7 +190,7 @@ def test_the_command_stores_and_reports(drops, tmp_path, capsys):
     assert restitution["highest_bias"] == pytest.approx(
         restitution["expected_highest"] - restitution["centred"]
     )
-    assert f"beside {DROPS} measured drops" in capsys.readouterr().out
+    assert f"against {DROPS} measured drops" in capsys.readouterr().out
     stored = MEASURED_SHOTS.load(tmp_path / "measured")
     assert stored.distributions[0].measured == pytest.approx(SAME, abs=0.005)
     page = (tmp_path / "measured" / "report.html").read_text()

@@ -357,7 +357,7 @@ def test_a_real_limit_is_seen_before_the_factor_is_computed(tmp_path):
     done = limited(before, 100_000_000, after, tmp_path)
 
     assert done.returncode == 0, done.stderr
-    found = re.search(r"takes about (\d+) MB of memory, expected at most (\d+)", done.stdout)
+    found = re.search(r"needing about (\d+) MB of memory, expected at most (\d+)", done.stdout)
     assert found is not None, done.stdout
     assert 100 < int(found[1]) < 500
     assert int(found[2]) < 100

@@ -195,7 +195,7 @@ def test_a_run_that_ends_in_contact_has_no_estimate():
     study = run_impact(changed(duration=4e-6), levels=("reduced",))
     assert study.estimates == {}
     assert estimate_lines(study)[0].startswith("No error estimate: ")
-    assert "cut off" in estimate_lines(study)[0]
+    assert "ends in contact" in estimate_lines(study)[0]
 
 
 @pytest.mark.parametrize(
