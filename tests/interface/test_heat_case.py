@@ -174,6 +174,54 @@ def test_at_20_degrees_it_is_the_stroke_of_the_case(valve):
     assert found.numbers["opening delay"] == plain.needle_times.opening.at_90
 
 
+PULSE = (
+    "time: [0 ms, 3 ms, 3.001 ms, 4 ms, 4.001 ms, 7 ms], "
+    "voltage: [12 V, 12 V, -30 V, -30 V, 0 V, 0 V]}"
+)
+TWO = PULSE.replace("7 ms", "5 ms, 5.001 ms, 7 ms").replace("0 V]", "0 V, 12 V, 12 V]")
+
+
+def test_a_second_pulse_is_no_rebound():
+    """Truth = the same stroke without the second pulse."""
+    driver = "{type: voltage-step, voltage: 12 V, end: 4 ms, decay: 30 V}"
+    found = []
+    for course in (PULSE, TWO):
+        case = read((driver, "{type: voltage-table, " + course))
+        at = {a: COLD for a in aspects_of(case)}
+        found.append(heated_stroke(build_valve(case), find_roles(case), "dry", at).numbers)
+
+    one, two = found
+
+    assert 5e-6 < one["rebound"] < 50e-6
+    assert two["rebound"] == one["rebound"]
+
+
+@pytest.mark.parametrize("end", ["4 ms", "4 ms, repeat_every: 5 ms"], ids=["once", "again"])
+def test_the_rebound_of_a_normally_open_valve_ends_before_it_opens(end):
+    """Truth = the first bounce, which is the highest, over the position at touch."""
+    case = read(
+        ("seat: {type: end-stop, gap: 0 um", "seat: {type: end-stop, gap: 100 um"),
+        ("stop: {type: end-stop, gap: 100 um", "stop: {type: end-stop, gap: 0 um"),
+        ("preload: 10 N", "preload: -10 N"),
+        ("resistance: 2 ohm,", "resistance: 2 ohm, closes: downward,"),
+        ("end: 4 ms", f"end: {end}"),
+        (
+            "  growth:\n    lift:\n      of: [stop.gap, coil.gap]",
+            "  growth:\n    lift:\n      of: [seat.gap]",
+        ),
+    )
+    valve, roles = build_valve(case), find_roles(case)
+    result = one_variant(valve, roles, "dry", silent, check=False).variant.result
+    first, second = [item.time for item in result.events if item.stop == "seat"][:2]
+    lift = result.channels["needle.low displacement"].values
+    between = lift[(result.time >= first) & (result.time <= second)]
+
+    found = heated_stroke(valve, roles, "dry", {a: COLD for a in aspects_of(case)}).numbers
+
+    expected = between.max() - np.interp(first, result.time, lift)
+    assert found["rebound"] == pytest.approx(expected, rel=1e-12, abs=0.0)
+
+
 def test_each_aspect_takes_its_own_temperature(valve):
     hot = {"copper": 393.15, "ambient": 293.15}
 

@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from klack.analyses.stroke.run import one_variant
+from klack.analyses.stroke.times import LiftTimes
 from klack.assembling.valve import Valve, filled_network
 from klack.case.levels import Variant
 from klack.case.thermal import CaseThermal
@@ -217,7 +218,10 @@ NUMBERS: Mapping[str, tuple[str, str]] = {
     "closing delay": ("s", "From the command to the first touch of the seat."),
     "first peak at the stop": ("N", "Largest force of the first impact on the opening stop."),
     "first peak at the seat": ("N", "Largest force of the first impact on the seat."),
-    "rebound": ("m", "Largest distance from the seat after its first touch."),
+    "rebound": (
+        "m",
+        "Largest distance from the seat between its first touch and the next opening.",
+    ),
     "restitution": ("1", "Restitution of the first impact on the seat."),
 }
 """What is followed: name, unit and meaning."""
@@ -274,7 +278,7 @@ def heated_stroke(
         "closing delay": _since(times.closing.touch, closes),
         "first peak at the stop": stop.peak_force if stop else nan,
         "first peak at the seat": seat.peak_force if seat else nan,
-        "rebound": _rebound(result, roles, times.closing.touch),
+        "rebound": _rebound(result, roles, times, opens),
         "restitution": seat.restitution if seat else nan,
     }
     return HeatedStroke(
@@ -307,12 +311,28 @@ def _uncommanded(way: str, delay: float, commands: Sequence[float]) -> tuple[str
     )
 
 
-def _rebound(result: NetworkResult, roles: ValveRoles, touch: float | None) -> float:
+def _rebound(
+    result: NetworkResult, roles: ValveRoles, times: LiftTimes, opens: Sequence[float]
+) -> float:
+    """Largest distance from the seat [m] between its first touch and the next opening.
+
+    That opening is the next command for it, or the last bounce before the opening stop is met.
+    """
+    touch = times.closing.touch
     if touch is None:
         return float("nan")
     lift = result.channels[f"{roles.needle}.{roles.point} displacement"].values
-    after = lift[result.time >= touch]
-    return float(after.max() - lift[0]) if after.size else float("nan")
+    closed = lift[0] if times.starts == "closed" else np.interp(touch, result.time, lift)
+    hits = {
+        stop: [item.time for item in result.events if item.stop == stop and item.time > touch]
+        for stop in (roles.seat, roles.opening_stop)
+    }
+    end = min((command for command in opens if command > touch), default=np.inf)
+    reopened = min(hits[roles.opening_stop], default=np.inf)
+    if reopened < end:
+        end = max((time for time in hits[roles.seat] if time < reopened), default=touch)
+    after = lift[(result.time >= touch) & (result.time <= end)]
+    return float(after.max() - closed) if after.size else float("nan")
 
 
 def _still_driven(result: NetworkResult) -> tuple[str, ...]:
