@@ -392,6 +392,20 @@ def test_a_measure_without_values_is_told(tmp_path):
     assert any("'seat.7.peak_force' has no value at any point" in note for note in record.warnings)
 
 
+def test_parameters_that_a_dry_variant_leaves_out_are_named(tmp_path):
+    """Truth = the definition of the variant: no restrictions, no films."""
+    bores, film = "network.components.bores.diameter", "network.components.opening.film.roughness"
+    more = f"{bores}: {{from: 1 mm, to: 1.4 mm}}\n    {film}: {{values: [0.1 um, 1 um]}}\n    lift:"
+    text = STUDY.replace("lift: {normal", more + " {normal")
+
+    found = klack.run_study(SMALL, write(tmp_path, text)).record.warnings
+
+    assert [note.split(" Try")[0] for note in found if "no effect" in note] == [
+        f"'{bores}' has no effect: the variant 'dry' leaves 'bores' out.",
+        f"'{film}' has no effect: the variant 'dry' leaves the film of 'opening' out.",
+    ]
+
+
 def test_command_writes_result_report_and_numbers(study, tmp_path, capsys):
     out, numbers = tmp_path / "out", tmp_path / "numbers.json"
     command = ["study", str(SMALL), "--study", str(study), "--out", str(out)]

@@ -25,8 +25,10 @@ from klack.analyses.study.points import Space, Values
 from klack.analyses.study.record import StudyColumn
 from klack.analyses.unfinished import LogForm, UnfinishedLog, fingerprint
 from klack.case.any_case import AnyCase, CaseTree
+from klack.case.key_path import split_path
 from klack.case.points import GivenPoints, PointValue
 from klack.case.study_source import StudySource
+from klack.case.valve import ValveCase
 from klack.errors import InputError
 from klack.machine.progress import Progress
 
@@ -34,6 +36,7 @@ __all__ = [
     "Evaluation",
     "KeptPoint",
     "asked_of",
+    "dry_warnings",
     "measure_columns",
     "point_fields",
     "point_key",
@@ -380,3 +383,23 @@ def row_warnings(
         if not np.isfinite(item.values).any()
     )
     return (*_of_rows(rows), *missing, *_today_notes(today))
+
+
+def dry_warnings(asked: AskedPoints, space: Space) -> tuple[str, ...]:
+    """Parameters of parts and films that a dry variant leaves out."""
+    if not isinstance(asked.case, ValveCase) or not asked.variant.startswith("dry"):
+        return ()
+    parts = asked.case.network.components
+    used = {name for item in space.linked for name in item.words.values()}
+    found = []
+    for name in (item.name for item in space.varied if item.is_key and item.name not in used):
+        section, place, *rest = (*split_path(name), "", "")
+        if section != "network" or place != "components" or rest[0] not in parts:
+            continue
+        if rest[1] == "film" or parts[str(rest[0])].dry() is None:
+            left = f"the film of '{rest[0]}'" if rest[1] == "film" else f"'{rest[0]}'"
+            found.append(
+                f"'{name}' has no effect: the variant '{asked.variant}' leaves {left} out. "
+                "Try: variant: wet."
+            )
+    return tuple(found)

@@ -15,6 +15,7 @@ from klack.analyses.study.computing import sounds_of
 from klack.analyses.study.evaluation import (
     Evaluation,
     asked_of,
+    dry_warnings,
     measure_columns,
     point_fields,
     point_log_form,
@@ -133,6 +134,7 @@ def run_optimisation(
                 warnings=(
                     *(() if optimum.feasible else (_NOT_FEASIBLE,)),
                     *_lucky_draws(asked, source),
+                    *dry_warnings(asked, space),
                     *warnings,
                     *of_rows,
                 ),

@@ -8,6 +8,7 @@ from klack.analyses.study.asked_points import AskedPoints, PointRow
 from klack.analyses.study.evaluation import (
     Evaluation,
     asked_of,
+    dry_warnings,
     measure_columns,
     point_fields,
     point_log_form,
@@ -135,6 +136,7 @@ def run_study(
         warnings=(
             *points.notes,
             *_bounds_by_today(source),
+            *dry_warnings(asked, points.space),
             *notes,
             *row_warnings(found, today, columns),
             *surrogate_warnings(surrogates),
