@@ -10,12 +10,15 @@ from typing import Any
 __all__ = [
     "PAGES",
     "PICTURED",
+    "TEXT",
     "Place",
     "chromium",
     "controls",
     "launched",
     "made_folder",
     "planned",
+    "put",
+    "text_of",
     "watched",
 ]
 
@@ -66,6 +69,19 @@ class Place:
         self.then(page)
 
 
+TEXT = "document.getElementById('k-yaml')"
+
+
+def text_of(page: Any) -> str:
+    """The text of the editor of a case."""
+    return str(page.evaluate(f"{TEXT}.value"))
+
+
+def put(page: Any, text: str) -> None:
+    """Replace the text of the editor, as one that is pasted over it does."""
+    page.evaluate(f"text => {{ {TEXT}.value = text; {TEXT}.focus(); }}", text)
+
+
 def _press(name: str) -> Callable[[Any], None]:
     def press(page: Any) -> None:
         page.get_by_role("button", name=name, exact=True).first.click()
@@ -79,7 +95,7 @@ def _open_all(page: Any) -> None:
 
 
 def _refused(page: Any) -> None:
-    page.get_by_label("case file, YAML").fill("klack: 1\nmotion: {speed: 3 kg}\n")
+    put(page, "klack: 1\nmotion: {speed: 3 kg}\n")
     page.wait_for_selector("text=not valid, not saved")
     page.get_by_role("button", name="Discard changes").click()
     page.wait_for_selector("text=valid impact, saved")

@@ -14,6 +14,7 @@ from klack.case.reader import find_case
 
 pytest.importorskip("nicegui")
 from app_browser import LONG, page, require_within, server
+from browser_pages import put, text_of
 from served_app import Served
 
 __all__ = ["page", "server"]  # fixtures
@@ -164,23 +165,21 @@ def test_all_of_a_long_list_is_found_by_a_part_of_its_name(page, server, folder)
 def test_form_and_text_follow_each_other_and_survive(page, server, folder):
     page.goto(f"{server.base}/case?path={CASE}")
     page.wait_for_selector("text=valid impact, saved")
-    area = page.get_by_label("case file, YAML")
-
     page.get_by_label("speed", exact=True).fill("0.4 m/s")
     page.get_by_label("speed", exact=True).press("Enter")
-    page.wait_for_function("document.querySelector('textarea').value.includes('0.4 m/s')")
+    page.wait_for_function("document.getElementById('k-yaml').value.includes('0.4 m/s')")
     page.wait_for_selector("text=valid impact, not saved")
     page.goto(f"{server.base}/")  # closed without saving
     page.goto(f"{server.base}/case?path={CASE}")
     page.wait_for_selector("text=valid impact, not saved")
-    assert "0.4 m/s" in area.input_value()
+    assert "0.4 m/s" in text_of(page)
     assert "0.4 m/s" not in (folder / CASE).read_text()
 
-    area.fill(area.input_value().replace("0.4 m/s", "0.4 mm"))
+    put(page, text_of(page).replace("0.4 m/s", "0.4 mm"))
     page.wait_for_selector("text=not valid, not saved")
-    assert "0.4 mm" in area.input_value()  # drawing does not put the former text back
+    assert "0.4 mm" in text_of(page)  # drawing does not put the former text back
     page.wait_for_selector("text=motion.speed")
-    area.fill(area.input_value().replace("0.4 mm", "0.35 m/s"))
+    put(page, text_of(page).replace("0.4 mm", "0.35 m/s"))
     page.wait_for_function("document.getElementById('f-motion.speed').value == '0.35 m/s'")
     page.keyboard.press("Control+s")
     page.wait_for_selector("text=valid impact, saved")
@@ -197,14 +196,14 @@ def test_a_run_from_the_editor_is_that_of_the_text_on_the_page(page, server, fol
     jobs = Jobs(OpenFolder(folder))
     page.goto(f"{server.base}/case?path=valve/edited.yaml")
     page.wait_for_selector("text=valid impact, saved")
-    area, run = page.get_by_label("case file, YAML"), page.get_by_role("button", name="Run")
+    run = page.get_by_role("button", name="Run")
 
-    area.fill(text.replace("0.3 m/s", "0.3 kg"))
+    put(page, text.replace("0.3 m/s", "0.3 kg"))
     page.wait_for_selector("text=not valid, not saved")  # its words move the buttons
     run.click()
     page.get_by_role("button", name="Save and run").click()
     page.wait_for_selector("text=Not run.")
-    area.fill(text.replace("0.3 m/s", "0.4 m/s"))
+    put(page, text.replace("0.3 m/s", "0.4 m/s"))
     page.wait_for_selector("text=valid impact, not saved")
     run.click()
     page.wait_for_selector("text=which does not contain this text yet")
@@ -217,7 +216,7 @@ def test_a_run_from_the_editor_is_that_of_the_text_on_the_page(page, server, fol
     assert jobs.all() == []  # nothing that is not seen was run
     page.get_by_role("button", name="Discard changes").click()
     page.wait_for_selector("text=valid impact, saved")
-    area.fill(text.replace("0.3 m/s", "0.4 m/s"))
+    put(page, text.replace("0.3 m/s", "0.4 m/s"))
     page.wait_for_selector("text=valid impact, not saved")
     run.click()
     page.get_by_role("button", name="Save and run").click()
@@ -236,7 +235,7 @@ def test_a_text_too_long_for_the_page_is_neither_saved_nor_run(page, server, fol
     before = (folder / CASE).read_text("utf-8")
     page.goto(f"{server.base}/case?path={CASE}")
     page.wait_for_selector("text=valid")
-    page.get_by_label("case file, YAML").fill(before + "#" * 960_000)
+    put(page, before + "#" * 960_000)
     page.wait_for_selector("text=too long, not kept")
     for name in ("Save", "Run"):
         page.get_by_role("button", name=name, exact=True).click()
@@ -294,14 +293,13 @@ def test_text_typed_while_the_server_is_away_comes_back(folder, browser):
         assert page.get_by_label("speed", exact=True).input_value() == speed
         first.kill()
     page.wait_for_function("!window.socket.connected")
-    area = page.get_by_label("case file, YAML")
-    area.fill(area.input_value().replace(speed, "0.36 m/s"))
+    put(page, text_of(page).replace(speed, "0.36 m/s"))
     page.goto("about:blank")  # it would load itself anew while the next address is opened
     with Served(folder, "--port", port) as again:
         context.new_page().goto(again.address)  # the token of the new server
         page.goto(f"{again.base}{query}")
         page.wait_for_selector("text=valid impact, not saved")
-        assert "0.36 m/s" in area.input_value()
+        assert "0.36 m/s" in text_of(page)
     context.close()
     (folder / "valve" / "away.yaml").unlink()
 
@@ -441,13 +439,11 @@ window.release = () => { const all = window.heard; window.heard = null; all.forE
 
 
 def _typed_early(page, server):
-    """The text area of a case, typed into before the server listens."""
+    """Open a case, and type into its text before the server listens."""
     page.add_init_script(LATE)
     page.goto(f"{server.base}/case?path={CASE}")
-    area = page.get_by_label("case file, YAML")
-    area.fill("klack: 1\ntitle: early\n")
+    put(page, "klack: 1\ntitle: early\n")
     page.wait_for_selector("#k-link >> text=connecting")
-    return area
 
 
 def test_what_is_pressed_before_the_server_listens_is_done_once_it_does(page, server, folder):
@@ -465,7 +461,7 @@ def test_what_is_pressed_before_the_server_listens_is_done_once_it_does(page, se
 
 def test_text_discarded_at_once_stays_discarded(page, server, folder):
     """It was typed while the server did not listen; the page looks at the clock only later."""
-    area = _typed_early(page, server)
+    _typed_early(page, server)
     page.evaluate("window.paused = true; window.release()")
     page.wait_for_selector("text=not valid, not saved")
     page.get_by_role("button", name="Discard changes").click()
@@ -474,5 +470,5 @@ def test_text_discarded_at_once_stays_discarded(page, server, folder):
     page.evaluate("window.paused = false")
     page.wait_for_function("!Object.keys(sessionStorage).some(key => key.startsWith('klack-text'))")
     page.wait_for_timeout(200)
-    assert area.input_value() == (folder / CASE).read_text("utf-8")
+    assert text_of(page) == (folder / CASE).read_text("utf-8")
     assert page.locator(".k-badge").inner_text() == "valid impact, saved"

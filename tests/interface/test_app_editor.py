@@ -13,6 +13,7 @@ from klack.case.reader import find_case
 
 pytest.importorskip("nicegui")
 from app_browser import page, server, slow
+from browser_pages import put, text_of
 from served_app import Served
 
 __all__ = ["page", "server"]  # fixtures
@@ -49,10 +50,6 @@ def enter(page: Any, key: str, value: str, delay: float = 0.0, end: str = "Enter
     page.keyboard.type(value, delay=delay)
     if end:
         page.keyboard.press(end)
-
-
-def text_of(page: Any) -> str:
-    return str(page.get_by_label("case file, YAML").input_value())
 
 
 def require(page: Any, text: str, **values: str) -> None:
@@ -134,7 +131,7 @@ def test_save_waits_for_what_was_typed_before_it(editor, server, folder):
 def test_a_form_made_again_keeps_what_is_half_typed(editor):
     """A shorter list takes a box away; the box with the focus, its letters and its cursor stay."""
     text = text_of(editor)
-    editor.get_by_label("case file, YAML").fill(text.replace(", full]", "]"))
+    put(editor, text.replace(", full]", "]"))
     enter(editor, DURATION, "1245 ns", end="")
     for _ in range(5):
         editor.keyboard.press("ArrowLeft")
@@ -147,9 +144,8 @@ def test_a_form_made_again_keeps_what_is_half_typed(editor):
 
 
 def test_a_box_without_letters_of_its_own_follows_the_text_once_it_is_left(editor, server):
-    area = editor.get_by_label("case file, YAML")
     with slow(server, "reader:Reader"):
-        area.fill(text_of(editor).replace("0.3 m/s", "0.4 m/s"))
+        put(editor, text_of(editor).replace("0.3 m/s", "0.4 m/s"))
         editor.locator(f"[id='f-{SPEED}']").focus()
         editor.wait_for_timeout(600)
     editor.wait_for_selector("text=valid impact, not saved")
@@ -212,23 +208,17 @@ def test_what_the_server_did_not_hear_before_a_reload_is_there_again(editor):
     require(editor, text.replace("0.3 m/s", "0.4 m/s") + "# mine")
 
 
-# ----------------------------------------------------------------------- lines, colours, errors
+# ----------------------------------------------------------------------- lines, folds, errors
 
-SAME = """() => {
-  const ink = document.getElementById("k-ink").textContent.slice(0, -1);
-  const first = parseInt(document.querySelector("#k-lines").textContent.replace("! ", ""));
-  const lines = document.getElementById("k-yaml").value.split("\\n");
-  return lines.slice(first - 1, first - 1 + ink.split("\\n").length).join("\\n") === ink;
-}"""
-WRONG = "[...document.querySelectorAll('#k-lines .k-wrong')].map(e => e.textContent).join()"
+MARKED = (
+    "kind => [...document.querySelectorAll(`.cm-lineNumbers .${kind}`)]"
+    ".map(e => e.textContent).join()"
+)
 
 
-def put(page: Any, text: str) -> None:
-    """Paste a long text: :meth:`fill` types each line."""
-    page.get_by_label("case file, YAML").evaluate(
-        "(e, text) => { e.value = text; e.dispatchEvent(new Event('input', {bubbles: true}));"
-        "e.focus(); }",
-        text,
+def require_marks(page: Any, kind: str, *lines: int) -> None:
+    page.wait_for_function(
+        f"([kind, lines]) => ({MARKED})(kind) === lines", arg=[kind, ",".join(map(str, lines))]
     )
 
 
@@ -236,57 +226,41 @@ def line_of(text: str, words: str) -> int:
     return text[: text.index(words)].count("\n") + 1
 
 
-def test_the_letters_over_the_text_are_those_of_the_text(editor):
-    """Truth: the text itself; the last line ends at the end of the text area, its padding left."""
-    editor.wait_for_selector("#k-ink .k-key")
-    editor.wait_for_function(SAME)
-    first = {
-        kind: editor.locator(f"#k-ink .{kind}").all_inner_texts() for kind in ("k-key", "k-number")
-    }
-    text = text_of(editor)
-    put(editor, text + "# x: 1\n" * 3000 + "last: 'it''s'  # here")
-    editor.keyboard.press("Control+End")
-    editor.wait_for_function("document.querySelector('#k-ink').textContent.includes('last: ')")
-    editor.wait_for_function(SAME)
-    ends = editor.evaluate(
-        "() => { const area = document.getElementById('k-yaml');"
-        "const edge = area.getBoundingClientRect().top + area.clientHeight - 12;"
-        "return ['k-ink', 'k-lines'].map(id => document.querySelector(`#${id} > div > div`)"
-        ".getBoundingClientRect().bottom - edge); }"
+def cursor(page: Any) -> tuple[int, str]:
+    """Line of the cursor, from 1, and what stands before it there."""
+    number, before = page.evaluate(
+        "() => { const { focusNode, focusOffset } = getSelection();"
+        "const line = (focusNode.closest ? focusNode : focusNode.parentNode).closest('.cm-line');"
+        "const before = new Range(); before.setStart(line, 0);"
+        "before.setEnd(focusNode, focusOffset);"
+        "return [document.querySelector('.cm-lineNumbers .cm-activeLineGutter').textContent,"
+        " before.toString()]; }"
     )
-
-    assert "young" in first["k-key"]
-    assert "210 GPa" in first["k-number"]
-    for kind, words in (("k-key", "last"), ("k-words", "'it''s'"), ("k-aside", "# here")):
-        assert editor.locator(f"#k-ink .{kind}").last.inner_text() == words
-    assert editor.locator("#k-lines").inner_text().split()[-1] == str(text.count("\n") + 3001)
-    assert max(map(abs, ends)) < 1.5  # [px]: browsers scroll by whole ones; a line has 21
+    return int(number), str(before)
 
 
-def test_the_line_of_an_error_is_marked_until_it_moves_and_the_cursor_goes_there(editor, server):
+def test_the_line_of_an_error_is_marked_where_it_moves_and_the_cursor_goes_there(editor, server):
     text = text_of(editor)
     wrong = text.replace("0.3 m/s", "0.3 kg")
     line = line_of(wrong, "0.3 kg")
-    area, go = editor.get_by_label("case file, YAML"), editor.get_by_role("button", name="Go to")
-    area.fill(wrong)
+    go = editor.get_by_role("button", name="Go to")
+    put(editor, wrong)
     editor.wait_for_selector("#k-yaml[aria-invalid=true]")
     assert go.inner_text() == f"Go to line {line}"
     go.press("Enter")
-    editor.wait_for_function(f"{WRONG} === '! {line}'")
-    place = editor.evaluate(
-        "() => { const e = document.activeElement, at = e.selectionStart;"
-        "return [e.id, e.value.slice(0, at).split('\\n').length, e.selectionEnd - at]; }"
-    )
-    assert place == ["k-yaml", line, 0]
+    require_marks(editor, "k-wrong", line)
+    assert cursor(editor) == (line, "")
     with slow(server, "reader:Reader"):
         editor.keyboard.press("Control+Home")
         editor.keyboard.type("# one more\n")
-        editor.wait_for_function(f"{WRONG} === ''")  # it may stand elsewhere
+        go.click()
+        require_marks(editor, "k-wrong", line + 1)
+        assert cursor(editor) == (line + 1, "")
     editor.get_by_role("button", name=f"Go to line {line + 1}").press("Enter")
-    editor.wait_for_function(f"{WRONG} === '! {line + 1}'")
-    area.fill(text)
+    require_marks(editor, "k-wrong", line + 1)
+    put(editor, text)
     editor.wait_for_selector("#k-yaml[aria-invalid=false]")
-    editor.wait_for_function(f"{WRONG} === ''")
+    require_marks(editor, "k-wrong")
     editor.wait_for_selector("text=valid impact, saved")
     assert not go.is_visible()
 
@@ -298,42 +272,41 @@ def test_doubts_of_a_valid_text_are_shown_and_marked_at_the_lines_of_their_keys(
         "materials:", "parameters: {idle: 1 N}\nmaterials:"
     )
     lines = [line_of(odd, words) for words in ("idle: 1 N", "30 m/s")]
-    marks = "[...document.querySelectorAll('#k-lines .k-odd')].map(e => e.textContent).join()"
-    editor.get_by_label("case file, YAML").fill(odd)
+    put(editor, odd)
     editor.wait_for_selector("text=valid impact, not saved")
     words = editor.locator("#k-doubts").inner_text()
     editor.get_by_role("button", name=f"Go to line {lines[0]}").press("Enter")
-    editor.wait_for_function(f"{marks}.startsWith('! {lines[0]}')")
+    editor.locator(".cm-lineNumbers .k-odd").get_by_text(str(lines[0]), exact=True).wait_for()
     editor.keyboard.press("Control+End")
-    editor.wait_for_function(f"{marks}.endsWith('! {lines[1]}')")
+    editor.locator(".cm-lineNumbers .k-odd").get_by_text(str(lines[1]), exact=True).wait_for()
     assert "parameters.idle: nothing in this case" in words
     assert "motion.speed: 30 m/s is unusual" in words
     assert editor.locator("#k-yaml").get_attribute("aria-invalid") == "false"
-    editor.get_by_label("case file, YAML").fill(text)
+    put(editor, text)
     editor.wait_for_function("document.getElementById('k-doubts').textContent === ''")
 
 
-def test_a_click_on_the_way_to_an_error_goes_to_its_column(editor):
-    area, go = editor.get_by_label("case file, YAML"), editor.get_by_role("button", name="Go to")
+def test_a_click_on_the_way_to_an_error_goes_to_its_column_in_a_folded_part(editor):
+    """Folded by keys; truth: the brackets of the error, and the text without its folds."""
     text = text_of(editor).replace("speed: 0.3 m/s}", "speed: 0.3 m/s}}")
     assert "}}" in text
-    area.fill(text)
+    put(editor, text)
     editor.wait_for_selector("#k-yaml[aria-invalid=true]")
+    editor.keyboard.press("Control+Alt+[")  # all parts
+    editor.locator(".cm-foldPlaceholder").first.wait_for()
+    go = editor.get_by_role("button", name="Go to")
     go.click()
-    at = editor.evaluate("document.activeElement.selectionStart")
-    assert text[at - 1 : at + 1] == "}}"
+    line, before = cursor(editor)
+    assert line == line_of(text, "0.3 m/s}}")
+    assert text.splitlines()[line - 1][len(before) - 1 : len(before) + 1] == "}}"
+    assert text_of(editor) == text
 
 
-def test_a_long_text_is_drawn_where_it_is_seen_and_a_long_line_stays_plain(editor):
+def test_a_long_text_is_drawn_where_it_is_seen(editor):
     """Nodes do not grow with the text, so neither does the time of a key."""
-    area, text = editor.get_by_label("case file, YAML"), text_of(editor)
-    put(editor, text + "a: {b: 1}\n" * 90_000)
+    text = text_of(editor)
+    put(editor, text + "a: {b: 1}\n" * 60_000 + "# " + "x" * 6000)
     editor.keyboard.press("Control+End")
-    editor.wait_for_function(SAME)
-    last = text.count("\n") + 90_000
-    editor.wait_for_function(f"document.querySelector('#k-lines').textContent.includes('{last}')")
-    assert editor.evaluate("document.querySelectorAll('#k-ink *').length") < 2000
-    assert "k-drawn" in str(area.get_attribute("class"))
-    put(editor, text + "# " + "x" * 6000)
-    editor.wait_for_function("!document.getElementById('k-yaml').matches('.k-drawn')")
-    assert editor.locator("#k-ink").inner_text().strip() == ""
+    last = text.count("\n") + 60_001
+    editor.locator(".cm-lineNumbers").get_by_text(str(last), exact=True).wait_for()
+    assert editor.evaluate("document.querySelectorAll('.cm-editor *').length") < 3000

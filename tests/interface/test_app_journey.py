@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 from app_browser import LONG
-from browser_pages import watched
+from browser_pages import put, text_of, watched
 from served_app import Served
 
 sync_api = pytest.importorskip("playwright.sync_api")
@@ -164,15 +164,14 @@ def duplicate_and_note(walk: Walk, folder: Path) -> None:
 
 def edit_by_form_and_by_text(walk: Walk, folder: Path) -> None:
     walk.presses(f"Edit {COPY}", "valid impact, saved", kind="link")
-    area = walk.page.get_by_label("case file, YAML")
-    before = area.input_value()
+    before = text_of(walk.page)
     walk.finds(before == (folder / COPY).read_text(), "the text is that of the file")
     walk.types("speed", "0.4 m/s", "valid impact, not saved")
-    walk.finds("0.4 m/s" in area.input_value(), "the text has what was typed in the form")
+    walk.finds("0.4 m/s" in text_of(walk.page), "the text has what was typed in the form")
     walk.waits("() => document.activeElement.id === 'f-motion.speed'")  # it keeps the focus
     changed = [
         (old, new)
-        for old, new in zip(before.splitlines(), area.input_value().splitlines(), strict=True)
+        for old, new in zip(before.splitlines(), text_of(walk.page).splitlines(), strict=True)
         if old != new
     ]
     walk.finds(len(changed) == 1, f"one line of the text changed, not {changed}")
@@ -180,22 +179,22 @@ def edit_by_form_and_by_text(walk: Walk, folder: Path) -> None:
     walk.sees("not valid, not saved")
     walk.types("speed", "0.4 m/s", "valid impact, not saved")
     walk.no_longer_sees("motion.speed")
-    area.fill(area.input_value().replace("0.4 m/s", "0.5 m/s"))
+    put(walk.page, text_of(walk.page).replace("0.4 m/s", "0.5 m/s"))
     walk.waits("() => document.getElementById('f-motion.speed').value === '0.5 m/s'")
-    area.fill(area.input_value() + "\nunknown: 3\n")
+    put(walk.page, text_of(walk.page) + "\nunknown: 3\n")
     walk.sees("not valid, not saved", "unknown")
-    area.fill("a: [1, 2\nb: ")
+    put(walk.page, "a: [1, 2\nb: ")
     walk.sees("not valid, not saved")
-    area.fill("")
+    put(walk.page, "")
     walk.sees("not valid, not saved")
-    area.fill("klack: 1\nx: &a [1]\ny: *a\n")
+    put(walk.page, "klack: 1\nx: &a [1]\ny: *a\n")
     walk.sees("not valid, not saved")
     walk.finds((folder / COPY).read_text() == before, "nothing was written")
     walk.presses("Discard changes", "valid impact, saved")
     is_back = "text => document.getElementById('k-yaml').value === text"
     walk.page.wait_for_function(is_back, arg=before, timeout=LONG)  # comes after the words
     levels = "[lumped, reduced-none, reduced-attachment, reduced, full]"
-    area.fill(before.replace(levels, "[reduced]"))
+    put(walk.page, before.replace(levels, "[reduced]"))
     walk.sees("valid impact, not saved")
     walk.keys("Control+s")
     walk.sees("valid impact, saved")
@@ -205,17 +204,16 @@ def edit_by_form_and_by_text(walk: Walk, folder: Path) -> None:
 def a_conflict_on_saving(walk: Walk, folder: Path) -> None:
     file = folder / COPY
     saved = file.read_text()
-    area = walk.page.get_by_label("case file, YAML")
-    area.fill(saved + "# mine\n")
+    put(walk.page, saved + "# mine\n")
     walk.sees("valid impact, not saved")
     file.write_text(saved + "# theirs\n")
     walk.presses("Save", "Another program has changed the file")
     walk.finds(file.read_text() == saved + "# theirs\n", "what others wrote stays")
-    walk.finds("# mine" in area.input_value(), "and mine is still there to be copied")
+    walk.finds("# mine" in text_of(walk.page), "and mine is still there to be copied")
     walk.presses("Discard changes", "valid impact, saved")
-    walk.finds("# theirs" in area.input_value(), "now theirs is shown")
+    walk.finds("# theirs" in text_of(walk.page), "now theirs is shown")
     file.unlink()
-    area.fill(saved)
+    put(walk.page, saved)
     walk.sees("valid impact, not saved")
     walk.presses("Save", "No such file")
     file.write_text(saved)
@@ -320,14 +318,14 @@ def move_pin_hear(walk: Walk, folder: Path) -> None:
     page.wait_for_selector(".k-badge.good")
     value = float(speed.input_value())
     walk.presses("Edit the case with these values", "valid impact, not saved")
-    written = speed_in(page.get_by_label("case file, YAML").input_value())
+    written = speed_in(text_of(page))
     walk.finds(written == pytest.approx(value, rel=1e-6), f"{written} is that of the slider")
     walk.goes(f"/sliders?path={COPY}", "peak force")
     page.wait_for_selector(".k-badge.good")
     walk.presses("Edit the case with these values", "Replace unsaved changes?")
     walk.presses("Cancel", "peak force")
     walk.goes(f"/case?path={COPY}", "valid impact, not saved")
-    kept = speed_in(page.get_by_label("case file, YAML").input_value())
+    kept = speed_in(text_of(page))
     walk.finds(kept == written, "the text that was not saved stays")
     walk.presses("Save", "valid impact, saved")
 
@@ -340,16 +338,15 @@ def kill_in_the_middle(walk: Walk, folder: Path, serve: Callable[[Path], Served]
     walk.presses("Make", "impact, valve/case-3.yaml")
     walk.presses(f"Run {COPY}", f"klack impact {COPY}")
     walk.goes("/case?path=valve/case-3.yaml", "valid impact, saved")
-    area = walk.page.get_by_label("case file, YAML")
-    mine = area.input_value() + "# not saved yet\n"
-    area.fill(mine)
+    mine = text_of(walk.page) + "# not saved yet\n"
+    put(walk.page, mine)
     walk.sees("valid impact, not saved")
     walk.page.goto("about:blank")
     walk.server.kill()
     walk.moved_to(serve(folder))
     walk.sees(f"klack impact {COPY}", "edited, not saved")
     walk.goes("/case?path=valve/case-3.yaml", "valid impact, not saved")
-    walk.finds(area.input_value() == mine, "the text that was not saved is there")
+    walk.finds(text_of(walk.page) == mine, "the text that was not saved is there")
     walk.goes("/", "done in ")
     walk.no_longer_sees("since ")  # the last run, not that of the morning
     walk.finds(peak_of(folder / "klack-results/case-2") > 0, "the run has written its result")
@@ -391,18 +388,17 @@ def two_browsers(walk: Walk, browser: Any, folder: Path) -> None:
         address = f"/case?path={COPY}"
         walk.goes(address, "valid impact, saved")
         other.goes(address, "valid impact, saved")
-        areas = [who.page.get_by_label("case file, YAML") for who in (walk, other)]
-        text = areas[0].input_value()
-        areas[0].fill(text + "# one\n")
+        text = text_of(walk.page)
+        put(walk.page, text + "# one\n")
         walk.sees("valid impact, not saved")
-        areas[1].fill(text + "# two\n")
+        put(other.page, text + "# two\n")
         other.sees("Another page holds unsaved text of this case.")
         other.presses("Save", "valid impact, saved")
         walk.finds((folder / COPY).read_text() == text + "# two\n", "the second saved first")
         walk.presses("Save", "Another program has changed the file")
         walk.goes("/", f"impact, {COPY} · edited, not saved")
         walk.goes(address, "valid impact, not saved")
-        walk.finds("# one" in areas[0].input_value(), "the text of the first is not lost")
+        walk.finds("# one" in text_of(walk.page), "the text of the first is not lost")
         walk.presses("Discard changes", "valid impact, saved")
         assert other.said == []
         walk.steps += other.steps

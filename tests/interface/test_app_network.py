@@ -12,6 +12,7 @@ import pytest
 
 pytest.importorskip("nicegui")
 from app_browser import page, require_within, server, slow
+from browser_pages import TEXT, put, text_of
 from served_app import Served
 
 __all__ = ["page", "server"]  # fixtures
@@ -38,10 +39,6 @@ def editor(page: Any, server: Served) -> Iterator[Any]:
     yield page
     page.get_by_role("button", name="Discard changes").click()
     page.wait_for_selector("text=valid stroke, saved")
-
-
-def text_of(page: Any) -> str:
-    return str(page.get_by_label("case file, YAML").input_value())
 
 
 def require_text(page: Any, text: str) -> None:
@@ -149,7 +146,7 @@ def test_the_keyboard_alone_edits_and_the_text_is_drawn(editor):
     require_text(editor, first)
     editor.wait_for_selector("text=valid stroke, saved")
 
-    area.fill(first.replace("spring:", "coil_spring:").replace("spring.end", "coil_spring.end"))
+    put(editor, first.replace("spring:", "coil_spring:").replace("spring.end", "coil_spring.end"))
     editor.locator(".target[data-name=coil_spring]").wait_for(state="attached")
 
 
@@ -178,11 +175,7 @@ def with_bleed(text: str) -> str:
 
 
 def type_at_the_end(page: Any, words: str) -> None:
-    page.evaluate(
-        "words => { const e = document.getElementById('k-yaml'); e.setRangeText(words, "
-        "e.value.length, e.value.length); e.dispatchEvent(new Event('input', {bubbles: true})); }",
-        words,
-    )
+    page.evaluate(f"words => {{ {TEXT}.value += words; }}", words)
 
 
 def test_text_typed_while_a_component_is_added_stays_and_so_does_the_component(editor, server):
@@ -202,8 +195,7 @@ def test_text_typed_while_a_component_is_added_stays_and_so_does_the_component(e
     editor.evaluate(
         "() => { const put = window.klackText; window.klackText = (...all) => {"
         "window.klackText = put; const e = document.getElementById('k-yaml');"
-        "e.setRangeText('# also\\n', e.value.length, e.value.length);"
-        "e.dispatchEvent(new Event('input', {bubbles: true})); put(...all); }; }"
+        "e.value += '# also\\n'; put(...all); }; }"
     )
     editor.get_by_role("button", name="Remove bleed").click()
     require_text(editor, first + "# mine\n# also\n")
@@ -263,7 +255,7 @@ def test_a_value_typed_while_the_text_is_no_yaml_waits_until_it_is(editor):
     box.press("Enter")
     editor.wait_for_selector("text=The value is written as soon as the text can be read")
     assert box.input_value() == "61 N"
-    editor.get_by_label("case file, YAML").fill(first)
+    put(editor, first)
     require_text(editor, first.replace(f"preload: {was}", "preload: 61 N"))
     editor.wait_for_selector("text=valid stroke, not saved")
 

@@ -10,6 +10,7 @@ from itertools import groupby
 from math import inf
 from typing import Any
 
+import nicegui.elements.codemirror  # noqa: F401  (the library of case_text.js)
 from nicegui import ui
 
 from klack.app.answers import Checked, FormField, NetworkView
@@ -18,7 +19,6 @@ from klack.app.pages.frame import (
     address,
     asking,
     button,
-    element,
     frame,
     heading,
     link,
@@ -61,6 +61,20 @@ def _begins_a_study(text: str) -> bool:
     """Whether a text has a section ``study``, and none that a case needs."""
     heads = {line.partition(":")[0] for line in text.splitlines()}
     return "study" in heads and not heads & {"bodies", "network"}
+
+
+class _CaseText(ui.element, component="case_text.js"):  # type: ignore[call-arg]
+    """The text of a case in CodeMirror, which NiceGUI brings along."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self._props["text"] = text
+        self._props["attributes"] = {
+            "id": "k-yaml",
+            "spellcheck": "false",
+            "aria-label": "case file, YAML",
+            "aria-describedby": "k-told k-doubts",
+        }
 
 
 @dataclass(eq=False)
@@ -139,16 +153,10 @@ class _Editor:
                 self._show_side("Form")
             with ui.element("section").classes("k-sheet k-text"):
                 heading("YAML").classes("k-sr")
-                element("pre", id="k-lines", tabindex=-1, aria_hidden="true")
-                with ui.element("div"):
-                    element("pre", id="k-ink", tabindex=-1, aria_hidden="true")
-                    self._area = plain(self._text, "textarea")
-                self._area.props("id=k-yaml spellcheck=false autocomplete=off")
-                self._area.props["aria-describedby"] = "k-told k-doubts"
-                self._area.props["aria-label"] = "case file, YAML"
+                self._area = _CaseText(self._text.replace("\r\n", "\n"))
                 # not throttled: what was typed last comes before the click on Save or Discard
                 self._area.on(
-                    "input",
+                    "typed",
                     self._typed,
                     js_handler=f"(e) => emit(window.klackTyped(e.target, {_LONGEST}))",
                 )

@@ -128,18 +128,11 @@
     if (Object.keys(values).length) takeUp();
   };
   window.klackText = (text, known, shown) => {
-    const area = document.getElementById("k-yaml"), old = area.value;
+    const area = document.getElementById("k-yaml");
     sent = sent.filter(([, , at]) => at > known);
     if (area.at > known) return;
     area.shown = shown;
-    if (old === text) return;
-    let from = 0, end = 0;
-    const most = Math.min(old.length, text.length);
-    while (from < most && old[from] === text[from]) from++;
-    while (end < most - from && old[old.length - 1 - end] === text[text.length - 1 - end]) end++;
-    area.setRangeText(text.slice(from, text.length - end), from, old.length - end, "preserve");  // the cursor stays
-    klackNoted();
-    klackDrawn();
+    area.told(text);  // the cursor stays
   };
   addEventListener("beforeunload", () => document.activeElement?.blur());  // half typed: told before the page goes
 })();
@@ -177,7 +170,7 @@ document.addEventListener("keydown", (event) => {
   const area = () => document.getElementById("k-yaml");
   const connected = () => window.socket?.connected && window.did_handshake;
   let left = stored((store, name) => store.getItem(name));  // by the page before this one
-  document.addEventListener("input", (event) => {
+  document.addEventListener("typed", (event) => {
     if (event.target === area() && !connected()) stored((store, name) => store.setItem(name, event.target.value));
   });
   addEventListener("pagehide", () => {  // what is on its way may be lost
@@ -197,10 +190,7 @@ document.addEventListener("keydown", (event) => {
     if (!found) return;
     const text = left;
     left = null;  // once: what is typed on this page reaches the server by itself
-    if (text !== null && text !== found.value) {
-      found.value = text;
-      found.dispatchEvent(new Event("input", { bubbles: true }));
-    }
+    if (text !== null) found.value = text;
     if (connected()) stored((store, name) => store.removeItem(name));
   }, 100);
 })();
