@@ -174,7 +174,6 @@ def _nothing(state: State, request: Request, error: KlackError) -> Response:
 def _add_static(outer: FastAPI) -> None:
     """Style and script, read once."""
     kinds = {
-        "editor.js": "text/javascript",
         "klack.css": "text/css",
         "klack.js": "text/javascript",
         "points.css": "text/css",

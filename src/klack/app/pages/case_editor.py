@@ -160,7 +160,6 @@ class _Editor:
                     self._typed,
                     js_handler=f"(e) => emit(window.klackTyped(e.target, {_LONGEST}))",
                 )
-        ui.add_head_html('<script src="/static/editor.js" defer></script>')
         ui.timer(0.05, self._settle, once=True)
 
     def _listen(self, boxes: ui.element) -> None:
