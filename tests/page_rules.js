@@ -82,7 +82,7 @@ window.klackRules = (() => {
     const said = over > 0 ? [`the page is ${over} px wider than the window of ${root.clientWidth} px`] : [];
     for (const e of document.querySelectorAll("body *")) {
       if (!/auto|scroll/.test(getComputedStyle(e).overflowX) || e.scrollWidth <= e.clientWidth + 1 || !seen(e)) continue;
-      if (e.tabIndex < 0 && e.tagName !== "PRE") said.push(`${name(e)} is scrolled sideways, and the Tab key does not reach it`);
+      if (e.tabIndex < 0 && e.tagName !== "PRE" && !e.querySelector(":scope > [contenteditable=true]")) said.push(`${name(e)} is scrolled sideways, and the Tab key does not reach it`);
     }
     return said;
   };
@@ -189,7 +189,7 @@ window.klackRules = (() => {
   const focus = () => {
     const e = document.activeElement;
     if (!e || e === document.body) return null;
-    const style = getComputedStyle(e), said = [];
+    const style = getComputedStyle(e.closest(".cm-editor") || e), said = [];  // the frame of an editor shows it
     const marked = (s) => (s.outlineStyle !== "none" && parseFloat(s.outlineWidth) >= 1 && ratio(over(colour(s.outlineColor), ground(e.parentElement || e)), ground(e.parentElement || e)) >= 3) || s.outlineStyle === "auto";
     if (!marked(style)) said.push(`${name(e)} has the focus and does not show it`);
     const box = e.getBoundingClientRect();

@@ -71,6 +71,7 @@ class _CaseText(ui.element, component="case_text.js"):  # type: ignore[call-arg]
         self._props["text"] = text
         self._props["attributes"] = {
             "id": "k-yaml",
+            "tabindex": "0",
             "spellcheck": "false",
             "aria-label": "case file, YAML",
             "aria-describedby": "k-told k-doubts",
