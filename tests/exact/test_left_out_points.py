@@ -14,7 +14,7 @@ from spatial_needle import ABOVE, BELOW, Needle, move, ring
 
 from klack.network.rows import FilmRow
 from klack.transient import spatial_run
-from klack.transient.interface_arrays import Films, Outside, Record, State
+from klack.transient.interface_arrays import Films, Guide, Outside, Record, State
 from klack.transient.interface_kernel import FINISHED, LEFT_OUT, march, march_near
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.interface_run import contact_points, modes_of_step, near_points
@@ -54,7 +54,9 @@ class Motion:
         )
         points = contact_points(model, modes.B1, STEP)
         given = modes, Outside(1.0, 0.0), points._replace(gap=model.gap.copy())
-        rest = None, self.films, state, record
+        # films stand beside a guide in valves: without its heights the same compiled loop serves
+        bore = None if self.films is None else Guide.none(model.mode_count)
+        rest = bore, self.films, state, record
         if margin is None:
             return march(self.steps, 0, *given, *rest)[1], state
         near = near_points(model, self.rigid)
