@@ -819,7 +819,8 @@ class _Moving:
         if points:
             touching = (self.resting if rest else self.points)._replace(gap=self.gap0)
         state = self.state if points else self.apart
-        bore = self.bore if len(self.bore.clearance) else None
+        # films share one loop, with a guide and without its heights
+        bore = self.bore if len(self.bore.clearance) or self.films is not None else None
         if self.model.ways:
             march_on = self.march[points]
             _, status = march_on(count, 0, modes, _NONE, touching, bore, self.films, state, record)

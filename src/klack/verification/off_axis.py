@@ -214,7 +214,7 @@ def fly_in_films(
         modes,
         Outside(0.0, 0.0),
         contact_points(model, modes.B1, step),
-        bore if len(bore.clearance) else None,
+        bore,
         films,
         state,
         record,
