@@ -546,6 +546,7 @@ def test_whole_periods_turn_their_energy_over(periods):
     energy = 0.5 * 3e-3 * 0.5**2
 
     assert books.scale == pytest.approx(energy, rel=1e-9)
+    assert books.relative_residual == abs(books.residual) / books.scale
     # round-off of a record: the run ends up to 1 us late
     share = np.sin(2.0 * np.pi * periods) ** 2
     assert books.throughput == pytest.approx(share * energy, abs=2e-2 * energy)

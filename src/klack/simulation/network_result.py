@@ -162,8 +162,8 @@ class EnergyBooks:
 
     @property
     def relative_residual(self) -> float:
-        """Residual over throughput [-]."""
-        return abs(self.residual) / self.throughput if self.throughput > 0.0 else 0.0
+        """Residual over :attr:`scale` [-]."""
+        return abs(self.residual) / self.scale if self.scale > 0.0 else 0.0
 
     @property
     def least_loss(self) -> float:

@@ -458,7 +458,7 @@ def _energy_table(study: StrokeStudy) -> Table:
                 rows.append((f"{word} {name}", *map(_energy, found, books)))
     rows.append(("throughput", *(quantity(book.throughput, "J") for book in books)))
     residuals = [
-        f"{quantity(book.residual, 'J', 2)}\n{book.relative_residual:.1e} of the throughput"
+        f"{quantity(book.residual, 'J', 2)}\nrelative: {book.relative_residual:.1e}"
         for book in books
     ]
     rows.append(("residual", *(text.replace("e-", "e\N{MINUS SIGN}") for text in residuals)))

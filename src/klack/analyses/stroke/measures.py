@@ -271,7 +271,8 @@ VARIANT_MEASURES: tuple[Measure[StrokeVariant], ...] = described_in(
         key="energy_residual",
         symbol="r_E",
         definition="Supplies minus losses minus the increase of all stores, over the "
-        "throughput: round-off in a correct run.",
+        "throughput, or the energy of the bodies and 0.1 % of all stores if larger: round-off "
+        "in a correct run.",
         read=lambda variant: variant.result.books.relative_residual,
         form="power",
         column=Column("", 1.0, ".1e"),

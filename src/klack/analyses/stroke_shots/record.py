@@ -194,8 +194,8 @@ STROKE_MEASURES: tuple[Measure[Row], ...] = described_in(
     Measure(
         key="energy_residual",
         symbol="r_E",
-        definition="Residual of the energy balance over the throughput: round-off in a correct "
-        "run.",
+        definition="Residual of the energy balance over the throughput (or what bodies and stores "
+        "hold): round-off in a correct run.",
         form="power",
     ),
 )
