@@ -305,7 +305,10 @@ def test_text_typed_while_the_server_is_away_comes_back(folder, browser):
 
 
 def _ranges(page, number: int) -> list[float]:
-    """Ends of both axes of a chart, as Plotly has drawn it."""
+    """Ends of both axes of a chart, once Plotly has drawn it."""
+    page.wait_for_function(
+        "n => document.querySelectorAll('.k-plot')[n]?._fullLayout?.yaxis", arg=number
+    )
     return page.evaluate(
         "n => (({xaxis, yaxis}) => [...xaxis.range, ...yaxis.range])"
         "(document.querySelectorAll('.k-plot')[n]._fullLayout)",
