@@ -53,10 +53,8 @@ def test_a_warm_up_with_its_files(case, tmp_path, capsys):
 
 @pytest.mark.slow
 def test_soaked_strokes_with_their_causes(case, tmp_path, capsys):
-    assert (
-        main(["heat", str(case), "--soak", "-30 degC, 80 degC", "--json", "-", "-q", "--no-report"])
-        == 0
-    )
+    soak = "-30 degC, 80 degC, -30 degC"
+    assert main(["heat", str(case), "--soak", soak, "--json", "-", "-q", "--no-report"]) == 0
 
     numbers = json.loads(capsys.readouterr().out)
     assert numbers["temperature_K"]["valve"] == [243.15, 353.15]

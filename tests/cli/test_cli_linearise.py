@@ -165,8 +165,11 @@ def test_a_boost_driver_is_told_to_be_no_part_of_the_model(capsys):
         (("--frequencies", "1 kHz", "1 Hz"), "--frequencies: got from 1 kHz to 1 Hz"),
         (("--current", "1"), "unit"),
         (("--lift", "1 mm"), "between the stops"),
+        (("--lift", "-1 mm"), "between the stops"),
+        (("--current", "-1 A"), "expected 0 A or more"),
         (("--variant", "moist"), "moist"),
         (("--sweep", "lift", "0 um", "10 um", "1"), "2 or more"),
+        (("--sweep", "lift", "-10 um", "0 um", "1"), "2 or more"),
     ],
 )
 def test_what_cannot_be_is_one_message(words, said, capsys):

@@ -213,11 +213,12 @@ class _Found:
 def _soaked(strokes: _Strokes, network: HeatNetwork, soak: Sequence[float]) -> _Found:
     names = (*network.node_of, *network.fixed_names)
     base = dict.fromkeys(names, REFERENCE)
-    states = {_celsius(T): dict.fromkeys(names, T) for T in soak}
+    soaked = {_celsius(T): T for T in soak}  # each once
+    states = {name: dict.fromkeys(names, T) for name, T in soaked.items()}
     whole = [strokes.at(state) for state in states.values()]
     return _Found(
-        time=np.zeros(len(soak)),
-        temperature={"valve": np.array(soak, dtype=float)},
+        time=np.zeros(len(soaked)),
+        temperature={"valve": np.array(list(soaked.values()))},
         heat={},
         strokes=whole,
         causes=_causes(strokes, _celsius(REFERENCE), base, states),

@@ -22,16 +22,28 @@ _Current = Annotated[
     _Texts,
     Parameter(
         name="--current",
+        allow_leading_hyphen=True,
         negative="",
         help='Steady current of all coils, "3 A", or of one, "coil=3 A". [default: as at the '
         "start of a run]",
     ),
 ]
 _Voltage = Annotated[
-    _Texts, Parameter(name="--voltage", negative="", help="Steady voltage, instead of a current.")
+    _Texts,
+    Parameter(
+        name="--voltage",
+        allow_leading_hyphen=True,
+        negative="",
+        help="Steady voltage, instead of a current.",
+    ),
 ]
 _Lift = Annotated[
-    _Text, Parameter(name="--lift", help='Hold the needle at this displacement, "40 um".')
+    _Text,
+    Parameter(
+        name="--lift",
+        allow_leading_hyphen=True,
+        help='Hold the needle at this displacement, "40 um".',
+    ),
 ]
 _Begin = Annotated[
     Literal["start", "far"],
@@ -76,6 +88,7 @@ _Sweep = Annotated[
     tuple[str, str, str, int] | None,
     Parameter(
         name="--sweep",
+        allow_leading_hyphen=True,
         help="Stability over a key of the case, or lift, current or voltage, then from, to and the "
         'number of values: --sweep network.components.pipe.length "0.2 m" "2 m" 10.',
     ),

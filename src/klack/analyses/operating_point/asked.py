@@ -30,6 +30,7 @@ class SteadyAsked:
         _Texts,
         Parameter(
             name="--current",
+            allow_leading_hyphen=True,
             negative="",
             help='With --steady: current of all coils, "3 A", or of one, "coil=3 A". [default: '
             "as at the start of a run]",
@@ -38,19 +39,25 @@ class SteadyAsked:
     voltage: Annotated[
         _Texts,
         Parameter(
-            name="--voltage", negative="", help="With --steady: voltage, instead of a current."
+            name="--voltage",
+            allow_leading_hyphen=True,
+            negative="",
+            help="With --steady: voltage, instead of a current.",
         ),
     ] = None
     lift: Annotated[
         str | None,
         Parameter(
-            name="--lift", help='With --steady: hold the needle at this displacement, "40 um".'
+            name="--lift",
+            allow_leading_hyphen=True,
+            help='With --steady: hold the needle at this displacement, "40 um".',
         ),
     ] = None
     sweep: Annotated[
         list[tuple[str, str, str, int]] | None,
         Parameter(
             name="--sweep",
+            allow_leading_hyphen=True,
             negative="",
             help="With --steady: a key of the case, or lift, current or voltage, then from, to "
             'and the number of values: --sweep lift "0 um" "80 um" 9. Twice for two of them.',
