@@ -55,13 +55,20 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 
 STROKES = re.compile("stroke|network|film")
+SHARED = re.compile(r'scope="(?:module|session)"')
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Strokes first, the first half of two workers: one compiles their loop, none waits for it."""
-    files = {item.path for item in items}
-    first = {path for path in files if STROKES.search(path.read_text("utf-8"))}
-    items.sort(key=lambda item: item.path not in first)
+    """Strokes first, the first half of two workers: one compiles their loop, none waits for it.
+
+    In each half files with a fixture of their own first: what a worker without tests takes from the
+    end of the other's is tests that stand alone, so that no fixture is made twice.
+    """
+    texts = {path: path.read_text("utf-8") for path in {item.path for item in items}}
+    places = {
+        path: (not STROKES.search(text), not SHARED.search(text)) for path, text in texts.items()
+    }
+    items.sort(key=lambda item: places[item.path])
 
 
 def pytest_collection_finish() -> None:
