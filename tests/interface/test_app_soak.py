@@ -22,14 +22,14 @@ pytestmark = [
 
 @pytest.fixture(scope="module")
 def soaked() -> Iterator[tuple[list[Memory], list[Memory]]]:
-    """Memory before and after 100 moves, and after 6 and 12 page changes, on the overview."""
+    """Memory before and after 50 moves, and after 6 and 12 page changes, on the overview."""
     with soaking("demo-valve-axisymmetric") as found:
         found.open_sliders()
         for share in np.linspace(0.02, 0.98, 20):  # every reach once, all kinds of answers
             found.move(float(share))
         found.move(0.5)  # both times the same answer: others have other parts in the page
         moves = [found.memory()]
-        for number in range(100):
+        for number in range(50):
             found.move((0.618 * number) % 1.0)
         found.move(0.5)
         moves.append(found.memory())
