@@ -28,7 +28,8 @@ def folder(tmp_path_factory) -> Path:
     (folder / "rigid.yaml").write_text(text, encoding="utf-8")
     soft = "  elements: {flange: {stiffness: {z: 1 N/um}, damping: {z: 20 N*s/m}}}\n  receiver:"
     (folder / "soft.yaml").write_text(text.replace("  receiver:", soft), encoding="utf-8")
-    assert main(["stroke", str(folder / "rigid.yaml"), "-q", "--out", str(folder / "stroke")]) == 0
+    words = ["-q", "--no-report", "--out", str(folder / "stroke")]
+    assert main(["stroke", str(folder / "rigid.yaml"), *words]) == 0
     return folder
 
 

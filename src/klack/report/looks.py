@@ -119,8 +119,13 @@ def thinned(
     if x.size <= 2 * columns or np.isnan(y).any():
         return x, y
     column = ((x - x[0]) / (x[-1] - x[0]) * columns).astype(np.int64).clip(0, columns - 1)
-    order = np.lexsort((y, column))  # by column, inside it by value
-    edges = np.flatnonzero(np.diff(column[order])) + 1
-    lowest, highest = np.concatenate([[0], edges]), np.concatenate([edges, [x.size]]) - 1
-    kept = np.unique(np.concatenate([[0, x.size - 1], order[lowest], order[highest]]))
+    begins = np.flatnonzero(np.diff(column, prepend=-1))
+    counts = np.diff(begins, append=x.size)
+    low, high = (
+        np.flatnonzero(y == np.repeat(extreme.reduceat(y, begins), counts))
+        for extreme in (np.minimum, np.maximum)
+    )
+    first = low[np.diff(column[low], prepend=-1) > 0]
+    last = high[np.diff(column[high], append=columns) > 0]
+    kept = np.unique(np.concatenate([[0, x.size - 1], first, last]))
     return x[kept], y[kept]
