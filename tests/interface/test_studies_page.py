@@ -84,6 +84,7 @@ def test_commands_print_what_the_page_shows(tmp_path, capsys, monkeypatch, place
     file.write_text(FILE.read_text().replace("kind: sobol", f"kind: {design}"))
     case = "docs/how-to/small_valve.yaml"
     kept = [] if command == "sensitivities" else ["--out", str(tmp_path / "out"), "--no-report"]
+    kept += ["--no-check-steps"] if design == "saltelli" else []  # 640 strokes, the same numbers
     assert main([command, case, "--study", str(file), *kept]) == 0
     compare(QUOTED[place], capsys.readouterr().out, f"studies.md, block {place}")
 
@@ -139,7 +140,8 @@ def test_robust_optimum_and_the_valves_made_after_it(tmp_path, capsys, monkeypat
     assert main(["export", out, "--to", "case", "--point", point, "--out", str(case)]) == 0
     made = str(case / f"small_valve_point_{point}.yaml")
     capsys.readouterr()
-    assert main(["study", made, *asked, str(tmp_path / "made"), "--made", "1024"]) == 0
+    many = ["--made", "1024", "--no-check-steps"]  # the same numbers
+    assert main(["study", made, *asked, str(tmp_path / "made"), *many]) == 0
     compare(QUOTED[6], capsys.readouterr().out, "studies.md, made valves")
 
 
@@ -155,7 +157,8 @@ def test_half_of_the_valves_made_after_a_nominal_optimum_miss_its_bound(tmp_path
     for item in (*record.parameters, *record.linked):
         if "." in item.name:
             case = case.with_value(item.name, f"{float(item.values[best])!r} {item.unit}")
-    missed = klack.run_study(case, ROBUST, made=1024).record.missed[0].probability
+    case = case.with_value("run.check_steps", "false")  # they are those of the nominal optimum
+    missed = klack.run_study(case, ROBUST, made=256).record.missed[0].probability
     assert missed == pytest.approx(0.5, abs=0.05)
     quoted = re.search(r"ends at ([\d.]+) kN, and ([\d.]+) %", PAGE)
     force = next(item for item in record.measures if item.name == "opening.peak_force")
