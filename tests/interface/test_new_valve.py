@@ -439,8 +439,8 @@ def test_faces_are_called_by_their_place(tables):
     assert places["housing.bottom"] == "bottom"
     assert (places["housing.rim"], places["housing.bore"]) == ("outside", "bore")
     assert (places["needle.tip"], places["housing.seat"], places["housing.floor"]) == (
-        "arc",
-        "cone",
+        "ball",
+        "hollow cone",
         "shoulder",
     )
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.app.answers import FaceFacts, PartFacts
+from klack.app.face_places import profile_places, solid_places
 from klack.case.geometry import Outline
 from klack.errors import InputError
 from klack.mesh.meridian import mesh_meridian
@@ -129,6 +130,7 @@ def _refused(body: str, row: int, got: str, expected: str) -> InputError:
 
 _FINER = (25, 50, 100)  # elements over the longest side, of a mesh for the picture alone
 _MOST_FACES = 400  # in a list
+_EVEN = 1e-3  # of the size of the part
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -183,36 +185,40 @@ class Part:
 
     def faces(self, model: str) -> tuple[str, ...]:
         """Names of its faces in a model."""
-        return tuple(face.name for face in self._faces(model))
-
-    def _faces(self, model: str) -> tuple[FaceFacts, ...]:
         if self.is_half(model):
             assert self.profiles is not None
-            return _profile_faces(self.profiles)
-        return () if self.content is None else tuple(_step_faces(self.content))
+            return tuple(profile_places(self.profiles))
+        return () if self.content is None else tuple(face.name for face in self.content.faces)
 
-    @property
+    @cached_property
     def facts(self) -> PartFacts:
         """For the page."""
         low, high = self.box
         size = " x ".join(f"{1e3 * x:.4g}" for x in high - low)
         solids = 1 if self.content is None else len(self.content.solids)
         count = "" if solids == 1 else f"{solids} solids, glued where they touch; "
-        faces, solid_faces = self._faces("half"), self._faces("solid")
-        shown = faces if self.profiles is not None else solid_faces
-        if len(shown) > _MOST_FACES:
+        count_of_faces = len(self.faces("solid" if self.profiles is None else "half"))
+        if count_of_faces > _MOST_FACES:
             raise InputError(
                 self.name,
-                got=f"{len(shown)} faces",
+                got=f"{count_of_faces} faces",
                 expected=f"at most {_MOST_FACES}",
                 hint="suppress small fillets and threads in the CAD program, or write the case.",
             )
         return PartFacts(
-            words=f"{count}{size} mm, {self.volume * 1e9:.5g} mm^3, {len(shown)} named faces",
-            faces=faces if self.profiles is not None else (),
-            solid_faces=solid_faces,
+            words=f"{count}{size} mm, {self.volume * 1e9:.5g} mm^3, {count_of_faces} named faces",
+            faces=() if self.profiles is None else _profile_faces(self.profiles),
+            solid_faces=self._solid_faces,
             not_turned=self.not_turned,
         )
+
+    @property
+    def _solid_faces(self) -> tuple[FaceFacts, ...]:
+        if self.content is None:
+            return ()
+        assert self.path is not None
+        # a shape of its own: with triangles its boxes are other ones
+        return tuple(_step_faces(self.content, solid_places(read_step(self.path))))
 
     def picture_mesh(self, model: str) -> Mesh:
         """Coarse mesh, for a picture and the place of touch."""
@@ -298,59 +304,26 @@ def _plainly_named(profiles: Mapping[str, Profile]) -> dict[str, Profile]:
 
 
 def _profile_faces(profiles: Mapping[str, Profile]) -> tuple[FaceFacts, ...]:
-    lines, arcs = {}, set()
-    for name in dict.fromkeys(n for profile in profiles.values() for n in profile.names):
-        curves = [c for p in profiles.values() for c in p.curves if c.name == name]
-        lines[name] = np.concatenate([c.at(np.linspace(0, 1, 33)) for c in curves])
-        if any(c.centre is not None for c in curves):
-            arcs.add(name)
-    every = np.concatenate(list(lines.values()))
-    ends = every.min(axis=0), every.max(axis=0)
     found = []
-    for name, points in lines.items():
+    for name, place in profile_places(profiles).items():
+        curves = [c for p in profiles.values() for c in p.curves if c.name == name]
+        points = np.concatenate([c.at(np.linspace(0, 1, 33)) for c in curves])
         low, high = points.min(axis=0), points.max(axis=0)
-        place = "arc" if name in arcs else _place(low, high, ends)
         words = f"r {_range(low[0], high[0])}, z {_range(low[1], high[1])}"
         found.append(FaceFacts(name=name, words=words, place=place))
     return tuple(found)
 
 
-def _step_faces(content: StepContent) -> Iterator[FaceFacts]:
-    """Faces of solids: of a box around each, the largest distance from the axis and its heights."""
-    boxes = {
-        part.name: (_around(part.low, part.high), np.array([part.low[2], part.high[2]]))
-        for part in content.faces
-    }
-    r = max((far for far, _ in boxes.values()), default=0.0)
-    heights = np.array([z for _, z in boxes.values()] or [np.zeros(2)])
-    ends = np.array([0.0, heights.min()]), np.array([r, heights.max()])
+def _step_faces(content: StepContent, places: Mapping[str, str]) -> Iterator[FaceFacts]:
+    """Faces of solids: area, centre across z if it is not on the axis, heights."""
+    least = _EVEN * max(float(np.max(face.high - face.low)) for face in content.faces)
     for part in content.faces:
-        far, (low, high) = boxes[part.name]
         count = "" if part.count == 1 else f"{part.count} faces, "
-        # where it is no plane across the axis, the box has no smallest distance: a wall
-        near = 0.0 if high - low < _EVEN * (ends[1][1] - ends[0][1]) else far
-        place = _place(np.array([near, low]), np.array([far, high]), ends)
-        words = f"{count}{part.size * 1e6:.4g} mm^2, z {_range(float(low), float(high))}"
-        yield FaceFacts(name=part.name, words=words, place=place)
-
-
-def _around(low: Floats, high: Floats) -> float:
-    return float(np.max(np.abs([low[:2], high[:2]])))
-
-
-_EVEN = 1e-3  # of the size of the part
-
-
-def _place(low: Floats, high: Floats, ends: tuple[Floats, Floats]) -> str:
-    """Where a face between two corners (r, z) lies on a part between its own two."""
-    least = _EVEN * float(np.max(ends[1] - ends[0]))
-    if high[1] - low[1] < least:
-        is_low, is_high = low[1] - ends[0][1] < least, ends[1][1] - high[1] < least
-        return "bottom" if is_low else "top" if is_high else "shoulder"
-    if high[0] - low[0] < least:
-        is_in = low[0] - ends[0][0] < least and ends[0][0] > least
-        return "outside" if ends[1][0] - high[0] < least else "bore" if is_in else "wall"
-    return "cone"
+        x, y = 0.5 * (part.low + part.high)[:2]
+        beside = f"x {_range(x, x)}, y {_range(y, y)}, " if np.hypot(x, y) > least else ""
+        heights = _range(float(part.low[2]), float(part.high[2]))
+        words = f"{count}{part.size * 1e6:.4g} mm^2, {beside}z {heights}"
+        yield FaceFacts(name=part.name, words=words, place=places[part.name])
 
 
 def _range(low: float, high: float) -> str:
