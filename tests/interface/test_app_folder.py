@@ -575,7 +575,9 @@ def test_a_second_run_says_how_far_it_is_of_the_whole(folder_jobs, sleeping):
     assert (
         words == "modes (2 of 3), 50 % of it; 5 s so far; about 7 s left, judging by the last run"
     )
-    assert (alone, alone_words) == (None, "modes, 50 %; 5 s so far")
+    assert (alone, alone_words) == (None, "modes (stage 2), 50 % of it; 5 s so far")
+    silent = replace(found, before={}, fraction=0.0, since=found.started + 3.0)
+    assert silent.progress(found.started + 15.0)[1] == "modes (stage 2) for 12 s; 15 s so far"
 
 
 def test_the_file_of_progress_has_the_times_of_the_stages(tmp_path, monkeypatch):

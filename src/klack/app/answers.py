@@ -426,12 +426,16 @@ class PartFacts:
 
 @dataclass(frozen=True, kw_only=True)
 class Proposal:
-    """Faces that meet and the held one, each empty if unknown; ``words`` say why these or none."""
+    """Faces that meet and the held one, each empty if unknown; ``words`` say why these or none.
+
+    ``is_refused`` if the parts could not even be compared.
+    """
 
     needle_contact: str = ""
     housing_contact: str = ""
     held: str = ""
     words: str = ""
+    is_refused: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)

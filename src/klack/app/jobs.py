@@ -107,8 +107,12 @@ class Job:
         words = [self.stage]
         if self.stage in self.before:
             words[0] += f" ({[*self.before].index(self.stage) + 1} of {len(self.before)})"
+        elif self.spent:
+            words[0] += f" (stage {len({*self.spent} - {self.stage}) + 1})"
         if fraction:
-            words[0] += f", {100.0 * fraction:.0f} %" + " of it" * bool(self.before)
+            words[0] += f", {100.0 * fraction:.0f} % of it"
+        elif self.since:
+            words[0] += f" for {duration_text(max(now - self.since, 0.0))}"
         words.append(f"{duration_text(max(now - self.started, 0.0))} so far")
         if self.stage not in self.before:
             return None, "; ".join(words)

@@ -48,6 +48,16 @@ class Shapes:
         """
         return self._part(name, source).facts
 
+    def mesh(self, name: str, source: tuple[str, str], model: str) -> None:
+        """Mesh a part for :meth:`parts_scene` and :meth:`proposal`, which take its time else.
+
+        Raises
+        ------
+        InputError
+            For one that cannot be meshed.
+        """
+        self._part(name, source).picture_mesh(model)
+
     def parts_scene(self, sources: Sources, model: str) -> bytes:
         """Both parts of a new valve, as drawn, in coarse meshes."""
         none = np.empty(0, dtype=np.int64)

@@ -190,12 +190,12 @@ def place_meshes(case: Case, progress: Progress) -> PlacedMeshes:
             return _places_of_moving_body(other, found)
         return found.lower if found else ()
 
-    upper, lower = (
-        mesh_body(case.bodies[name], name, places[name], partial(places_at, name))
-        for name in (moving.body, stop.body)
-    )
+    meshes = []
+    for i, name in enumerate((moving.body, stop.body)):
+        progress("mesh", i / 2)
+        meshes.append(mesh_body(case.bodies[name], name, places[name], partial(places_at, name)))
+    upper, lower = meshes
     upper_surface, lower_surface = upper.surface(moving.surface), lower.surface(stop.surface)
-    progress("mesh", 0.6)
     with named_contact(case, ("contact", "between"), moving, stop):
         pose, form = _pose(case, upper, upper_surface, lower, lower_surface, touch)
     upper = upper.moved(pose.shift[2:] * [0.0, 1.0]) if upper.dimension == 2 else upper.placed(pose)

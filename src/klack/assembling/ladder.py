@@ -78,9 +78,7 @@ def static_ladder(
     force = approach / compliance
     grade = grade_of(_REACH_MARGIN * approach)
     while True:
-        progress("static contact", 0.2)
         found = candidates.at(grade, worn) if reach is None else candidates.within(reach, worn)
-        progress("static contact", 0.8)
         layer = candidates.pair.layer
         try:
             static = _ladder(found.space, found.compliance, layer, energy, closing, force)

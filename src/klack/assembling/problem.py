@@ -101,7 +101,6 @@ def build_opposite(
         lower_surface=moving_surface,
         pose=Pose.along_z(shift),
     )
-    progress("upper stop", 0.5)
     # nothing gathers more energy than the first impact may have, whatever drives it up there
     static, _ = static_ladder(
         Candidates(contact, flexibility, moving),

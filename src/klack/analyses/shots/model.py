@@ -104,13 +104,11 @@ def _model(
     pair, height = problem.pair, touch_height(problem.space)
     drawn_height = height - pair.shift
     space = _candidates(case, problem, height, drawn_height)
-    progress("interface", 0.2)
     compliance = None
     if problem.case.contact.faces.is_none:  # else the model needs that of all directions
         compliance = extended_compliance(
             space, problem.static, problem.flexibility_upper, problem.flexibility_lower
         )
-        progress("interface", 0.8)
     limit = pressure_limit(problem, problem.yielding(progress), progress, more=_MORE)
     model = build_interface(problem, bodies.pools, space=space, compliance=compliance, limit=limit)
     guide = build_guide(problem, model, bodies.pools)

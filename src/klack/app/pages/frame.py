@@ -158,7 +158,7 @@ def read_first(
 
     Returns the element that it stands in; ``said`` is what stays in place of the words.
     """
-    waiting = plain(words, "p").props("role=status")
+    waiting = plain(words, "p").classes("k-wait").props("role=status")
     body = ui.element("div")
 
     async def fill() -> None:
@@ -173,6 +173,7 @@ def read_first(
             waiting.delete()
         else:
             waiting.set_text(said(found))
+            waiting.classes(remove="k-wait")
         with body:
             if (more := show(found)) is not None:
                 await more

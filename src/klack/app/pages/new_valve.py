@@ -68,6 +68,7 @@ class _Guide:
         self._proposed = Proposal()  # faces, and why these
         self._writing, self._turn = asyncio.Lock(), asyncio.Lock()
         self._is_checking = False  # the step that is shown has not its answer yet
+        self._looking = ""  # what is done for a proposal
         self._waiting = 0  # changes whose parts are not read, or whose faces are not proposed yet
 
     def build(self) -> None:
@@ -87,7 +88,8 @@ class _Guide:
         # until there is a step to leave
         set_off(True, *self._steps, self._back, self._next, self._over)
         with self._body:
-            plain("Reading the parts ...", "p").classes("k-soft").props("role=status")
+            words = plain("Reading the parts ...", "p").classes("k-soft k-wait")
+            words.props("role=status")
         ui.timer(0.05, self._opened, once=True)
 
     async def _opened(self) -> None:
@@ -209,9 +211,9 @@ class _Guide:
         missing = ("choose two parts that can be read", "choose both contact faces and a held face")
         stuck = self._plan.step == furthest < 2
         why = f"To continue, {missing[furthest]}." if stuck else ""
-        if self._waiting and furthest:
-            why = "Looking for the faces that meet; solids are meshed for that, in seconds ..."
-        self._why.set_text(why)
+        doing = self._looking or "Reading the parts ..." * (self._waiting > 0)
+        self._why.set_text(doing or why)
+        self._why.classes(add="k-wait" if doing else "", remove="" if doing else "k-wait")
 
     async def _show(self) -> None:
         if self._plan.step > self._furthest():
@@ -273,12 +275,27 @@ class _Guide:
         if self._plan != self._plan.with_proposal(none):
             return
         try:
+            await self._mesh(self._look, "Looking for the faces that meet")
             found = await self._state.shapes.call("proposal", sources, self.model)
         except (KlackError, OSError) as error:
-            found = Proposal(words=f"No faces are proposed: {error}")
+            found = Proposal(words=f"No faces are proposed: {error}", is_refused=True)
+        finally:
+            self._look("")
         if self._plan == self._plan.with_proposal(none):  # none was chosen meanwhile
             self._proposed = found
             await self.keep(self._plan.with_proposal(found))
+
+    def _look(self, words: str) -> None:
+        self._looking = words
+        self._show_steps()
+
+    async def _mesh(self, tell: Callable[[str], None], last: str) -> None:
+        """Mesh the parts coarsely, one by one, and say so; ``last`` is what follows."""
+        sources = self.sources()
+        for number, (body, source) in enumerate(sources.items(), 1):
+            tell(f"Meshing the {body} coarsely ({number} of {len(sources) + 1}) ...")
+            await self._state.shapes.call("mesh", body, source, self.model)
+        tell(f"{last} ({len(sources) + 1} of {len(sources) + 1}) ...")
 
     def _faces_of(self, body: str) -> tuple[Any, ...]:
         facts = self.facts(body)
@@ -290,11 +307,12 @@ class _Guide:
 
     async def _show_faces(self) -> None:
         faces = {body: self._faces_of(body) for body in BODIES}
-        step = FacesStep(faces, lambda: self._plan, self.keep, self._proposed.words)
+        step = FacesStep(faces, lambda: self._plan, self.keep, self._proposed)
         step.build()
 
         async def drawn() -> None:
             try:
+                await self._mesh(step.tell, "Drawing both parts")
                 packed = await self._state.shapes.call("parts_scene", self.sources(), self.model)
             except KlackError as error:
                 step.refuse(str(error))
@@ -364,7 +382,7 @@ class _Guide:
         return found
 
     async def _show_checks(self) -> None:
-        waiting = plain("Checking ...", "p").props("role=status")
+        waiting = plain("Checking ...", "p").classes("k-wait").props("role=status")
         place = ui.element("div")
 
         async def checked() -> None:
@@ -374,6 +392,7 @@ class _Guide:
                 waiting.set_text(str(error))
                 waiting.classes("k-error")
                 found = None
+            waiting.classes(remove="k-wait")
             if waiting.is_deleted:  # another step is shown, or the checks are made again
                 return
             self._is_checking = False
@@ -422,7 +441,7 @@ class _Guide:
         for each in (write, *others):  # until there is a case to write
             each.props("data-once disabled")
         message = plain("", "p").classes("k-error").props("role=alert")
-        text = plain("writing ...", "pre").classes("k-sheet k-pad k-yaml")
+        text = plain("writing ...", "pre").classes("k-sheet k-pad k-yaml k-wait")
         text.props["tabindex"] = "0"
         self._message = message
 
@@ -436,6 +455,7 @@ class _Guide:
             if errors:
                 message.set_text("\n".join(f"{f.what}: {f.words}" for f in errors))
             text.set_text(found.text or "No case: see the checks.")
+            text.classes(remove="k-wait")
             set_off(not found.text, write, *others)
 
         ui.timer(0.05, written, once=True)

@@ -91,7 +91,7 @@ class _Overview:
         self._show_jobs()
         with self._cases:
             _title("Cases")
-            plain("Looking ...", "p").classes("k-soft")
+            plain("Looking ...", "p").classes("k-soft k-wait")
         ui.timer(0.05, self._fill, once=True)
         ui.timer(_EVERY, self._follow)
 
@@ -543,7 +543,7 @@ def _parts(rows: list[_Row]) -> Iterator[list[_Row]]:
 def _reading(name: str) -> ui.element:
     with ui.element("div").classes("k-row") as row, ui.element("div"):
         plain(name, "div").classes("k-title")
-        plain("reading ...", "div").classes("k-soft")
+        plain("reading ...", "div").classes("k-soft k-wait")
     return row
 
 

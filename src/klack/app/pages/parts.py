@@ -9,7 +9,7 @@ from typing import Any
 from nicegui import ui
 from nicegui.elements.mixins.text_element import TextElement
 
-from klack.app.answers import FaceFacts, PartFacts
+from klack.app.answers import FaceFacts, PartFacts, Proposal
 from klack.app.guard import LARGEST_UPLOAD
 from klack.app.pages.frame import (
     Handler,
@@ -202,7 +202,7 @@ class PartsStep:
         with self._read[body]:
             if found is None:
                 if self._plan().given(body).strip():
-                    plain(_READING, "p").classes("k-soft").props("role=status")
+                    plain(_READING, "p").classes("k-soft k-wait").props("role=status")
             elif isinstance(found, str):
                 plain(found, "p").classes("k-error").props("role=alert")
             else:
@@ -211,7 +211,8 @@ class PartsStep:
                     if found.not_turned
                     else "a body of revolution around z"
                 )
-                plain(f"{found.words}; {turned}", "p").classes("k-read").props("role=status")
+                read = plain(f"{found.words}; {turned}", "p").props("role=status")
+                read.classes("k-read" if found.not_turned else "k-read k-good")
 
     def _show_models(self) -> None:
         facts = [self._facts().get(body) for body in BODIES]
@@ -265,7 +266,7 @@ class FacesStep:
         faces: Mapping[str, tuple[FaceFacts, ...]],
         plan: Callable[[], ValvePlan],
         keep: Callable[[ValvePlan], Awaitable[None]],
-        proposed: str,
+        proposed: Proposal,
     ) -> None:
         self._faces, self._plan, self._keep, self._proposed = faces, plan, keep, proposed
         self._click = self._missing() or "held"
@@ -276,8 +277,11 @@ class FacesStep:
 
     def build(self) -> None:
         """Make the list, and a place for the bodies."""
-        if self._proposed:
-            plain(self._proposed, "p").classes("k-read").props("role=status")
+        if self._proposed.words:
+            found = self._proposed
+            is_whole = found.needle_contact and found.housing_contact and found.held
+            look = "k-error" if found.is_refused else "k-read k-good" if is_whole else "k-read"
+            plain(found.words, "p").classes(look).props("role=status")
         with ui.element("div").classes("k-pick"):
             with ui.element("div"):
                 with ui.element("div").classes("k-head"):
@@ -288,8 +292,7 @@ class FacesStep:
                     }
                 self._place = ui.element("div").classes("k-sheet")
                 with self._place:
-                    self._words = plain("Meshing for the picture ...", "p").classes("k-pad")
-                    self._words.props("role=status")
+                    self._words = plain("", "p").classes("k-pad k-wait").props("role=status")
                 with ui.element("div").classes("k-head k-below"):
                     tick(" Cut open", False, lambda on: self._in_scene(lambda it: it.cut_open(on)))
                     for body in BODIES:
@@ -311,10 +314,15 @@ class FacesStep:
             )
         self._scene.set_roles(self._plan().roles)
 
+    def tell(self, words: str) -> None:
+        """Say what is done for the picture, unless another step is shown."""
+        if not self._words.is_deleted:
+            self._words.set_text(words)
+
     def refuse(self, error: str) -> None:
         """Say why there is no picture; the list still works."""
         self._words.set_text(f"No picture: {error}")
-        self._words.classes("k-error")
+        self._words.classes(add="k-error", remove="k-wait")
 
     def _show_face(self, body: str, face: FaceFacts) -> None:
         name = f"{body}.{face.name}"

@@ -90,7 +90,8 @@ async def showing_page(state: State, given: Mapping[str, str]) -> None:
                     plain("as edited, not saved", "span").classes("k-tag")
         told = ui.element("div")
         with told:
-            plain("Reading, and meshing what has no mesh yet ...", "p").props("role=status")
+            words = "Reading, and meshing what has no mesh yet ..."
+            plain(words, "p").classes("k-wait").props("role=status")
         body = ui.element("div").classes("k-sheet")
         body.set_visibility(False)
 

@@ -32,6 +32,15 @@
     if (told) told.textContent = window.did_handshake || performance.now() < 700 ? "" : "connecting ...";
     if (told && window.did_handshake) clearInterval(linking);
   }, 100);
+  // what waits shows for how long, from 2 s on; it is no text: screen readers would read each second
+  setInterval(() => {
+    for (const found of document.querySelectorAll(".k-wait")) {
+      const words = found.textContent, now = performance.now();
+      if (found.waits !== words) Object.assign(found, { waits: words, since: now });
+      const time = Math.floor((now - found.since) / 1000);
+      found.dataset.for = time < 2 ? "" : time < 100 ? ` ${time} s` : ` ${Math.round(time / 60)} min`;
+    }
+  }, 500);
   // Ctrl+S saves in the editor instead of the page
   document.addEventListener("keydown", (event) => {
     const save = document.getElementById("k-save");
