@@ -52,7 +52,7 @@ def turned(seed: int) -> Profile:
         add(Line, 0.0, z - depth - draw(0.05, 0.5) * inner, "hollow cone")
     else:
         add(Arc, 0.0, z - depth - inner, "hollow ball", (0.0, (z - depth) * scale))
-    return Profile((0.0, -scale), (*edges, Line((0.0, -scale))))
+    return Profile((0.0, -scale), (*edges, Line((0.0, -scale), "axis")))
 
 
 def named(word: str) -> str:

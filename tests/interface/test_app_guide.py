@@ -247,21 +247,22 @@ def test_from_drawings_by_keyboard_and_it_survives(page, server, folder, browser
     assert case.bodies["housing"].material != case.bodies["needle"].material
 
 
-@pytest.mark.parametrize("kind", ["turned", "square"])
+@pytest.mark.parametrize("kind", ["turned", "square", "overlapping"])
 def test_faces_are_proposed_with_the_reason_of_files_chosen_at_once(page, server, folder, kind):
-    """Truth: as drawn; a square rod, no turned part, ends 0.1 mm above its block."""
+    """Truth: as drawn; a square rod, no turned part, ends 0.1 mm above its block, or in it."""
     from netgen.occ import Box, Pnt, Z
 
     faces, how = ("tip", "seat", "rim"), "nearest along the axis"
-    if kind == "square":
+    if kind != "turned":
         faces, how = ("foot", "up", "base"), "nearest along the axis, 100 um apart as drawn"
-        rod, block = Box(Pnt(-1, -1, 0.1), Pnt(1, 1, 9)), Box(Pnt(-3, -2, -6), Pnt(3, 2, 0))
+        low = 0.1 if kind == "square" else -1.0
+        rod, block = Box(Pnt(-1, -1, low), Pnt(1, 1, 9)), Box(Pnt(-3, -2, -6), Pnt(3, 2, 0))
         ends = rod.faces.Min(Z), block.faces.Max(Z), block.faces.Min(Z)
         for face, name in zip(ends, faces, strict=True):
             face.name = name
-        rod.WriteStep(str(folder / "cad" / "square-needle.step"))
-        block.WriteStep(str(folder / "cad" / "square-housing.step"))
-    file = {"turned": "cad/{}.step", "square": "cad/square-{}.step"}[kind]
+        rod.WriteStep(str(folder / "cad" / f"{kind}-needle.step"))
+        block.WriteStep(str(folder / "cad" / f"{kind}-housing.step"))
+    file = "cad/{}.step" if kind == "turned" else f"cad/{kind}-{{}}.step"
     open_guide(page, server)
     choose_step(page, "needle", "cad/words.step")
     page.wait_for_selector("text=which starts with")  # so the process that reads is there
@@ -269,10 +270,19 @@ def test_faces_are_proposed_with_the_reason_of_files_chosen_at_once(page, server
         for body in ("needle", "housing"):
             choose_step(page, body, file.format(body))
         page.wait_for_function("document.body.innerText.split('Reading ...').length == 3")
+        page.wait_for_selector(".k-wait[data-for$=' s']")  # the seconds of a wait
     read(page)
+    # a part that is not turned is no success
+    assert page.locator(".k-read.k-good").count() == (2 if kind == "turned" else 0)
     page.wait_for_selector("#k-next:enabled")
     onward(page, ".ks-view canvas")
+    assert page.locator(".k-wait").count() == 0  # each has ended
     words = page.locator("#k-step .k-read").inner_text()
+    is_good = page.locator("#k-step .k-read.k-good").count() == 1
+    assert is_good == (kind != "overlapping")
+    if kind == "overlapping":
+        assert words.startswith("No contact faces are proposed: the bodies overlap")
+        return
     assert f"needle.{faces[0]} hits housing.{faces[1]}, which are {how}" in words
     roles = (("needle", "contact"), ("housing", "contact"), ("housing", "held"))
     for (body, role), face in zip(roles, faces, strict=True):

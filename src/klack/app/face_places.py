@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.mesh.profile import Curve, Profile
+from klack.mesh.profile import Curve, Profile, on_axis
 from klack.mesh.solid import face_names
 
 __all__ = ["profile_places", "solid_places"]
@@ -46,7 +46,7 @@ def profile_places(profiles: Mapping[str, Profile]) -> dict[str, str]:
     low, high = points.min(axis=0), points.max(axis=0)
     found: dict[str, set[str]] = {}
     for curve in curves:
-        if curve.name:
+        if curve.name and not on_axis(curve):
             found.setdefault(curve.name, set()).add(_of_curve(curve, low, high))
     return {name: _together(words) for name, words in found.items()}
 
@@ -55,8 +55,8 @@ def _of_curve(curve: Curve, low: Floats, high: Floats) -> str:
     """Material is to the left of a curve."""
     least = _EVEN * float(np.max(high - low))
     if curve.centre is not None:
-        on_axis = abs(curve.centre[0]) < _SAME * curve.radius
-        return _hollow("ball", curve.angle < 0.0) if on_axis else "curved"
+        is_ball = abs(curve.centre[0]) < _SAME * curve.radius
+        return _hollow("ball", curve.angle < 0.0) if is_ball else "curved"
     r, z = (b - a for a, b in zip(curve.start, curve.end, strict=True))
     if abs(z) <= _SAME * abs(r):
         return _level(curve.start[1], low[1], high[1], least)
