@@ -184,3 +184,19 @@ def test_a_rounded_edge_is_no_shaft_and_the_wall_beside_it_is_outside(degrees):
     bottom = [e for e in prism.edges if e.start.z == e.end.z == 0.0]
     assert "round" in solid_places(prism.MakeFillet(bottom, 0.5)).values()
     assert all(a != b for a, b in pairwise(sorted(found)))
+
+
+def test_a_wall_with_a_nose_stays_outside_and_rounded_edges_of_a_boss_are_no_shafts():
+    from netgen.occ import Box, Cylinder, Pnt, Z
+
+    wall = Cylinder(Pnt(0, 0, 0), Z, r=5, h=4) + Box(Pnt(0, -1, 1), Pnt(8, 1, 3))
+    assert sorted(solid_places(wall).values()) == sorted(
+        ["bottom", "top", "outside", "outside", "shoulder", "shoulder", "flat", "flat"]
+    )
+    boss = Box(Pnt(-2, -2, 4), Pnt(2, 2, 6))
+    boss.faces.name = "flat"
+    boss = boss.MakeFillet([e for e in boss.edges if abs(e.start.z - e.end.z) > 1], 0.5)
+    for face in boss.faces:
+        face.name = face.name if face.name == "flat" else "round"
+    found = solid_places(wall + boss)
+    assert (found["round"], found["flat"]) == ("round", "flat and top")
