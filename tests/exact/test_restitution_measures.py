@@ -411,13 +411,13 @@ def rate(t, share=1.0):
     return -SPEED_SPEEDS - ACCELERATION * t - 0.5 * JERK * t**2 + share * impulse(t) / MASS_SPEEDS
 
 
-def event(rows, body, phase, share=1.0):
+def event(rows, phase, share=1.0):
     """The impact, with records that begin a phase of fine steps late."""
-    (found,) = events(rows, body, phase, share)
+    (found,) = events(rows, phase, share)
     return found
 
 
-def events(rows, body, phase, share=1.0, scale=1.0, at_work=0.0):
+def events(rows, phase, share=1.0, scale=1.0, at_work=0.0):
     """Impacts of a motion of this scale, where the largest force is ``at_work`` [N]."""
     ends = STEP * np.arange(1201)
     force = np.diff([impulse(t) for t in ends]) / STEP
@@ -427,9 +427,9 @@ def events(rows, body, phase, share=1.0, scale=1.0, at_work=0.0):
     steps[:, 2] = np.where(touches, scale * force, 0.0)
     steps[:, 3] = np.where(touches, 0.0, scale * force)
     times = STEP * np.arange(phase, 1201, LOOK)
-    speeds = {body: scale * np.array([rate(t, share) for t in times])}
+    rates = scale * np.array([[rate(t, share) for t in times]])
     finder = ImpactFinder(rows, 0.0, STEP)
-    finder.feed(times, speeds, [steps[steps[:, 0] < times[-1] - 0.5 * STEP]])
+    finder.feed(times, rates, [steps[steps[:, 0] < times[-1] - 0.5 * STEP]])
     return finder.events({"force": ChannelData(unit="N", values=np.array([0.0, -at_work]))})
 
 
@@ -437,7 +437,7 @@ def events(rows, body, phase, share=1.0, scale=1.0, at_work=0.0):
 def test_speeds_do_not_depend_on_where_the_records_lie(phase):
     parts = {"needle": RigidMass(mass=MASS_SPEEDS), "stop": STOP}
     rows = Network(parts, [["needle.body", "stop.upper"], ["stop.lower", "ground"]]).rows()
-    found = event(rows, "needle", phase)
+    found = event(rows, phase)
 
     fastest = max(-rate(t) for t in STEP * np.arange(501))
     left = rate(TOUCH + CONTACT)
@@ -451,15 +451,15 @@ def test_speeds_do_not_depend_on_where_the_records_lie(phase):
 
 
 def test_an_arm_moves_its_lever_by_its_ratio():
-    """A force at a third of the first arm: that one moves by a third as much."""
+    """A mass at the first arm is nine times as heavy at a third of it."""
     parts = {
         "lever": Lever(arms={"far": 30e-3, "near": 10e-3}, effective_mass=MASS_SPEEDS),
         "stop": STOP,
     }
     rows = Network(parts, [["lever.near", "stop.upper"], ["stop.lower", "ground"]]).rows()
-    found = event(rows, "lever", 17, share=1.0 / 3.0)
+    found = event(rows, 17, share=1.0 / 9.0)
 
-    fastest = max(-rate(t, 1.0 / 3.0) for t in STEP * np.arange(501))
+    fastest = max(-rate(t, 1.0 / 9.0) for t in STEP * np.arange(501))
     assert found.approach_speed == pytest.approx(fastest, rel=1e-6)
 
 
@@ -468,10 +468,10 @@ def test_round_off_of_the_forces_at_work_hits_nothing():
     parts = {"needle": RigidMass(mass=MASS_SPEEDS), "stop": STOP}
     rows = Network(parts, [["needle.body", "stop.upper"], ["stop.lower", "ground"]]).rows()
 
-    (weak,) = events(rows, "needle", 0, scale=1e-14 / PEAK, at_work=1.0)
+    (weak,) = events(rows, 0, scale=1e-14 / PEAK, at_work=1.0)
     assert weak.peak_force == pytest.approx(1e-14, rel=1e-3, abs=0.0)  # a step is 1 / 400 of it
-    assert events(rows, "needle", 0, scale=1e-15 / PEAK, at_work=1.0) == ()
-    assert len(events(rows, "needle", 0, scale=1e-15 / PEAK)) == 1
+    assert events(rows, 0, scale=1e-15 / PEAK, at_work=1.0) == ()
+    assert len(events(rows, 0, scale=1e-15 / PEAK)) == 1
 
 
 TIME_TIMES = np.linspace(0.0, 10e-3, 10_001)

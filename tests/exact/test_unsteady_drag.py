@@ -21,6 +21,7 @@ from klack.hydraulics.unsteady_drag import (
     unsteady_drag_step,
 )
 from klack.mechanics.force import ConstantForce
+from klack.mechanics.lever import Lever
 from klack.mechanics.rigid_mass import RigidMass
 from klack.network.network import Network
 from klack.network.step_function import evaluate
@@ -201,6 +202,18 @@ def test_added_mass_moves_with_the_body_as_a_whole():
     assert body.mass == pytest.approx(4e-3)
     assert body.port_shapes[0, 0] == pytest.approx(1.0 / sqrt(4e-3))
     assert body.rigid_axial[0] == pytest.approx(sqrt(4e-3))
+
+
+def test_added_mass_at_an_arm_counts_with_its_square():
+    """Definition: the inertia about the pivot, as a mass at the first arm."""
+    arms = {"pushed": 10e-3, "wet": -20e-3}
+    parts = {
+        "lever": Lever(effective_mass=1e-3, arms=arms),
+        "drag": UnsteadyDrag(shape="layer", area=1e-4, height=1e-4, added_mass=3e-3),
+    }
+    body = Network(parts, [["lever.wet", "drag.body"]], fluid=liquid(0.01)).rows().bodies[0].body
+    assert body.mass == pytest.approx(1e-3 + 4.0 * 3e-3)
+    assert body.port_shapes[0] == pytest.approx(np.array([1.0, -2.0]) / sqrt(13e-3))
 
 
 def test_without_the_liquid_nothing_is_left():

@@ -282,7 +282,7 @@ def _starting_speed(rows: Rows, port: str) -> float:
 
 
 def _load(rows: Rows, component: str, port: int, added: float) -> None:
-    """Scale the rigid mode of the body at a port: it moves as a whole with more mass."""
+    """Scale the rigid mode of the body at a port: it moves with more mass there."""
     for k, row in enumerate(rows.bodies):
         if port not in row.ports or row.course is not None:
             continue
@@ -294,7 +294,8 @@ def _load(rows: Rows, component: str, port: int, added: float) -> None:
             expected="one rigid motion, along the axis",
             hint="write added_mass: 0 g, and add its mass to that of the body.",
         )
-        scale = sqrt(body.mass / (body.mass + added))
+        heavier = body.mass + added * row.face_ratio(port) ** 2
+        scale = sqrt(body.mass / heavier)
         first = np.r_[scale, np.ones(body.mode_count - 1)][:, None]
         recovery = body.recovery
         if recovery is not None:
@@ -303,7 +304,7 @@ def _load(rows: Rows, component: str, port: int, added: float) -> None:
             row,
             body=replace(
                 body,
-                mass=body.mass + added,
+                mass=heavier,
                 port_shapes=body.port_shapes * first,
                 observer_shapes=body.observer_shapes * first,
                 rigid_axial=body.rigid_axial / scale,

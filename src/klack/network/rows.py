@@ -49,6 +49,8 @@ __all__ = [
     "WaveRow",
 ]
 
+_ROUND_OFF = 1e-9  # of the ratio of two arms
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionCourse:
@@ -139,6 +141,17 @@ class BodyRow:
     speed: float = 0.0
     course: MotionCourse | None = None
     places: tuple[tuple[str, str], ...] = ()
+
+    def face_ratio(self, port: int) -> float:
+        """Speed of the face at a port over the one of the body as a whole.
+
+        1 for a body that shifts along its axis; for a lever the arm there over the first one.
+        """
+        body = self.body
+        if body.momentum is not None or not body.mode_count == body.rigid_count == 1:
+            return 1.0
+        ratio = float(body.rigid_axial[0] * body.port_shapes[0, self.ports.index(port)])
+        return ratio if abs(ratio - 1.0) > _ROUND_OFF else 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -563,6 +576,12 @@ class Rows:
     def owners(self) -> dict[int, BodyRow]:
         """Body of each handle that is a port of one."""
         return {handle: row for row in self.bodies for handle in row.ports}
+
+    @property
+    def meeting(self) -> list[tuple[BodyRow | None, BodyRow | None]]:
+        """Upper and lower body of each interface; None is the ground."""
+        owner = self.owners
+        return [(owner.get(row.upper), owner.get(row.lower)) for row in self.interfaces]
 
     @property
     def in_fluid(self) -> set[int]:

@@ -4,16 +4,16 @@
 does not grow with time.  Where the run is cut into parts changes nothing, not even the last bit.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import isfinite, nan
 from typing import Any
 
 import numpy as np
 
-from klack.arrays import Vector
+from klack.arrays import Matrix, Vector
 from klack.machine.compiling.jit import inner, njit
-from klack.network.rows import GROUND, BodyRow, Rows
+from klack.network.rows import Rows
 from klack.simulation.network_interfaces import FORCE_ROUND_OFF
 from klack.simulation.network_result import ChannelData, ImpactEvent, InterfaceRecord
 from klack.simulation.rest import (
@@ -24,13 +24,12 @@ from klack.simulation.rest import (
     rest_time,
 )
 
-__all__ = ["ROTATION", "ImpactFinder", "arm_doubts", "judged"]
+__all__ = ["ROTATION", "ImpactFinder", "judged"]
 
 
 _PAUSE_STEPS = 100  # a film is not recorded while its force passes through zero: so many fine steps
 _PAUSE_SHARE = 0.04  # or this share of the time to rest, whichever is longer
 _STRIKES = 1e-6  # [m/s] closing speed at the start: less is rest
-_SAME_ARM = 1e-6  # of the ratio of two arms
 _BEND = 0.25  # of what other forces do between two records: more from one to the next is a jump
 
 _KNOWN = 3.0  # of the records after a contact: none is needed
@@ -82,8 +81,8 @@ class ImpactFinder:
     """Finds the impacts on all interfaces of a network.
 
     Contacts that follow each other within the longest period of the two bodies are one impact, and
-    so are contacts between which the centres of mass do not move apart.  For rigid bodies half the
-    time of the shorter contact stands for that period.  A contact that is closed at the start is
+    so are contacts between which the centres of mass (of levers the faces) do not move apart.  For
+    rigid bodies half the time of the shorter contact stands for that period.  A contact that is closed at the start is
     no impact, unless a body has a speed towards it.  A film acts before the first touch and after
     the last one: the speeds are the highest ones while it presses, and within two of these periods
     while it pulls.  An impact whose last contact lasts until the bodies are at rest ends there.
@@ -101,21 +100,12 @@ class ImpactFinder:
     """
 
     def __init__(self, rows: Rows, start: float, step: float) -> None:
-        owner = rows.owners
+        met = list(zip(rows.interfaces, rows.meeting, strict=True))
         self._stops = [row.component for row in rows.interfaces]
-        self._bodies = [
-            tuple(owner[h] if h != GROUND else None for h in (row.upper, row.lower))
-            for row in rows.interfaces
-        ]
-        self._period = [longest_period(bodies) for bodies in self._bodies]
-        self._mass = [effective_mass(bodies) for bodies in self._bodies]
-        self._mobility = [
-            mobility(row, bodies) for row, bodies in zip(rows.interfaces, self._bodies, strict=True)
-        ]
-        self._rest = [
-            rest_time(row, bodies)
-            for row, bodies in zip(rows.interfaces, self._bodies, strict=True)
-        ]
+        self._period = [longest_period(bodies) for bodies in rows.meeting]
+        self._mass = [effective_mass(*pair) for pair in met]
+        self._mobility = [mobility(*pair) for pair in met]
+        self._rest = [rest_time(*pair) for pair in met]
         self._state = np.zeros(len(self._stops), dtype=_STATE)
         for name in ("row_end", "time"):
             self._state[name] = -np.inf
@@ -132,22 +122,22 @@ class ImpactFinder:
     def state(self, values: Vector) -> None:
         self._state = np.ascontiguousarray(values, dtype=float).copy().view(_STATE).reshape(-1)
 
-    def feed(self, time: Vector, velocity: Mapping[str, Vector], steps: Sequence[Vector]) -> None:
+    def feed(self, time: Vector, rates: Matrix, steps: Sequence[Vector]) -> None:
         """Take in what followed in the run.
 
         Parameters
         ----------
         time (n,) [s]
             After the last time that was fed.
-        velocity (n,) [m/s]
-            Of the centre of mass of each body that moves, by component.
+        rates (interfaces, n) [m/s]
+            Speed of each gap, positive when it opens: of the centres of mass, or of the faces of
+            levers and of bodies that follow a course.
         steps (k, 6)
             Per interface, of every step in which it carried force: start, length [s], contact
             force, film force [N], gap [m], speed of the gap at the start [m/s], needed where the
             contact is open or closes; nan where not known.
         """
-        for c, rows in enumerate(steps):
-            rate = self._gap_rate(c, time, velocity)
+        for c, (rate, rows) in enumerate(zip(rates, steps, strict=True)):
             out = np.empty((len(rows) // 2 + 2, len(_EVENT)))
             pause = max(_PAUSE_SHARE * self._rest[c], self._pause)
             count = _feed(
@@ -183,15 +173,6 @@ class ImpactFinder:
         self._found.clear()
         self._state["news"] = self._state["impact_news"] = 0.0
 
-    def _gap_rate(self, c: int, time: Vector, velocity: Mapping[str, Vector]) -> Vector:
-        """Relative velocity of the centres of mass, positive when the gap opens."""
-        rate = np.zeros(len(time))
-        bodies: tuple[BodyRow | None, ...] = self._bodies[c]
-        for body, sign in zip(bodies, (1.0, -1.0), strict=True):
-            if body is not None and body.component in velocity:
-                rate += sign * velocity[body.component]
-        return rate
-
     def _event(self, c: int, row: Vector) -> ImpactEvent:
         found = dict(zip(_EVENT, row.tolist(), strict=True))
         before, after = found["before"], found["after"]
@@ -208,31 +189,6 @@ class ImpactFinder:
             restitution=-after / before,
             energy_loss=0.5 * self._mass[c] * (before**2 - after**2),
         )
-
-
-def arm_doubts(rows: Rows) -> Iterator[str]:
-    """Doubts about stops at another arm of a lever than the first, whose speed is recorded."""
-    owner = rows.owners
-    for row in rows.interfaces:
-        for handle in {row.upper, row.lower} & owner.keys():
-            lever = owner[handle]
-            body = lever.body
-            if lever.course is not None or body.momentum is not None or not body.rigid_count:
-                continue
-            ratio = port_mobility(handle, lever) * body.mass
-            if abs(ratio - 1.0) < _SAME_ARM:
-                continue
-            first, here = body.port_names[0], body.port_names[lever.ports.index(handle)]
-            effect = (
-                f"their speeds are {1.0 / ratio:.3g} times the true ones"
-                if ratio > 0.0
-                else "they are not recognised"
-            )
-            yield (
-                f"impacts on '{row.component}' are recorded with the speed of the arm '{first}' of "
-                f"'{lever.component}', but the stop is at '{here}': {effect}. Forces are right. "
-                f"Try: give '{here}' as the first of the arms, with effective_mass there."
-            )
 
 
 def judged(
@@ -271,22 +227,21 @@ def judged(
     after
         The same for a run that continues this one.
     """
-    owner = rows.owners
     stops = {row.component: c for c, row in enumerate(rows.interfaces)}
     share = np.zeros((len(stops), len(stops)))
     meeting: list[set[str]] = []
     masses = []
-    for c, row in enumerate(rows.interfaces):
-        sides = [owner.get(handle) for handle in (row.upper, row.lower)]
+    for c, (row, sides) in enumerate(zip(rows.interfaces, rows.meeting, strict=True)):
         meeting.append({side.component for side in sides if side is not None})
-        masses.append(effective_mass(sides))
+        masses.append(effective_mass(row, sides))
         own = mobility(row, sides)
         for k, other in enumerate(rows.interfaces):
             if k != c and own > 0.0:
                 shared = [
-                    abs(port_mobility(handle, owner[handle]))
-                    for handle in (other.upper, other.lower)
-                    if handle in owner and any(owner[handle] is side for side in sides)
+                    abs(port_mobility(face, pushed, side))
+                    for face, side in zip((row.upper, row.lower), sides, strict=True)
+                    for pushed in (other.upper, other.lower)
+                    if side is not None and pushed in side.ports
                 ]
                 share[c, k] = sum(shared) / own
     after = before.copy()

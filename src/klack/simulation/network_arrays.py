@@ -372,7 +372,7 @@ class InterfaceTrial(NamedTuple):
     least: Vector  # force in this macro step and at its start
     most: Vector
     chi: Vector  # dissipation factor at the start of the step
-    opening: Vector  # speed at which the centres of mass part then, where it was asked
+    opening: Vector  # speed of the gap then, where it was asked
     first: Vector  # force in the first sub-step, or at its start
     stiffness: Vector  # slope of a force that rises or falls within the step; 0: of its mean alone
     rise: Vector  # change of the force over the step
@@ -482,6 +482,6 @@ class Recording(NamedTuple):
     port_block1: Index
     fluid_ports: Index  # that pressures and flows push
     port_row: Index
-    parting: Index  # (interfaces, 4): blocks of the upper and the lower body, none if it is held
+    parting: Index  # (interfaces, 6): blocks of the upper body, none if held, row; of the lower one
     fine: Cube  # (interfaces, most, 6): start, step, contact force, film force, gap, opening
     filled: Index  # (interfaces,)

@@ -498,7 +498,6 @@ def _interfaces(
     rows: Rows, port_of: Mapping[int, int], bodies: Bodies
 ) -> tuple[Interfaces, InterfaceState]:
     count = len(rows.interfaces)
-    owner = rows.owners
     kind = np.full(count, NO_LAW, np.int64)
     law0, alpha = np.zeros(count, np.int64), np.zeros(count)
     law = [np.zeros(0)]
@@ -518,7 +517,7 @@ def _interfaces(
     film_time = stroke / _FLIGHT_SPEED or 1.0  # nothing to fly, no film to judge
     moved = _Answers.of(rows.bodies, _propagators(rows.bodies, (film_time,))).moved
     force = film_time / interface_compliance(moved, upper, lower)  # that gives 1 m/s
-    rest = [rest_time(row, (owner.get(row.upper), owner.get(row.lower))) for row in rows.interfaces]
+    rest = [rest_time(*pair) for pair in zip(rows.interfaces, rows.meeting, strict=True)]
     interfaces = Interfaces(
         interfaces=count,
         upper=upper,

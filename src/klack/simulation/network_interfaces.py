@@ -718,13 +718,13 @@ def end_interfaces(
 
 @phase
 def _opening(bodies: Any, recording: Recording, c: int, level: int) -> float:
-    """Speed at which the centres of mass part at the start of the step [m/s].
+    """Speed of the gap at the start of the step [m/s]; see ``Recording.parting``.
 
     Modes have moved freely since, which does not change the speed of a body as a whole.
     """
     at = recording.parting
-    upper = port_speed(bodies, level, at[c, 0], at[c, 1], -1)
-    return upper - port_speed(bodies, level, at[c, 2], at[c, 3], -1)
+    upper = port_speed(bodies, level, at[c, 0], at[c, 1], at[c, 2])
+    return upper - port_speed(bodies, level, at[c, 3], at[c, 4], at[c, 5])
 
 
 @phase

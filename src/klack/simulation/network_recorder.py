@@ -16,7 +16,7 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.arrays import Vector
+from klack.arrays import Matrix, Vector
 from klack.contact.step_constants import NO_LAW
 from klack.hydraulics.fluid import Fluid
 from klack.machine.memory import require_memory
@@ -31,7 +31,7 @@ from klack.simulation.network_compile import CompiledNetwork
 from klack.simulation.network_record import extremes, lay_across, moment_of, record_moment
 from klack.simulation.network_result import ChannelData, InterfaceRecord
 
-__all__ = ["Recorder", "recorded_columns", "values_now"]
+__all__ = ["Recorder", "gap_rates", "recorded_columns", "values_now"]
 
 
 _MOST_FINE = 1_000_000  # recorded steps per interface that are kept
@@ -114,7 +114,7 @@ class Recorder:
         ]
         self._driven = len(driven)
         self.peaks = [_Column(f"{row.component} peak force", "N") for row in rows.interfaces]
-        self.moving = {rows.bodies[b].component: 2 * len(ports) + i for i, b in enumerate(free)}
+        parting, self.sides = _sides(rows, blocks)
         count = len(rows.interfaces)
         columns = len(self.means) + len(self.points) + count
         _require_memory(records, columns)
@@ -130,7 +130,7 @@ class Recorder:
             port_block0=blocks[owner].astype(np.int64),
             port_block1=blocks[[b + 1 for b in owner]].astype(np.int64),
             port_row=np.array([FIXED_ROWS + i for i in place], dtype=np.int64),
-            parting=_parting(rows, blocks),
+            parting=parting,
             fine=np.empty((count, fine, _FINE)),
             filled=np.zeros(count, np.int64),
         )
@@ -154,7 +154,7 @@ class Recorder:
         self._points[:, 0] = self.recording.points[0]
         if fresh:  # a run that goes on knows this moment
             none = [np.empty((0, _FINE))] * len(self._fine)
-            finder.feed(np.array([time]), self._velocities(1), none)
+            finder.feed(np.array([time]), gap_rates(self.recording.points[:1], self.sides), none)
 
     def port_speeds(self) -> Vector:
         """Velocity [m/s] of every port at the start, the ground last."""
@@ -201,7 +201,7 @@ class Recorder:
         """Take over a chunk with a look at each ``time``."""
         recording, count = self.recording, len(time)
         steps = [recording.fine[c, : recording.filled[c]] for c in range(len(self._fine))]
-        finder.feed(time, self._velocities(count), steps)
+        finder.feed(time, gap_rates(recording.points[:count], self.sides), steps)
         self._thin(count)
         for c, rows in enumerate(steps):
             begin = self._kept[c]
@@ -260,9 +260,6 @@ class Recorder:
                     found = int(look), columns[column].name
         return found
 
-    def _velocities(self, count: int) -> dict[str, Vector]:
-        return {name: self.recording.points[:count, i] for name, i in self.moving.items()}
-
     def _thin(self, count: int) -> None:
         """Records of this chunk: means of means, largest peaks, last points."""
         recording, looks, first = self.recording, self.looks, self.looked
@@ -280,17 +277,51 @@ class Recorder:
         np.maximum(self._peaks[:, here], peaks.T, out=self._peaks[:, here])
 
 
-def _parting(rows: Rows, blocks: NDArray[np.int64]) -> NDArray[np.int64]:
-    """First and last block of both bodies of each interface, the upper one first."""
-    free = {
-        port: (blocks[b], blocks[b + 1])
-        for b, row in enumerate(rows.bodies)
-        if row.body.moves
-        for port in row.ports
-    }
-    ends = [(row.upper, row.lower) for row in rows.interfaces]
-    found = [[*free.get(upper, (0, 0)), *free.get(lower, (0, 0))] for upper, lower in ends]
-    return np.array(found, dtype=np.int64).reshape(len(ends), 4)
+def _sides(rows: Rows, blocks: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Where the speeds of both sides of each interface are, the upper one first.
+
+    A body moves as a whole, with its centre of mass.  The face of a lever moves with its own arm,
+    and that of a body that follows a course moves with it where the other body can fly.  All others
+    are held.
+
+    Returns
+    -------
+    parting (interfaces, 6)
+        Per side: first and last block, none if held, and the row of shapes there.
+    columns (interfaces, 2)
+        Among the points of a record; -1 if held.
+    """
+    ports = [(b, i) for b, row in enumerate(rows.bodies) for i in range(len(row.ports))]
+    place = {handle: p for p, handle in enumerate(h for row in rows.bodies for h in row.ports)}
+    free = [b for b, row in enumerate(rows.bodies) if row.body.moves]
+    parting, columns = [], []
+    for interface, bodies in zip(rows.interfaces, rows.meeting, strict=True):
+        flies = any(owner is not None and owner.body.moves for owner in bodies)
+        for handle, owner in zip((interface.upper, interface.lower), bodies, strict=True):
+            if owner is None or not flies or not (owner.body.moves or owner.course is not None):
+                parting += [0, 0, -1]
+                columns.append(-1)
+                continue
+            b, i = ports[place[handle]]
+            own = owner.course is not None or owner.face_ratio(handle) != 1.0
+            parting += [blocks[b], blocks[b + 1], FIXED_ROWS + i if own else -1]
+            columns.append(len(ports) + place[handle] if own else 2 * len(ports) + free.index(b))
+    count = len(rows.interfaces)
+    return (
+        np.array(parting, dtype=np.int64).reshape(count, 6),
+        np.array(columns, dtype=np.int64).reshape(count, 2),
+    )
+
+
+def gap_rates(points: Matrix, sides: NDArray[np.int64]) -> Matrix:
+    """Speed of each gap [m/s] at each record, (interfaces, n), positive when it opens."""
+    rates = np.zeros((len(sides), len(points)))
+    for rate, (upper, lower) in zip(rates, sides, strict=True):
+        if upper >= 0:
+            rate += points[:, upper]
+        if lower >= 0:
+            rate -= points[:, lower]
+    return rates
 
 
 def recorded_columns(rows: Rows) -> int:

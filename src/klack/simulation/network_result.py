@@ -84,7 +84,7 @@ class ImpactEvent:
         First touch.
     approach_speed [m/s]
         Closing speed of the centres of mass: at first touch, or the highest one since the film
-        began to press.
+        began to press.  Levers, and bodies that follow a course, count with the speed of the face.
     peak_force [N]
         Of contact and film together.
     peak_time [s]

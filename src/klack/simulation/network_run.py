@@ -24,7 +24,7 @@ from klack.simulation.control_loop import ControlLoop
 from klack.simulation.delay_line import LINE_MEMORY
 from klack.simulation.displaced_liquid import liquid_doubts
 from klack.simulation.impact_doubts import cut_doubts, impact_doubts, line_doubts
-from klack.simulation.impact_events import ImpactFinder, arm_doubts, judged
+from klack.simulation.impact_events import ImpactFinder, judged
 from klack.simulation.lasting_laws import pressed_state, slider_places
 from klack.simulation.limits import Limits
 from klack.simulation.moving_bodies import MovingBodies
@@ -297,7 +297,6 @@ def simulate_network(
     doubts = [*line_doubts(network, step * first_step)]
     doubts += liquid_doubts(rows, channels, step * grid.looks * grid.look_steps)
     doubts += cut_doubts(events) if failure is None else ()
-    doubts += arm_doubts(rows)
     for doubt in doubts:
         warnings.warn(doubt, AccuracyWarning, stacklevel=2)
     if network.moving is None:

@@ -37,7 +37,7 @@ def rest_time(row: InterfaceRow, bodies: Sequence[BodyRow | None]) -> float:
     """
     if row.law is None:
         return 0.0
-    bounce = bounce_time(row, bodies) if np.isfinite(effective_mass(bodies)) else 0.0
+    bounce = bounce_time(row, bodies) if np.isfinite(effective_mass(row, bodies)) else 0.0
     return float(max(_PERIODS * longest_period(bodies), _BOUNCES * bounce))
 
 
@@ -46,7 +46,7 @@ def bounce_time(row: InterfaceRow, bodies: Sequence[BodyRow | None]) -> float:
 
     See :func:`rest_time`; the row has a law.
     """
-    mass = effective_mass(bodies)
+    mass = effective_mass(row, bodies)
     if row.law is None or not np.isfinite(mass):
         return np.inf
     depth = _depth(row.law, 0.5 * mass * _SPEED**2)
@@ -64,7 +64,7 @@ def resting_dissipation(
     mass and stiffness.  0 without dissipation, while open, and where neither body can fly.
     """
     alpha = 0.0 if row.law is None else row.law.flat().dissipation
-    mass = effective_mass(bodies)
+    mass = effective_mass(row, bodies)
     if row.law is None or alpha == 0.0 or indentation <= 0.0 or not np.isfinite(mass):
         return 0.0
     return float(alpha / np.sqrt(2.0 * row.law.potential(indentation) / mass))
@@ -81,29 +81,41 @@ def longest_period(bodies: Sequence[BodyRow | None]) -> float:
     return longest
 
 
-def effective_mass(bodies: Sequence[BodyRow | None]) -> float:
-    """Mass of the relative motion of the moving bodies [kg]; infinite if none moves."""
-    inverse = sum(1.0 / b.body.mass for b in bodies if b is not None and b.body.moves)
-    return 1.0 / inverse if inverse > 0.0 else np.inf
+def effective_mass(row: InterfaceRow, bodies: Sequence[BodyRow | None]) -> float:
+    """Mass of the relative motion of the faces [kg]; infinite if neither body moves.
+
+    Elastic bodies count as a whole; a lever as the mass that has its inertia at the arm there.
+    """
+    sides = zip((row.upper, row.lower), bodies, strict=True)
+    inverse = sum(
+        owner.face_ratio(handle) ** 2 / owner.body.mass
+        for handle, owner in sides
+        if owner is not None and owner.body.moves
+    )
+    return float(1.0 / inverse) if inverse > 0.0 else np.inf
 
 
 def mobility(row: InterfaceRow, bodies: Sequence[BodyRow | None]) -> float:
-    """Speed at which the centres of mass part, per impulse of the interface [1/kg].
+    """Speed at which the gap opens, per impulse of the interface [1/kg].
 
     0 where neither body can fly, or a given motion drives it.
     """
     sides = zip((row.upper, row.lower), bodies, strict=True)
-    return sum(port_mobility(handle, owner) for handle, owner in sides)
+    return sum(port_mobility(handle, handle, owner) for handle, owner in sides)
 
 
-def port_mobility(handle: int, owner: BodyRow | None) -> float:
-    """Speed of the centre of mass per impulse at one of its ports [1/kg]; see :func:`mobility`."""
+def port_mobility(face: int, pushed: int, owner: BodyRow | None) -> float:
+    """Speed of the ``face`` per impulse at the port ``pushed`` of a body [1/kg].
+
+    See :meth:`BodyRow.face_ratio` and :func:`mobility`.
+    """
     if owner is None or owner.course is not None:
         return 0.0
-    body, port = owner.body, owner.ports.index(handle)
+    body, port = owner.body, owner.ports.index(pushed)
     if body.momentum is not None:
         return float(body.momentum @ body.port_shapes[:, port]) / body.mass
-    return float(body.rigid_axial @ body.port_shapes[: body.rigid_count, port]) / body.mass
+    whole = float(body.rigid_axial @ body.port_shapes[: body.rigid_count, port]) / body.mass
+    return owner.face_ratio(face) * whole
 
 
 def _depth(law: InterfaceLaw, energy: float) -> float:

@@ -994,9 +994,7 @@ class _Balance:
             settled = begin_faces(interfaces.law, int(interfaces.law0[c]), deep)
             interfaces.gap0[c] += settled
             now.gap[c] += settled
-        owner = rows.owners
-        for c, touching in enumerate(rows.interfaces):
-            pair = (owner.get(touching.upper), owner.get(touching.lower))
+        for c, (touching, pair) in enumerate(zip(rows.interfaces, rows.meeting, strict=True)):
             chi = resting_dissipation(touching, pair, -float(now.gap[c] + now.e[c]))
             damped = bool(closed[c]) and interfaces.alpha[c] > 0.0
             # 0 would be for "not touched yet"

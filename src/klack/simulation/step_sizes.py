@@ -146,11 +146,9 @@ def _is_whole(number: float) -> bool:
 
 
 def _middle(rows: Rows, h: float, near: int) -> int:
-    owner = rows.owners
     shortest = inf
-    for row in rows.interfaces:
+    for row, bodies in zip(rows.interfaces, rows.meeting, strict=True):
         if row.law is not None:
-            bodies = (owner.get(row.upper), owner.get(row.lower))
             sharper = sqrt(1.0 + 2.0 * row.law.flat().dissipation)  # in time, of a damped peak
             shortest = min(shortest, bounce_time(row, bodies) / sharper)
     most = min(_MIDDLE, near // 2, int(_OF_BOUNCE * min(shortest, 1.0) / h))

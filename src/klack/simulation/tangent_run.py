@@ -35,7 +35,7 @@ from klack.simulation.network_arrays import PARTS, scratch_memory
 from klack.simulation.network_compile import compile_network
 from klack.simulation.network_kernel import CLOCK
 from klack.simulation.network_record import moment_of
-from klack.simulation.network_recorder import Recorder
+from klack.simulation.network_recorder import Recorder, gap_rates
 from klack.simulation.network_result import (
     ChannelData,
     EnergyBooks,
@@ -177,9 +177,7 @@ class TangentRun:
 
         time, points, fine = at(self._time), at(self._points), [at(part) for part in self._fine]
         finder = ImpactFinder(self.rows, float(self._time[0, 0]), self.sizes.step)
-        moving = self._columns[2]
-        speeds = {name: np.ascontiguousarray(points[:, i]) for name, i in moving.items()}
-        finder.feed(time, speeds, fine)
+        finder.feed(time, gap_rates(points, self._columns[2]), fine)
         heavier = self._heavier(direction, amount)
         result = self._result(time, points, at(self._means), fine)
         events = tuple(
@@ -406,13 +404,9 @@ class _Running:
             ),
             (),
         )
-        interfaces = rows.interfaces
-        owner = rows.owners
-        self.pause = [
-            longest_period((owner.get(row.upper), owner.get(row.lower))) for row in interfaces
-        ]
+        self.pause = [longest_period(bodies) for bodies in rows.meeting]
         self.closed = network.interface_state.force > 0.0
-        self.released = np.full(len(interfaces), -inf)
+        self.released = np.full(len(rows.interfaces), -inf)
         self.fastest = 0.0
         self.touches: list[Touch] = []
         self.done: list[_Part] = []
@@ -454,7 +448,7 @@ class _Running:
             sizes=self.sizes,
             cpu_time=0.0,
             looks=self.grid.looks,
-            _columns=(self.recorder.means, self.recorder.points, self.recorder.moving),
+            _columns=(self.recorder.means, self.recorder.points, self.recorder.sides),
             _time=np.concatenate([part.time for part in parts]),
             _points=np.concatenate([part.points for part in parts]),
             _means=np.concatenate([part.means for part in parts]),
@@ -666,10 +660,9 @@ class _Found:
 
 
 def _masses(rows: Rows) -> dict[str, float]:
-    owner = rows.owners
     return {
-        row.component: effective_mass((owner.get(row.upper), owner.get(row.lower)))
-        for row in rows.interfaces
+        row.component: effective_mass(row, bodies)
+        for row, bodies in zip(rows.interfaces, rows.meeting, strict=True)
     }
 
 
