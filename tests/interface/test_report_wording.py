@@ -16,7 +16,9 @@ from base64 import b64encode
 from contextlib import suppress
 from dataclasses import replace
 
+import numpy as np
 import pytest
+from draws import each
 from schematic_rules import random_network
 
 from klack.analyses.impact.analysis import (
@@ -32,11 +34,13 @@ from klack.analyses.impact.wording import ESTIMATE_COLUMNS, answer, estimate_row
 from klack.analyses.page import schematic_section
 from klack.contact.restitution import Deviation
 from klack.report.html import render_html
+from klack.report.one_unit import in_one_unit
 from klack.report.page import Content, Section, Table
 from klack.report.pdf import render_pdf
 from klack.report.spoken import spoken
 from klack.report.wording import listed, quantity, share, signed, signed_share
 from klack.schematic.picture import schematic_svg
+from klack.units import format_si
 
 
 def plain(text: str) -> str:
@@ -67,6 +71,61 @@ def plain(text: str) -> str:
 )
 def test_quantity(value: float, unit: str, digits: int, text: str) -> None:
     assert plain(quantity(value, unit, digits)) == text
+
+
+@each("seed", range(40))
+def test_a_column_has_one_unit_and_the_same_numbers(seed: int) -> None:
+    """Definition: what the cells say stays, to every digit, and only one prefix is left."""
+    rng = np.random.default_rng(seed)
+    unit = str(rng.choice(["s", "N", "N s", "m/s", "Hz", "kg", "J", "N/m"]))
+    values = 10.0 ** rng.uniform(-9.0, 6.0, 6) * rng.choice([-1.0, 1.0], 6)
+    write = (quantity, format_si)[seed % 2]
+    cells = [write(float(value), unit) for value in values]
+
+    found = [cell for (cell,) in in_one_unit([(cell,) for cell in cells])]
+
+    def read(cell: str) -> tuple[float, str]:
+        number, _, of = cell.replace("−", "-").replace("\xa0", " ").partition(" ")
+        return float(number), of
+
+    assert len({read(cell)[1] for cell in found}) == 1 or unit == "kg"
+    sizes = {"f": 1e-15, "p": 1e-12, "n": 1e-9, "u": 1e-6, "µ": 1e-6, "m": 1e-3, "k": 1e3}
+    sizes |= {"": 1.0, "M": 1e6, "G": 1e9}
+    base = "g" if unit == "kg" else unit
+
+    def size(cell: str) -> float:
+        number, of = read(cell)
+        return number * sizes[of.removesuffix(base)]
+
+    written = [size(cell) for cell in cells]
+    assert [size(cell) for cell in found] == pytest.approx(written, rel=1e-12, abs=0.0)
+
+
+@each(
+    ("rows", "shown"),
+    [
+        # things down: remarks, dashes and zeros stay; one cell alone as well
+        (
+            [("a", "7.67 mg (flows on)", "12 us"), ("b", "682 ug", "-"), ("c", "0 kg", "-")],
+            [("a", "7.67 mg (flows on)", "12 us"), ("b", "0.682 mg", "-"), ("c", "0 mg", "-")],
+        ),
+        # things across: quantities in rows
+        (
+            [("time", "300 us", "2.5 ms", "-"), ("force", "1.2 kN", "950 N", "3 N")],
+            [("time", "0.300 ms", "2.5 ms", "-"), ("force", "1200 N", "950 N", "3 N")],
+        ),
+        # no prefix before a power, a level or a word
+        ([("3 m^2",), ("40 mm^2",)], [("3 m^2",), ("40 mm^2",)]),
+        ([("3 modes",), ("5 m",)], [("3 modes",), ("5 m",)]),
+        # round-off beside numbers: a power of ten
+        ([("3.5 mJ",), ("2.1 pJ",)], [("3.5 mJ",), ("2.1e-9 mJ",)]),
+        # a small number takes the next prefix if the others stay short
+        ([("1.2 us",), ("2.78 ms",)], [("1.2 us",), ("2780 us",)]),
+        ([("1.2 us",), ("27.8 ms",)], [("0.0012 ms",), ("27.8 ms",)]),
+    ],
+)
+def test_columns_that_share_a_unit(rows: list[tuple[str, ...]], shown: list[tuple[str, ...]]):
+    assert [tuple(row) for row in in_one_unit(rows)] == shown
 
 
 def test_signs_and_shares() -> None:

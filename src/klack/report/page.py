@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 from klack.report.chart import AnyChart
+from klack.report.one_unit import in_one_unit
 from klack.report.wording import spelled
 
 __all__ = ["Content", "NextStep", "Picture", "Section", "Sound", "Table"]
@@ -26,8 +27,8 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
 
     def spelled(self) -> Self:
-        """The same with units and powers as pages spell them."""
-        rows = tuple(tuple(map(spelled, row)) for row in self.rows)
+        """The same with one unit per column, and units and powers as pages spell them."""
+        rows = tuple(tuple(map(spelled, row)) for row in in_one_unit(self.rows))
         return replace(self, columns=tuple(map(spelled, self.columns)), rows=rows)
 
 

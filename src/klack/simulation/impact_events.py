@@ -82,10 +82,11 @@ class ImpactFinder:
 
     Contacts that follow each other within the longest period of the two bodies are one impact, and
     so are contacts between which the centres of mass (of levers the faces) do not move apart.  For
-    rigid bodies half the time of the shorter contact stands for that period.  A contact that is closed at the start is
-    no impact, unless a body has a speed towards it.  A film acts before the first touch and after
-    the last one: the speeds are the highest ones while it presses, and within two of these periods
-    while it pulls.  An impact whose last contact lasts until the bodies are at rest ends there.
+    rigid bodies half the time of the shorter contact stands for that period.  A contact that is
+    closed at the start is no impact, unless a body has a speed towards it.  A film acts before the
+    first touch and after the last one: the speeds are the highest ones while it presses, and within
+    two of these periods while it pulls.  An impact whose last contact lasts until the bodies are at
+    rest ends there.
 
     Where a step does not know the speed of the gap at its start, it follows between two records
     from the impulse of the interface itself, step by step (a film stops a body within less than

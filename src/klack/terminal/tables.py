@@ -5,6 +5,8 @@ import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from klack.report.one_unit import in_one_unit
+
 __all__ = ["Notes", "TextTable", "plain_math", "print_table", "printable"]
 
 
@@ -143,7 +145,7 @@ def print_table(
     for i, column in enumerate(columns):
         words = i < left
         table.add_column(Text(column), justify="left" if words else "right", overflow="fold")
-    for row in rows:
+    for row in in_one_unit(rows):
         table.add_row(*(Text(printable(cell), style=_STYLES.get(cell, "")) for cell in row))
     console.print(table)
 
