@@ -19,6 +19,7 @@ import pytest
 import klack
 from klack.analyses.study.analysis import STUDY as ANALYSIS
 from klack.analyses.study.asked_points import PointRow, PointSteps, groups_of
+from klack.analyses.study.content import study_content
 from klack.analyses.study.evaluation import KeptPoint, point_key
 from klack.analyses.study.kinds import ask
 from klack.analyses.study.points import parameters_of, short_names
@@ -175,6 +176,22 @@ class TestNumbers:
         assert record.failed.tolist() == [False, True]
         assert np.isnan(columns(record)["opening_time"][1])
         assert "1 of 2 points have no measures" in record.warnings[0]
+
+        def remarks(record):
+            sections = {section.title: section for section in study_content(record).sections}
+            points, below = sections["Points"].tables
+            return [row[-1] for row in points.rows], below.rows
+
+        noted = replace(record, notes=("8 g, so slow\nTry: 3 g\nother", ""))
+        marks, texts = remarks(noted)
+        assert marks == ["a, b", "failed: c"]
+        assert texts[:2] == (("a", "1", "8 g, so slow\nTry: 3 g"), ("b", "1", "other"))
+        assert texts[2][2] == record.failures[1].partition("\n")[0]
+        marks, texts = remarks(
+            replace(noted, failures=("", ""), notes=("8 g is lost", "9 g is lost"))
+        )
+        assert marks == ["a", "a"]
+        assert texts == (("a", "2, 1 with these numbers", "8 g is lost"),)
         text = text.replace("2 mm, 1 mm", "1 mm, 1.1 mm")
         with pytest.raises(InputError, match="none of which can be computed") as caught:
             klack.run_study(SMALL, write(tmp_path, text))

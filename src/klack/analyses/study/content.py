@@ -1,8 +1,8 @@
 """Content of a study's report."""
 
+import re
 from collections.abc import Sequence
 from math import isfinite, nan
-from textwrap import shorten
 
 import numpy as np
 
@@ -30,11 +30,13 @@ from klack.analyses.study.wording import (
     MISSED_COLUMNS,
     SHARE_COLUMNS,
     SURROGATE_COLUMNS,
+    alike,
     change,
     effect_cells,
     index_cells,
     largest_first,
     missed_cells,
+    numberless,
     on_page,
     rate_text,
     short_labels,
@@ -49,8 +51,6 @@ from klack.studies.fronts import spread_over
 __all__ = ["study_content"]
 
 _LISTED = 100
-_REMARK = 100
-"""Letters of a remark in the table of points."""
 _OF_FRONT = 24
 _MANY_ROWS = 1024
 _FEWEST = 8
@@ -105,7 +105,7 @@ def study_content(record: StudyRecord) -> Content:
         _sensitivity_section(record, labels),
         *_surrogate_sections(record, labels),
         Section(title="Parameters", tables=(keys,)),
-        Section(title="Points", tables=(_point_table(record, labels),), paragraphs=_left(record)),
+        Section(title="Points", tables=_point_tables(record, labels), paragraphs=_left(record)),
     ]
     return page_of(
         record,
@@ -424,16 +424,35 @@ def _word_effects(
     return (Table(columns=("measure", "parameter", "value", "mean"), rows=rows),) if rows else ()
 
 
-def _point_table(record: StudyRecord, labels: dict[str, str]) -> Table:
+def _point_tables(record: StudyRecord, labels: dict[str, str]) -> tuple[Table, ...]:
+    """The points, their remarks as letters; below them each remark once."""
     shown = [item for item in record.columns if item.varies]
+    points = range(min(record.count, _LISTED))
+    failed = [record.failures[i].partition("\n")[0] for i in points]
+    remarks = [[failed[i]] if failed[i] else _notes(record.notes[i]) for i in points]
+    kinds = alike(remarks)
+    letters = {kind: chr(ord("a") + k % 26) * (1 + k // 26) for k, kind in enumerate(kinds)}
     rows = []
-    for i in range(min(record.count, _LISTED)):
+    for i in points:
         cells = [on_page(item, float(item.values[i])) for item in shown]
-        remark = (record.failures[i] or record.notes[i]).partition("\n")[0]
-        rows.append((str(i), *cells, shorten(remark, _REMARK, placeholder=" …")))
+        marks = ", ".join(dict.fromkeys(letters[numberless(text)] for text in remarks[i]))
+        rows.append((str(i), *cells, f"failed: {marks}" if failed[i] else marks))
     columns = ("point", *(labels[item.name] for item in shown), "remark")
-    last = None if any(row[-1] for row in rows) else -1
-    return Table(columns=columns[:last], rows=tuple(row[:last] for row in rows))
+    last = None if kinds else -1
+    found = [Table(columns=columns[:last], rows=tuple(row[:last] for row in rows))]
+    if kinds:
+        texts = []
+        for kind, notes in kinds.items():
+            note, times = notes.most_common(1)[0]
+            same = f", {times} with these numbers" if len(notes) > 1 else ""
+            texts.append((letters[kind], f"{notes.total()}{same}", note))
+        found.append(Table(columns=("remark", "points", "text"), rows=tuple(texts)))
+    return tuple(found)
+
+
+def _notes(text: str) -> list[str]:
+    """Notes of a point, each with its advice."""
+    return re.split(r"\n(?!Try: )", text) if text else []
 
 
 def _left(record: StudyRecord) -> tuple[str, ...]:

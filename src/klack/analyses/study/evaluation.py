@@ -6,7 +6,6 @@ both have.
 """
 
 import json
-import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -23,6 +22,7 @@ from klack.analyses.study.computing import PointWorkers
 from klack.analyses.study.kinds import ask, kind_of
 from klack.analyses.study.points import Space, Values
 from klack.analyses.study.record import StudyColumn
+from klack.analyses.study.wording import alike
 from klack.analyses.unfinished import LogForm, UnfinishedLog, fingerprint
 from klack.case.any_case import AnyCase, CaseTree
 from klack.case.key_path import split_path
@@ -237,7 +237,6 @@ class Evaluation:
         )
 
 
-_NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 _TOLD = 5
 """Kinds of notes that are told; those of a kind differ in numbers only."""
 
@@ -352,11 +351,7 @@ def _of_rows(rows: Sequence[PointRow]) -> tuple[str, ...]:
         found.append(
             f"{failures.total()} of {len(rows)} points have no measures; {times} times: {reason}"
         )
-    alike: dict[str, Counter[str]] = {}
-    for row in rows:
-        for kind, note in {_NUMBER.sub("#", note): note for note in row.notes}.items():
-            alike.setdefault(kind, Counter())[note] += 1
-    kinds = sorted(alike.values(), key=lambda notes: -notes.total())
+    kinds = sorted(alike(row.notes for row in rows).values(), key=lambda notes: -notes.total())
     for notes in kinds[:_TOLD]:
         note = notes.most_common(1)[0][0]
         other = ", with other numbers" if len(notes) > 1 else ""

@@ -1,6 +1,8 @@
 """Words for the columns and points of a study."""
 
-from collections.abc import Callable, Iterator
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
 from math import isfinite
 
 import numpy as np
@@ -23,6 +25,7 @@ __all__ = [
     "MISSED_COLUMNS",
     "SHARE_COLUMNS",
     "SURROGATE_COLUMNS",
+    "alike",
     "change",
     "effect_cells",
     "in_words",
@@ -30,6 +33,7 @@ __all__ = [
     "largest_first",
     "missed_cells",
     "number_text",
+    "numberless",
     "on_page",
     "rate_text",
     "short_labels",
@@ -41,6 +45,21 @@ __all__ = [
 
 
 _TOLD = 8  # points in a sentence
+_NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[+-]?\d+)?")
+
+
+def numberless(note: str) -> str:
+    """What notes of one kind have in common: they differ in numbers only."""
+    return _NUMBER.sub("#", note)
+
+
+def alike(notes: Iterable[Iterable[str]]) -> dict[str, Counter[str]]:
+    """How many points have each note, by kind."""
+    found: dict[str, Counter[str]] = {}
+    for of_point in notes:
+        for kind, note in {numberless(note): note for note in of_point}.items():
+            found.setdefault(kind, Counter())[note] += 1
+    return found
 
 
 def shown_unit(unit: str) -> tuple[str, float]:
