@@ -20,7 +20,7 @@ _QUANTITY = re.compile(
     rf"(?P<prefix>[fpnuµmkMG]?)(?P<unit>{_SYMBOL}{_BELOW})(?![\w^])"
 )
 _PLAIN = (Decimal("1e-4"), Decimal("1e6"))  # other numbers have a power of ten
-_SMALL = (Decimal("1e-5"), Decimal("0.01"))  # a smallest number that asks for the next prefix
+_SMALL = (Decimal("1e-5"), Decimal("0.1"))  # a smallest number that asks for the next prefix
 _LARGE = 10  # and a largest one that allows it
 
 
@@ -29,15 +29,15 @@ def in_one_unit(rows: Iterable[Sequence[str]]) -> list[list[str]]:
 
     A column is one quantity if all its cells that begin with one have the same unit up to its
     prefix.  Where things lie across and their quantities down, each row has one unit.  The unit is
-    that of the largest number, or a thousandth of it where the smallest number would be below 0.01
+    that of the largest number, or a thousandth of it where the smallest number would be below 0.1
     and all numbers stay below 10 000.
 
     >>> in_one_unit([("a", "984.94 us"), ("b", "2.7826 ms"), ("c", "0 s"), ("d", "-")])
     [['a', '0.98494 ms'], ['b', '2.7826 ms'], ['c', '0 ms'], ['d', '-']]
     >>> in_one_unit([("slow", "12.3 us", "1.2 kHz"), ("fast", "2.78 ms", "950 Hz")])
-    [['slow', '0.0123 ms', '1.2 kHz'], ['fast', '2.78 ms', '0.950 kHz']]
+    [['slow', '12.3 us', '1.2 kHz'], ['fast', '2780 us', '0.950 kHz']]
     >>> in_one_unit([("time", "12.3 us", "2.78 ms"), ("force", "1.2 kN", "950 N")])
-    [['time', '0.0123 ms', '2.78 ms'], ['force', '1.2 kN', '0.950 kN']]
+    [['time', '12.3 us', '2780 us'], ['force', '1.2 kN', '0.950 kN']]
     """
     cells = [list(row) for row in rows]
     columns: dict[int, dict[str, list[Place]]] = {}
