@@ -8,9 +8,8 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from klack.errors import InputError
-from klack.hydraulics.acting_area import acting_area
 from klack.hydraulics.flow_force import FlowForce
-from klack.hydraulics.narrowest_mantle import narrowest_mantle
+from klack.hydraulics.narrowest_mantle import acting_area, narrowest_mantle
 from klack.hydraulics.needle_contour import NeedleContour
 from klack.hydraulics.network_fluid import ambient_viscosity, viscosity_law
 from klack.hydraulics.opening import OpeningComponent
@@ -100,9 +99,9 @@ class ConicalSeat(OpeningComponent):
 
     .. math:: F = (S(x) - S(0))\,(p_{tip} - p_{shank}), \qquad Q = (S(x) - S(0))\,\dot x
 
-    with the acting area ``S`` of :mod:`~klack.hydraulics.acting_area`, and takes the volume ``Q``
-    that this area sweeps from the side of the tip to the other one (virtual work).  The channel
-    ``acting diameter`` is then that of ``S``.
+    with the acting area ``S`` of :mod:`~klack.hydraulics.narrowest_mantle`, and takes the volume
+    ``Q`` that this area sweeps from the side of the tip to the other one (virtual work).  The
+    channel ``acting diameter`` is then that of ``S``.
 
     Limits: concentric, quasi-steady, rigid; of two narrow sections only the narrower one counts for
     the flow.  Without ``tip_side`` the faces keep their diameters.  The contours beyond the ends of
