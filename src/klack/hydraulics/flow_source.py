@@ -8,9 +8,8 @@ from pydantic import Field, model_validator
 
 from klack.hydraulics.fluid_table import fluid_at
 from klack.hydraulics.network_fluid import energy_table, network_fluid
-from klack.hydraulics.time_table import check_table, step_table, value_at_start
+from klack.hydraulics.time_table import SourceOverTime, check_table
 from klack.input.section import Section
-from klack.network.component import Component
 from klack.network.port import FLOW, Port, Role
 from klack.network.rows import Book, Rows
 from klack.network.step_function import carray, step_function
@@ -66,7 +65,7 @@ class FlowTable(Section):
         return self
 
 
-class FlowSource(Component):
+class FlowSource(SourceOverTime):
     """Prescribed flow from a to b: constant, with a step, or from a table.
 
     A pump without leakage: it reaches any pressure, and its work ``(g_b - g_a) m`` (``g`` the
@@ -78,6 +77,7 @@ class FlowSource(Component):
     """
 
     type: ClassVar[str] = "flow-source"
+    quantity: ClassVar[str] = "flow"
     ports: ClassVar[Mapping[str, Port]] = {
         "a": Port("hydraulic", Role.FLOW, optional=True),
         "b": FLOW,
@@ -88,26 +88,6 @@ class FlowSource(Component):
     )
     step: FlowStep | None = Field(default=None, description="Changes the flow once.")
     table: FlowTable | None = Field(default=None, description="Instead of the flow.")
-
-    @model_validator(mode="after")
-    def _one_history(self) -> Self:
-        if self._exactly_one(("flow", "table"), "the flow over time") == "table":
-            return self._refuse_with(("step",), "table", "the table contains every change")
-        return self
-
-    def history(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Times [s] and volume flows [m^3/s], constant beyond both ends."""
-        if self.table is not None:
-            return self.table.time, self.table.flow
-        start = self.flow or 0.0
-        if self.step is None:
-            return (0.0,), (start,)
-        return step_table(start, self.step.to, self.step.at, self.step.rise)
-
-    def at_start(self) -> Component:
-        """Return a source of the flow at time zero."""
-        now = value_at_start(*self.history())
-        return self.model_copy(update={"flow": now, "step": None, "table": None})
 
     def add_rows(self, rows: Rows) -> None:
         """Add one branch that supplies energy."""

@@ -1,12 +1,15 @@
 """Values over time that a source is given: a step, or a table."""
 
 from collections.abc import Sequence
+from typing import ClassVar, Self
 
 import numpy as np
+from pydantic import model_validator
 
 from klack.input.problem import refuse_key_if
+from klack.network.component import Component
 
-__all__ = ["check_table", "step_table", "value_at_start"]
+__all__ = ["SourceOverTime", "check_table"]
 
 
 def check_table(time: Sequence[float], values: Sequence[float], name: str) -> None:
@@ -28,17 +31,29 @@ def check_table(time: Sequence[float], values: Sequence[float], name: str) -> No
         )
 
 
-def step_table(
-    before: float, after: float, at: float, rise: float
-) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Times [s] and values of a ramp from ``before`` to ``after`` that begins ``at``."""
-    return (at, at + rise), (before, after)
+class SourceOverTime(Component):
+    """A prescribed quantity: constant, with a step, or from a table."""
 
+    quantity: ClassVar[str]
+    """Key of its value, here and in the table."""
 
-def value_at_start(times: Sequence[float], values: Sequence[float]) -> float:
-    """Value at time zero, straight between the points and constant beyond them.
+    @model_validator(mode="after")
+    def _one_history(self) -> Self:
+        key = self.quantity
+        if self._exactly_one((key, "table"), f"the {key} over time") == "table":
+            return self._refuse_with(("step",), "table", "the table contains every change")
+        return self
 
-    >>> value_at_start((-1.0, 1.0), (2.0, 4.0))
-    3.0
-    """
-    return float(np.interp(0.0, times, values))
+    def history(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Times [s] and values [SI], constant beyond both ends."""
+        start, step, table = (getattr(self, key) for key in (self.quantity, "step", "table"))
+        if table is not None:
+            return table.time, getattr(table, self.quantity)
+        if step is None:
+            return (0.0,), (start or 0.0,)
+        return (step.at, step.at + step.rise), (start or 0.0, step.to)
+
+    def at_start(self) -> Component:
+        """Return a source of the value at time zero."""
+        now = float(np.interp(0.0, *self.history()))
+        return self.model_copy(update={self.quantity: now, "step": None, "table": None})
