@@ -16,7 +16,6 @@ from klack.hydraulics.accumulator import Accumulator
 from klack.hydraulics.chamber import Chamber
 from klack.hydraulics.fluid_library import library_fluid
 from klack.hydraulics.fluid_table import fluid_table
-from klack.hydraulics.gas.conductance import factor_of_area, factor_of_conductance
 from klack.hydraulics.gas.flow_law import LAMINAR, restriction_flow
 from klack.hydraulics.gas.gas_chamber import GasChamber
 from klack.hydraulics.gas.gas_face import GasFace
@@ -24,6 +23,7 @@ from klack.hydraulics.gas.gas_library import AIR, HYDROGEN, library_gas
 from klack.hydraulics.gas.gas_orifice import GasOrifice
 from klack.hydraulics.gas.gas_source import GasSource
 from klack.hydraulics.gas.gas_valve import GasValve
+from klack.hydraulics.gas.restriction import factor_of_area, factor_of_conductance
 from klack.hydraulics.gas_release import (
     free_gas,
     mixture_at,

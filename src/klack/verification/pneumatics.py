@@ -7,7 +7,6 @@ from math import asin, exp, log, pi, sin, sqrt
 import numpy as np
 from scipy.integrate import quad, solve_ivp
 
-from klack.hydraulics.gas.conductance import factor_of_area, factor_of_conductance
 from klack.hydraulics.gas.flow_law import VALVE, gap_flow, restriction_flow
 from klack.hydraulics.gas.gas import Gas, critical_ratio, nozzle_factor
 from klack.hydraulics.gas.gas_element import GasNetwork
@@ -15,6 +14,7 @@ from klack.hydraulics.gas.gas_gap import GasGap
 from klack.hydraulics.gas.gas_library import AIR, HYDROGEN, METHANE
 from klack.hydraulics.gas.gas_step import ISOTHERMAL, OF_CHAMBER, gas_step
 from klack.hydraulics.gas.gas_valve import mantle_area
+from klack.hydraulics.gas.restriction import factor_of_area, factor_of_conductance
 from klack.network.gas_rows import GasBranchRow, GasChamberRow, GasRows, GasSourceRow
 from klack.network.step_function import evaluate
 from klack.verification.benches import AMBIENT, component, last, run_network

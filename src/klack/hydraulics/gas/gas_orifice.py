@@ -6,9 +6,12 @@ from typing import ClassVar, Self
 
 from pydantic import Field, model_validator
 
-from klack.hydraulics.gas.conductance import factor_of_area, factor_of_conductance
 from klack.hydraulics.gas.network_gas import add_restriction, network_gas
-from klack.hydraulics.gas.restriction import RestrictionComponent
+from klack.hydraulics.gas.restriction import (
+    RestrictionComponent,
+    factor_of_area,
+    factor_of_conductance,
+)
 from klack.network.port import GAS_FLOW, Port
 from klack.network.rows import Rows
 from klack.units import Area, Length, Ratio, SonicConductance

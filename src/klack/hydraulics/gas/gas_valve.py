@@ -8,9 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from klack.hydraulics.gas.conductance import factor_of_area, factor_of_conductance
 from klack.hydraulics.gas.network_gas import add_restriction, network_gas
-from klack.hydraulics.gas.restriction import RestrictionComponent
+from klack.hydraulics.gas.restriction import (
+    RestrictionComponent,
+    factor_of_area,
+    factor_of_conductance,
+)
 from klack.input.problem import refuse_key_if
 from klack.network.port import ELEMENT, GAS_FLOW, Port, Role
 from klack.network.rows import Rows
