@@ -15,7 +15,7 @@ from klack.hydraulics.fluid_library import FLUIDS, find_fluid, library_fluid
 from klack.hydraulics.liquid import ATMOSPHERE, Murnaghan, TabulatedLiquid
 from klack.hydraulics.pressure_viscosity import PressureViscosity
 from klack.hydraulics.property_table import PropertyTable, read_property_table
-from klack.input.problem import CaseProblem, nearest, one_of, refuse_key_if
+from klack.input.problem import CaseProblem, nearest, one_of, problem_at, refuse_key_if
 from klack.input.section import InputPath, NamedSection, Section, Text
 from klack.units import (
     Density,
@@ -52,12 +52,8 @@ class DensityTable(Section):
 
     @model_validator(mode="after")
     def _usable(self) -> Self:
-        try:
+        with problem_at("density"):
             self.liquid()
-        except InputError as error:
-            raise CaseProblem(
-                ("density",), got=error.got, expected=error.expected, hint=error.hint
-            ) from None
         return self
 
     def liquid(self) -> TabulatedLiquid:
@@ -208,12 +204,8 @@ class FluidChoice(NamedSection):
 
     def _in_library(self) -> Self:
         if is_coolprop_name(self.name):
-            try:
+            with problem_at("name"):
                 coolprop_fluid(self.name)
-            except InputError as error:
-                raise CaseProblem(
-                    ("name",), got=error.got, expected=error.expected, hint=error.hint
-                ) from None
             return self
         if find_fluid(self.name) is None:
             hint = "for your own fluid add density, viscosity and bulk_modulus."

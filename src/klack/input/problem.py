@@ -1,11 +1,12 @@
 """A mistake in a case, with the key it belongs to."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from difflib import get_close_matches
 
 from klack.errors import InputError
 
-__all__ = ["CaseProblem", "Key", "nearest", "one_of", "refuse_key_if"]
+__all__ = ["CaseProblem", "Key", "nearest", "one_of", "problem_at", "refuse_key_if"]
 
 Key = tuple[str | int, ...]
 
@@ -34,6 +35,15 @@ def refuse_key_if(
     """Raise :class:`CaseProblem` where something in a case cannot be used."""
     if wrong:
         raise CaseProblem(key, got=got, expected=expected, hint=hint, on_key=on_key)
+
+
+@contextmanager
+def problem_at(*key: str | int) -> Iterator[None]:
+    """Turn an error of what a key describes into a :class:`CaseProblem` at that key."""
+    try:
+        yield
+    except InputError as error:
+        raise CaseProblem(key, got=error.got, expected=error.expected, hint=error.hint) from None
 
 
 def key_text(key: Key) -> str:

@@ -6,8 +6,7 @@ from typing import ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from klack.errors import InputError
-from klack.input.problem import CaseProblem, refuse_key_if
+from klack.input.problem import CaseProblem, problem_at, refuse_key_if
 from klack.magnetics.driver import driver_of
 from klack.magnetics.flux_map import FluxMap
 from klack.magnetics.flux_step import flux_rows
@@ -89,17 +88,10 @@ class ForceMapSolenoid(Component):
         else:
             self._whole_table()
         table = self.table()
-        try:
+        with problem_at(*(("linkage",) if self.map is None else ("map", "file"))):
             FluxMap.of(
                 current=table.current, gap=table.gap, linkage=table.linkage, force=table.force
             )
-        except InputError as error:
-            raise CaseProblem(
-                ("linkage",) if self.map is None else ("map", "file"),
-                got=error.got,
-                expected=error.expected,
-                hint=error.hint,
-            ) from None
         return self
 
     def _whole_table(self) -> None:

@@ -5,8 +5,7 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from klack.errors import InputError
-from klack.input.problem import CaseProblem
+from klack.input.problem import problem_at
 from klack.input.section import NamedSection, Number, Section, Text
 from klack.magnetics.hysteresis import measured_loop
 from klack.magnetics.iron import IronCurve, brauer, froehlich, measured, tanh_curve
@@ -63,12 +62,8 @@ class IronChoice(NamedSection):
         chosen = self._exactly_one(
             ("name", "froehlich", "tanh", "brauer", "table", "loop"), "which iron"
         )
-        try:
+        with problem_at(chosen):
             self.curve()
-        except InputError as error:
-            raise CaseProblem(
-                (chosen,), got=error.got, expected=error.expected, hint=error.hint
-            ) from None
         return self
 
     def curve(self) -> IronCurve:

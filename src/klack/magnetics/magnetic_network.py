@@ -5,8 +5,7 @@ from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from klack.errors import InputError
-from klack.input.problem import CaseProblem, nearest, one_of, refuse_key_if
+from klack.input.problem import CaseProblem, nearest, one_of, problem_at, refuse_key_if
 from klack.input.section import Name
 from klack.magnetics.circuit import MagneticCircuit
 from klack.magnetics.coupled_table import independent_ways
@@ -114,14 +113,10 @@ class MagneticNetwork(Component):
             hint="check gap and opens_from.",
         )
         self._check_circuits()
-        try:
+        with problem_at("elements"):
             circuit_numbers(self.circuit())
             if self.circuits:
                 independent_ways(self.circuit(), ("", *self.circuits))
-        except InputError as error:
-            raise CaseProblem(
-                ("elements",), got=error.got, expected=error.expected, hint=error.hint
-            ) from None
         return self
 
     def _check_circuits(self) -> None:

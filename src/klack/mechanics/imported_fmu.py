@@ -6,7 +6,7 @@ from typing import ClassVar, Literal, Self
 from pydantic import Field, model_validator
 
 from klack.errors import InputError
-from klack.input.problem import CaseProblem, nearest, one_of, refuse_key_if
+from klack.input.problem import CaseProblem, nearest, one_of, problem_at, refuse_key_if
 from klack.input.section import InputPath, Number
 from klack.mechanics.fmu_coupling import STATES, FmuCoupling
 from klack.mechanics.fmu_file import FmuDescription, FmuVariable, describe_fmu
@@ -88,12 +88,8 @@ class ImportedFmu(Component):
         return self
 
     def _description(self) -> FmuDescription:
-        try:
+        with problem_at("file"):
             return describe_fmu(self.file)
-        except InputError as error:
-            raise CaseProblem(
-                ("file",), got=error.got, expected=error.expected, hint=error.hint
-            ) from error
 
     def _named(self, *causalities: str) -> list[str]:
         found = self._description().variables.values()

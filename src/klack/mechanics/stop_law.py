@@ -7,8 +7,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from klack.contact.laws import HertzLaw, LinearLaw, TableLaw
-from klack.errors import InputError
-from klack.input.problem import CaseProblem
+from klack.input.problem import problem_at
 from klack.input.section import Section
 from klack.units import Force, Length, Modulus, Stiffness
 
@@ -69,12 +68,8 @@ class TableStopLaw(Section):
 
     @model_validator(mode="after")
     def _is_a_law(self) -> Self:
-        try:
+        with problem_at("indentation"):
             self.contact_law()
-        except InputError as error:
-            raise CaseProblem(
-                ("indentation",), got=error.got, expected=error.expected, hint=error.hint
-            ) from None
         return self
 
     def contact_law(self) -> TableLaw:

@@ -5,10 +5,9 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from klack.errors import InputError
 from klack.hydraulics.gas.gas import Gas
 from klack.hydraulics.gas.gas_library import GASES, library_gas
-from klack.input.problem import CaseProblem, one_of, refuse_key_if
+from klack.input.problem import CaseProblem, one_of, problem_at, refuse_key_if
 from klack.input.section import NamedSection, Text
 from klack.units import DynamicViscosity, GasConstant, Pressure, Ratio
 
@@ -42,12 +41,8 @@ class GasChoice(NamedSection):
     def _complete(self) -> Self:
         given = [key for key in _NUMBERS if getattr(self, key) is not None]
         if not given:
-            try:
+            with problem_at("name"):
                 library_gas(self.name)
-            except InputError as error:
-                raise CaseProblem(
-                    ("name",), got=error.got, expected=error.expected, hint=error.hint
-                ) from None
             return self
         if self.name in GASES:
             raise CaseProblem(
