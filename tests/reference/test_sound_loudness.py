@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 from klack.acoustics.drive_pattern import drive_pattern
-from klack.acoustics.loudness import loudness_level, time_varying_loudness
-from klack.acoustics.nonlinear_decay import nonlinear_decay
+from klack.acoustics.loudness import loudness_level, nonlinear_decay, time_varying_loudness
 from klack.acoustics.signal_statistics import pressure_third_octaves, weighted, weighting
 from klack.acoustics.sound import click_pressure
 from klack.acoustics.third_octave import band_edges, band_energies, middle_frequencies
