@@ -224,17 +224,14 @@ class Receiver(Protocol):
     @property
     def points(self) -> tuple[InterfacePoint, ...]:
         """Points in the receiver's own frame."""
-        ...
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
         """Freedoms of the columns and rows, n of them."""
-        ...
 
     @property
     def ears(self) -> tuple[str, ...]:
         """Names of the places where the sound pressure is known; may be none."""
-        ...
 
     def at(self, s: Complexes) -> ReceiverResponse:
         """Return mobility and transfers at ``s`` (k,) [1/s].
@@ -242,4 +239,3 @@ class Receiver(Protocol):
         Where only measured values exist, it rejects frequencies beyond them and an ``s`` that has
         a real part.
         """
-        ...

@@ -44,11 +44,9 @@ class Isolator(Protocol):
     @property
     def directions(self) -> tuple[int, ...]:
         """Directions 1 to 6 in which the element yields; the others are rigid."""
-        ...
 
     def stiffness(self, direction: int, s: Complexes) -> DynamicStiffness:
         """Return the stiffness of one direction at ``s`` (k,) [1/s]."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -58,7 +58,6 @@ class FluidProperties(Protocol):
 
     def at(self, temperature: float) -> FluidState:
         """Properties at a temperature [K]."""
-        ...
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -61,21 +61,17 @@ class LiquidLaw(Protocol):
 
     def density(self, pressure: ArrayLike) -> Values:
         """Density [kg/m^3] at the absolute pressure [Pa]."""
-        ...
 
     def bulk_modulus(self, pressure: ArrayLike) -> Values:
         """``rho dp/drho`` [Pa] at the absolute pressure [Pa]."""
-        ...
 
     @property
     def kinks(self) -> tuple[float, ...]:
         """Pressures [Pa] where the second derivative of the density jumps."""
-        ...
 
     @property
     def pressure_range(self) -> PressureRange:
         """Pressures for which the law holds."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

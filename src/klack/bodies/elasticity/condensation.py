@@ -36,15 +36,12 @@ class Halves(Protocol):
     @property
     def dtype(self) -> np.dtype[Any]:
         """Of the numbers of L."""
-        ...
 
     def forward(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
         """Solve L Y = B."""
-        ...
 
     def backward(self, Y: NDArray[np.float64]) -> NDArray[np.float64]:
         """Solve L^T X = Y."""
-        ...
 
 
 def reached_rows(factor: Halves, G: csr_array) -> NDArray[np.int64]:
