@@ -556,13 +556,6 @@ def test_arc_through_a_line_is_found():
         )
 
 
-def test_unknown_surface_name_lists_the_known_ones():
-    body = make(Line((1, 0), "foot"), Line((0, 1), "cone"), Line((0, 0), "axis"))
-
-    with pytest.raises(InputError, match="one of: foot, cone"):
-        body.surface_area("axis")
-
-
 FOLDER = Path(klack.mesh.files.__file__).parent
 
 

@@ -27,8 +27,6 @@ from klack.signals.sampled import Spectrum
 __all__ = [
     "CONCRETE_PLATE",
     "FORCE_REFERENCE",
-    "ISO_9611_VELOCITY_REFERENCE",
-    "POWER_REFERENCE",
     "STEEL_PLATE",
     "VELOCITY_REFERENCE",
     "SingleEquivalents",
@@ -39,12 +37,8 @@ __all__ = [
 
 VELOCITY_REFERENCE = 1e-9
 """[m/s], of EN 15657."""
-ISO_9611_VELOCITY_REFERENCE = 5e-8
-"""[m/s]."""
 FORCE_REFERENCE = 1e-6
 """[N]."""
-POWER_REFERENCE = 1e-12
-"""[W]."""
 
 _CONCRETE = Material(name="concrete", young=30e9, poisson=0.2, density=2300.0)
 _STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7800.0)

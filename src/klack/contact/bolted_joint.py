@@ -44,7 +44,7 @@ from klack.bodies.elasticity.shape_functions import shape_functions
 from klack.contact.complementarity import ComplementaritySolver
 from klack.materials.material import Material
 from klack.mesh.families import FAMILIES
-from klack.mesh.joint import FlatJoint, JointError
+from klack.mesh.joint import FlatJoint, JointError, refuse_joint_if
 from klack.mesh.mesh import FaceBlock, Mesh
 from klack.units import format_si
 
@@ -121,8 +121,12 @@ def clamped_state(
         A = P.T @ condensed_inverse(factor, csr_array(forces[:, free])) @ P
         unit, closed = _pressed(0.5 * (A + A.T), lever)
         stiffness = float(unit.sum())
-        if stiffness <= 0.0 or np.any(np.abs(lever.T @ unit) > _ASIDE * stiffness):
-            raise _wrong(joint, "beside the face where they touch", "a middle within it")
+        _wrong_if(
+            stiffness <= 0.0 or np.any(np.abs(lever.T @ unit) > _ASIDE * stiffness),
+            joint,
+            "beside the face where they touch",
+            "a middle within it",
+        )
         contact = unit * (preload / stiffness)
         u = np.zeros(parted.mesh.dof_count)
         u[free] = factor.solve((forces.T @ (P @ contact))[free])
@@ -213,8 +217,12 @@ def _loads(mesh: Mesh, parted: PartedBody, joint: FlatJoint) -> tuple[Floats, Fl
             if np.isin(faces.connectivity, block.connectivity).all(axis=1).any()
         }
         sides = {part_of[owner] for owner in owners}
-        if len(sides) > 1:
-            raise _wrong(joint, f"'{end}' is on both sides of the joint", "one face on either side")
+        _wrong_if(
+            len(sides) > 1,
+            joint,
+            f"'{end}' is on both sides of the joint",
+            "one face on either side",
+        )
         away = 1.0 if sides == {part_of[joint.upper]} else -1.0
         weight, facing = np.zeros(mesh.node_count), []
         for block in surface.blocks:
@@ -222,29 +230,33 @@ def _loads(mesh: Mesh, parted: PartedBody, joint: FlatJoint) -> tuple[Floats, Fl
             np.add.at(weight, block.connectivity, np.einsum("qi,fq->fi", N, size))
             facing.append(away * (normal @ joint.normal).ravel())
         normal = np.concatenate(facing)
-        if normal.min() < -_FACING:
-            raise _wrong(joint, f"'{end}', a face towards the joint", "faces away from the joint")
+        _wrong_if(
+            normal.min() < -_FACING,
+            joint,
+            f"'{end}', a face towards the joint",
+            "faces away from the joint",
+        )
         weight /= weight.sum()
         own = np.unique(np.concatenate([nodes_of(parted.mesh, owner) for owner in owners]))
         load[own] -= away * weight[parted.nodes[own]][:, None] * joint.normal
         middles[away] = weight @ mesh.points
         if normal.max() < 1.0 - _LEVEL:
             rims += [mesh.points[np.unique(block.rim[:, :2])] for block in surface.blocks]
-    if len(middles) < 2:
-        raise _wrong(joint, "the same side of the joint", "one edge on either side")
+    _wrong_if(len(middles) < 2, joint, "the same side of the joint", "one edge on either side")
     both = np.array([middles[-1.0], middles[1.0]])
     aside = float(np.linalg.norm(joint.across @ (both[1] - both[0])))
-    if aside > _ASIDE * joint.length:
-        raise _wrong(
-            joint,
-            f"their middles are {format_si(aside, 'm', 3)} apart across the bolts",
-            "ends that face each other",
-        )
+    _wrong_if(
+        aside > _ASIDE * joint.length,
+        joint,
+        f"their middles are {format_si(aside, 'm', 3)} apart across the bolts",
+        "ends that face each other",
+    )
     return load.ravel(), both, np.vstack(rims)
 
 
-def _wrong(joint: FlatJoint, got: str, expected: str) -> JointError:
-    return JointError(
+def _wrong_if(wrong: object, joint: FlatJoint, got: str, expected: str) -> None:
+    refuse_joint_if(
+        wrong,
         joint.name,
         got=f"bolts between {joint.ends[0]} and {joint.ends[1]}: {got}",
         expected=f"{expected}: the bolts press '{joint.lower}' and '{joint.upper}' together",

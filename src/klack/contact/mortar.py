@@ -217,8 +217,7 @@ def contact_space(
     others = {"a": sides["b"], "b": sides["a"]}
     looked_at = ("a", "b") if slave is None else (slave,)
     gaps = {side: face_gaps(*sides[side], *others[side], form) for side in looked_at}
-    if not all(np.any(np.isfinite(gap)) for gap in gaps.values()):
-        raise _not_facing(surface_a, surface_b)
+    _not_facing_if(not all(np.any(np.isfinite(gap)) for gap in gaps.values()), surface_a, surface_b)
     floor = min(float(np.nanmin(gap)) for gap in gaps.values())
     if reach is None:
         points = _POINTS_BY_COST[mesh_a.dimension]
@@ -813,8 +812,7 @@ def touching_shift(
         After 30 moves.
     """
     shift = -axial_distance(mesh_a, surface_a, mesh_b, surface_b)
-    if not np.isfinite(shift):
-        raise _not_facing(surface_a, surface_b)
+    _not_facing_if(not np.isfinite(shift), surface_a, surface_b)
     along = np.zeros(mesh_a.dimension)
     slave: Literal["a", "b"] | None = None
     slope, before, moved = 1.0, 0.0, 0.0
@@ -843,8 +841,9 @@ def touching_shift(
     )
 
 
-def _not_facing(surface_a: Surface, surface_b: Surface) -> InputError:
-    return InputError(
+def _not_facing_if(wrong: object, surface_a: Surface, surface_b: Surface) -> None:
+    refuse_if(
+        wrong,
         f"contact of surface '{surface_a.name}' with surface '{surface_b.name}'",
         got="no line along a surface normal that meets the front of the other surface",
         expected="two surfaces that face each other",

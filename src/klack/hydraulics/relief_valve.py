@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from klack.hydraulics.network_fluid import fixed_viscosity
 from klack.hydraulics.opening import OpeningComponent, opening_flow
-from klack.input.problem import CaseProblem
+from klack.input.problem import CaseProblem, refuse_key_if
 from klack.machine.compiling.jit import njit
 from klack.network.port import FLOW, Port
 from klack.network.ranges import value_text
@@ -126,22 +126,22 @@ class ReliefValve(OpeningComponent):
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         self._exactly_one(("diameter", "area"), "size when fully open")
-        if self.rated_pressure <= self.set_pressure:
-            raise CaseProblem(
-                ("rated_pressure",),
-                got=f"{value_text(self.rated_pressure, 'Pa')} at a set pressure of "
-                f"{value_text(self.set_pressure, 'Pa')}",
-                expected="more than the set pressure",
-                hint="use a point of the characteristic above the set pressure.",
-            )
-        if self.hysteresis >= self.set_pressure:
-            raise CaseProblem(
-                ("hysteresis",),
-                got=f"{value_text(self.hysteresis, 'Pa')} at a set pressure of "
-                f"{value_text(self.set_pressure, 'Pa')}",
-                expected="less than the set pressure",
-                hint="give the difference between opening and closing pressure.",
-            )
+        refuse_key_if(
+            self.rated_pressure <= self.set_pressure,
+            ("rated_pressure",),
+            got=f"{value_text(self.rated_pressure, 'Pa')} at a set pressure of "
+            f"{value_text(self.set_pressure, 'Pa')}",
+            expected="more than the set pressure",
+            hint="use a point of the characteristic above the set pressure.",
+        )
+        refuse_key_if(
+            self.hysteresis >= self.set_pressure,
+            ("hysteresis",),
+            got=f"{value_text(self.hysteresis, 'Pa')} at a set pressure of "
+            f"{value_text(self.set_pressure, 'Pa')}",
+            expected="less than the set pressure",
+            hint="give the difference between opening and closing pressure.",
+        )
         return self
 
     @property

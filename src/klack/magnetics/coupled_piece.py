@@ -170,15 +170,13 @@ def coupled_solve(
     middle: Any,
     size: float,
     modes: Any,
-    charged: Any,
     voltage: Any,
     shut: Any,
     mean: Any,
 ) -> bool:
     """Find the changes of all fluxes over a piece (in: a guess) and the mean currents [A].
 
-    ``shut`` is 1 for windings that conduct, ``charged`` are the capacitors after the first half of
-    their converters' work.  False without convergence.
+    ``shut`` is 1 for windings that conduct.  False without convergence.
     """
     g, z = stack(phi, 48), stack(phi, 48)
     B = stack(phi, 64)
@@ -274,9 +272,7 @@ def coupled_rates(
     for _ in range(windings + 1):  # one that begins to conduct may let another begin
         for j in range(fluxes):
             rates[j] = 0.0
-        if not coupled_solve(
-            par, hints, phi, rates, middle, size, modes, charged, voltage, conducts, mean
-        ):
+        if not coupled_solve(par, hints, phi, rates, middle, size, modes, voltage, conducts, mean):
             return False
         starts = False
         for w in range(windings):
@@ -370,9 +366,7 @@ def coupled_locate(
             # the voltage of a course is that of the whole piece, straight as it is
             at = now + 0.5 * length - cycles[w]
             voltage[w] = winding_voltage(par, winding_row(par, w), modes[w], charged, at)
-        if not coupled_solve(
-            par, hints, phi, change, middle, size, modes, charged, voltage, shut, mean
-        ):
+        if not coupled_solve(par, hints, phi, change, middle, size, modes, voltage, shut, mean):
             return -1.0
         if empties:
             c = int(par[row + 4])

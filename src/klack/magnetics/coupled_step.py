@@ -203,9 +203,7 @@ def coupled_step(par, state, inp, out):  # type: ignore[no-untyped-def]
         for w in range(windings):
             middle_time = now + 0.5 * piece - cycle[w]
             voltage[w] = winding_voltage(par, winding_row(par, w), mode[w], charged, middle_time)
-        if not coupled_solve(
-            par, hints, phi, change, middle, piece, mode, charged, voltage, shut, mean
-        ):
+        if not coupled_solve(par, hints, phi, change, middle, piece, mode, voltage, shut, mean):
             return 1
         bent = False
         for m in range(magnets):
@@ -228,9 +226,7 @@ def coupled_step(par, state, inp, out):  # type: ignore[no-untyped-def]
             if not starts:
                 break
             last = 0.0
-            if not coupled_solve(
-                par, hints, phi, change, middle, piece, mode, charged, voltage, shut, mean
-            ):
+            if not coupled_solve(par, hints, phi, change, middle, piece, mode, voltage, shut, mean):
                 return 1
         # the first event of any winding, and again from its end
         event, which, failed, stays = -1, NO_SWITCH, False, True

@@ -57,8 +57,6 @@ class ForceComparison:
     step [A], [A], [m]
         Two neighbouring currents and the gap where ``dF`` and ``(dpsi/dx) di`` differ most: there
         the contradiction arises.
-    step_share [-]
-        That difference over the largest given force.
     """
 
     current: float
@@ -68,7 +66,6 @@ class ForceComparison:
     share: float
     ratio: float
     step: tuple[float, float, float]
-    step_share: float
 
     def advice(self) -> str:
         """Likely reason."""
@@ -257,7 +254,6 @@ class FluxMap:
             share=float(apart[k, j]) / peak,
             ratio=float(np.sum(given * derived) / (np.sum(derived**2) or 1.0)),
             step=(float(i[s]), float(i[s + 1]), float(self.gap[g])),
-            step_share=float(changes[s, g]) / peak,
         )
 
     def _require_force(self, i: Vector, psi: Vector, force: Vector) -> None:

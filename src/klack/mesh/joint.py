@@ -17,6 +17,7 @@ __all__ = [
     "cylinder_joint",
     "edges_of_two",
     "flat_joint",
+    "refuse_joint_if",
 ]
 
 
@@ -26,6 +27,12 @@ class JointError(InputError):
     def __init__(self, name: str, *, got: str, expected: str, hint: str) -> None:
         self.name = name
         super().__init__(f"joint '{name}'", got=got, expected=expected, hint=hint)
+
+
+def refuse_joint_if(wrong: object, name: str, *, got: str, expected: str, hint: str) -> None:
+    """Raise :class:`JointError` where an edge or a face cannot be a joint."""
+    if wrong:
+        raise JointError(name, got=got, expected=expected, hint=hint)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,21 +109,20 @@ def cylinder_joint(profiles: Mapping[str, Profile], name: str) -> Joint:
     (one, own), (two, others) = edges_of_two(profiles, name).items()
     size = max(abs(x) for c in (*own, *others) for x in (*c.start, *c.end))
     radii = [r for curve in (*own, *others) for r, _ in (curve.start, curve.end)]
-    if min(radii) <= SAME * size:
-        raise JointError(
-            name,
-            got="an edge on the axis, or one that ends there",
-            expected="a cylinder around the axis",
-            hint="name the edge where the outer part meets the inner one.",
-        )
-    if max(radii) - min(radii) > SAME * size or any(c.centre is not None for c in own):
-        raise JointError(
-            name,
-            got="an edge that is not parallel to the axis, or edges of several radii",
-            expected="a cylinder: straight edges of one radius",
-            hint="press fits on cones and flat faces are not supported; draw and name the "
-            "cylinder.",
-        )
+    refuse_joint_if(
+        min(radii) <= SAME * size,
+        name,
+        got="an edge on the axis, or one that ends there",
+        expected="a cylinder around the axis",
+        hint="name the edge where the outer part meets the inner one.",
+    )
+    refuse_joint_if(
+        max(radii) - min(radii) > SAME * size or any(c.centre is not None for c in own),
+        name,
+        got="an edge that is not parallel to the axis, or edges of several radii",
+        expected="a cylinder: straight edges of one radius",
+        hint="press fits on cones and flat faces are not supported; draw and name the cylinder.",
+    )
     _require_same_ends(name, one, own, two, others)
     upwards = own[0].end[1] > own[0].start[1]  # the material is on the left: inside
     return Joint(
@@ -144,14 +150,13 @@ def flat_joint(profiles: Mapping[str, Profile], name: str, ends: tuple[str, str]
     (one, own), (two, others) = edges_of_two(profiles, name).items()
     size = max(abs(x) for c in (*own, *others) for x in (*c.start, *c.end))
     heights = [z for curve in (*own, *others) for _, z in (curve.start, curve.end)]
-    if max(heights) - min(heights) > SAME * size or any(c.centre is not None for c in own):
-        raise JointError(
-            name,
-            got="an edge that is not perpendicular to the axis, or edges at several heights",
-            expected="a flat face: straight edges of one z",
-            hint="bolts press along the axis; draw and name the flat face (cones are not "
-            "supported).",
-        )
+    refuse_joint_if(
+        max(heights) - min(heights) > SAME * size or any(c.centre is not None for c in own),
+        name,
+        got="an edge that is not perpendicular to the axis, or edges at several heights",
+        expected="a flat face: straight edges of one z",
+        hint="bolts press along the axis; draw and name the flat face (cones are not supported).",
+    )
     _require_same_ends(name, one, own, two, others)
     for end in ends:
         curves = [(solid, c) for solid, p in profiles.items() for c in p.curves if c.name == end]
@@ -181,15 +186,14 @@ def _require_same_ends(
     name: str, one: str, own: Sequence[Curve], two: str, others: Sequence[Curve]
 ) -> None:
     size = max(abs(x) for c in (*own, *others) for x in (*c.start, *c.end))
-    if len(own) != len(others) or not all(
-        any(_same(curve, other, size) for other in others) for curve in own
-    ):
-        raise JointError(
-            name,
-            got=f"edges of '{one}' and '{two}' with different ends",
-            expected="the same two ends in both parts",
-            hint="end the edges of both parts at the same points, as for glued parts.",
-        )
+    refuse_joint_if(
+        len(own) != len(others)
+        or not all(any(_same(curve, other, size) for other in others) for curve in own),
+        name,
+        got=f"edges of '{one}' and '{two}' with different ends",
+        expected="the same two ends in both parts",
+        hint="end the edges of both parts at the same points, as for glued parts.",
+    )
 
 
 def edges_of_two(profiles: Mapping[str, Profile], name: str) -> dict[str, list[Curve]]:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import ElementBlock, FaceBlock, Mesh, Surface
 from klack.mesh.occ import MM, box_mm, glue, matching_curves, plane_face
@@ -50,13 +50,13 @@ def mesh_meridian(profiles: Mapping[str, Profile], sizing: MeshSizing) -> Mesh:
     sizing
         Refinements are rings (r, z), or points (0, 0, z) on the axis.
     """
-    if not profiles:
-        raise InputError(
-            "mesh_meridian: profiles",
-            got="none",
-            expected="one profile per solid",
-            hint="give a mapping of solid name to Profile.",
-        )
+    refuse_if(
+        not profiles,
+        "mesh_meridian: profiles",
+        got="none",
+        expected="one profile per solid",
+        hint="give a mapping of solid name to Profile.",
+    )
     names = tuple(dict.fromkeys(name for p in profiles.values() for name in p.names))
     sizing.require_surfaces(names)
     lengths: dict[str, float] = {}
@@ -138,13 +138,13 @@ def _meridian_points(refinement: Any, shape: Any) -> NDArray[np.float64]:
     """Points of constant size within the box of the shape, shape (n, 2) [mm]."""
     if not refinement.is_ring:
         x, y, z = refinement.position
-        if np.hypot(x, y) > 0:
-            raise InputError(
-                "mesh_meridian: refinement",
-                got=f"a point at ({x:g}, {y:g}, {z:g}) m, not on the axis",
-                expected="a ring (r, z), or a point on the axis",
-                hint="an axisymmetric mesh can only be refined on rings: give (r, z).",
-            )
+        refuse_if(
+            np.hypot(x, y) > 0,
+            "mesh_meridian: refinement",
+            got=f"a point at ({x:g}, {y:g}, {z:g}) m, not on the axis",
+            expected="a ring (r, z), or a point on the axis",
+            hint="an axisymmetric mesh can only be refined on rings: give (r, z).",
+        )
         refinement = type(refinement)(
             position=(0.0, z), size=refinement.size, radius=refinement.radius
         )

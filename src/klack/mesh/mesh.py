@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.mesh.families import FAMILIES, ElementFamily
 from klack.mesh.rigid import Pose
 
@@ -174,13 +174,13 @@ class Mesh:
 
     def placed(self, pose: Pose) -> Self:
         """Turn and shift the mesh of a solid rigidly; not an axisymmetric one."""
-        if self.dimension != 3:
-            raise InputError(
-                "mesh: rigid displacement",
-                got="an axisymmetric body",
-                expected="a solid",
-                hint="use 'model: swept' with 'layers: 18'; for a shift along z use 'moved'.",
-            )
+        refuse_if(
+            self.dimension != 3,
+            "mesh: rigid displacement",
+            got="an axisymmetric body",
+            expected="a solid",
+            hint="use 'model: swept' with 'layers: 18'; for a shift along z use 'moved'.",
+        )
         return replace(self, points=pose.of(self.points))
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.mesh.profile import Curve, Profile
 
 __all__ = ["MM", "box_mm", "glue", "matching_curves", "plane_face", "revolved_solids"]
@@ -36,13 +36,13 @@ def revolved_solids(profiles: Mapping[str, Profile]) -> list[Any]:
     """Full turns of the profiles around z; solids and faces carry their names."""
     from netgen.occ import Axis, X, Y
 
-    if not profiles:
-        raise InputError(
-            "profiles",
-            got="none",
-            expected="one profile per solid",
-            hint="give a mapping of solid name to Profile.",
-        )
+    refuse_if(
+        not profiles,
+        "profiles",
+        got="none",
+        expected="one profile per solid",
+        hint="give a mapping of solid name to Profile.",
+    )
     solids = []
     for name, profile in profiles.items():
         face = plane_face(profile)

@@ -14,7 +14,7 @@ from functools import cache, cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.mesh.moments import Moments
 
 __all__ = ["Arc", "Curve", "Line", "Profile", "on_axis"]
@@ -93,8 +93,8 @@ class Curve:
         """Distance of points to the edge [m]."""
         return np.linalg.norm(np.asarray(points) - self.at(self.fraction(points)), axis=-1)
 
-    def quadrature(self, order: int = 24) -> tuple[NDArray, NDArray, NDArray]:
-        """Points (q, 2) [m], tangents times weight (q, 2) [m], lengths times weight (q,) [m]."""
+    def quadrature(self, order: int = 24) -> tuple[NDArray, NDArray]:
+        """Points (q, 2) [m], tangents times weight (q, 2) [m]."""
         x, w = _gauss(order)
         s, w = 0.5 * (x + 1), 0.5 * w
         points = self.at(s)
@@ -103,7 +103,7 @@ class Curve:
         else:
             d = points - np.array(self.centre)
             tangent = self.angle * np.column_stack([-d[:, 1], d[:, 0]])
-        return points, tangent * w[:, None], self.length * w
+        return points, tangent * w[:, None]
 
 
 @cache
@@ -263,35 +263,15 @@ class Profile:
         first = np.array([0.0, 0.0, self.volume * self.centre])
         return Moments.about_origin(self.volume, first, np.diag([across, across, along]))
 
-    def surface_area(self, name: str) -> float:
-        """Area swept by the edges called ``name`` [m^2]."""
-        if name not in self.names:
-            raise InputError(
-                f"Profile.surface_area('{name}')",
-                got="a name that is not in the profile",
-                expected=f"one of: {', '.join(self.names) or 'none'}",
-                hint="name the edge where the profile is made.",
-            )
-        total = 0.0
-        for curve in self.curves:
-            if curve.name == name:
-                points, _, length = curve.quadrature()
-                total += float(2 * np.pi * points[:, 0] @ length)
-        return total
-
     def _integral(self, m: int, n: int) -> float:
         """Integral of r^m z^n over the meridian [m^(m+n+2)]."""
         return sum(_moment(curve, m, n) for curve in self.curves)
 
 
 def _moment(curve: Curve, m: int, n: int) -> float:
-    points, tangent, _ = curve.quadrature()
+    points, tangent = curve.quadrature()
     r, z = points.T
     return float(np.sum(r ** (m + 1) / (m + 1) * z**n * tangent[:, 1]))
-
-
-def _error(where: str, got: str, expected: str, hint: str) -> InputError:
-    return InputError(where, got=got, expected=expected, hint=hint)
 
 
 def _text(point: NDArray | Point) -> str:
@@ -302,21 +282,21 @@ def _chain(start: Point, edges: tuple[Line | Arc, ...]) -> tuple[Curve, ...]:
     """Edges with both ends; checks numbers, closure, r >= 0."""
     corners = np.array([start, *(edge.end for edge in edges)], dtype=float)
     centres = np.array([e.centre for e in edges if isinstance(e, Arc)], dtype=float)
-    if len(edges) < 2 or not (np.all(np.isfinite(corners)) and np.all(np.isfinite(centres))):
-        raise _error(
-            "Profile.edges",
-            f"{len(edges)} edges" if len(edges) < 2 else "a coordinate that is not finite",
-            "at least two edges with finite (r, z) in m",
-            "list the edges in order, each with its end point.",
-        )
+    refuse_if(
+        len(edges) < 2 or not (np.all(np.isfinite(corners)) and np.all(np.isfinite(centres))),
+        "Profile.edges",
+        got=f"{len(edges)} edges" if len(edges) < 2 else "a coordinate that is not finite",
+        expected="at least two edges with finite (r, z) in m",
+        hint="list the edges in order, each with its end point.",
+    )
     size = float(np.ptp(corners, axis=0).max())
-    if np.linalg.norm(corners[-1] - corners[0]) > SAME * size:
-        raise _error(
-            f"Profile: edge {len(edges)} '{edges[-1].name}'",
-            f"an end at {_text(corners[-1])}",
-            f"the start of the profile, {_text(corners[0])}",
-            "add the edge that closes the profile (often the axis).",
-        )
+    refuse_if(
+        np.linalg.norm(corners[-1] - corners[0]) > SAME * size,
+        f"Profile: edge {len(edges)} '{edges[-1].name}'",
+        got=f"an end at {_text(corners[-1])}",
+        expected=f"the start of the profile, {_text(corners[0])}",
+        hint="add the edge that closes the profile (often the axis).",
+    )
     corners[-1] = corners[0]
     corners[np.abs(corners[:, 0]) < SAME * size, 0] = 0.0
     curves = []
@@ -324,13 +304,13 @@ def _chain(start: Point, edges: tuple[Line | Arc, ...]) -> tuple[Curve, ...]:
         where = f"Profile: edge {i + 1} '{edge.name}'"
         curve = _curve(where, corners[i], corners[i + 1], edge, size)
         lowest = curve.at(np.linspace(0, 1, 65))[:, 0].min()
-        if lowest < -SAME * size:
-            raise _error(
-                where,
-                f"a radius of {lowest * 1e3:.6g} mm",
-                "r >= 0 everywhere",
-                "draw the half of the section at positive r.",
-            )
+        refuse_if(
+            lowest < -SAME * size,
+            where,
+            got=f"a radius of {lowest * 1e3:.6g} mm",
+            expected="r >= 0 everywhere",
+            hint="draw the half of the section at positive r.",
+        )
         curves.append(curve)
     return tuple(curves)
 
@@ -338,25 +318,25 @@ def _chain(start: Point, edges: tuple[Line | Arc, ...]) -> tuple[Curve, ...]:
 def _curve(where: str, start: NDArray, end: NDArray, edge: Line | Arc, size: float) -> Curve:
     first: Point = (float(start[0]), float(start[1]))
     last: Point = (float(end[0]), float(end[1]))
-    if np.linalg.norm(end - start) <= SAME * size:
-        raise _error(
-            where,
-            "an edge of zero length",
-            "different start and end",
-            "remove the edge; a full circle needs two arcs.",
-        )
+    refuse_if(
+        np.linalg.norm(end - start) <= SAME * size,
+        where,
+        got="an edge of zero length",
+        expected="different start and end",
+        hint="remove the edge; a full circle needs two arcs.",
+    )
     if isinstance(edge, Line):
         return Curve(first, last, edge.name)
     centre = np.array(edge.centre, dtype=float)
     a, b = start - centre, end - centre
     ra, rb = np.hypot(*a), np.hypot(*b)
-    if abs(ra - rb) > 1e-6 * max(ra, rb):
-        raise _error(
-            where,
-            f"a centre {ra * 1e3:.6g} mm from the start and {rb * 1e3:.6g} mm from the end",
-            "the same distance (the radius) to both",
-            "the centre must lie on the perpendicular bisector of start and end.",
-        )
+    refuse_if(
+        abs(ra - rb) > 1e-6 * max(ra, rb),
+        where,
+        got=f"a centre {ra * 1e3:.6g} mm from the start and {rb * 1e3:.6g} mm from the end",
+        expected="the same distance (the radius) to both",
+        hint="the centre must lie on the perpendicular bisector of start and end.",
+    )
     angle = float(np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b))
     # put the centre on the bisector exactly, so that both ends lie on one circle
     chord = end - start
@@ -377,13 +357,13 @@ def _half_circle_sense(where: str, start: Point, end: Point, centre: Point) -> b
         >= -1e-6 * np.hypot(start[0] - centre[0], start[1] - centre[1])
         for angle in (np.pi, -np.pi)
     ]
-    if keeps[0] == keeps[1]:
-        raise _error(
-            where,
-            "a half circle, whose two arcs are equally long",
-            "clockwise True or False",
-            "set clockwise, or split the arc in two.",
-        )
+    refuse_if(
+        keeps[0] == keeps[1],
+        where,
+        got="a half circle, whose two arcs are equally long",
+        expected="clockwise True or False",
+        hint="set clockwise, or split the arc in two.",
+    )
     return keeps[1]
 
 
@@ -406,9 +386,9 @@ def _require_simple(curves: tuple[Curve, ...]) -> None:
 
 
 def _raise_crossing(curves: tuple[Curve, ...], i: int, j: int, point: NDArray) -> None:
-    raise _error(
+    raise InputError(
         f"Profile: edges {i + 1} '{curves[i].name}' and {j + 1} '{curves[j].name}'",
-        f"a common point at {_text(point)}",
-        "edges that meet only at the corners that join them",
-        "check the order of the edges and the direction of the arcs.",
+        got=f"a common point at {_text(point)}",
+        expected="edges that meet only at the corners that join them",
+        hint="check the order of the edges and the direction of the arcs.",
     )

@@ -7,7 +7,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError, require_nonnegative, require_positive
+from klack.errors import InputError, refuse_if, require_nonnegative, require_positive
 from klack.machine.memory import available_memory, require_memory
 from klack.units import format_si
 
@@ -40,13 +40,13 @@ class Refinement:
     radius: float = 0.0
 
     def __post_init__(self) -> None:
-        if len(self.position) not in (2, 3):
-            raise InputError(
-                "Refinement.position",
-                got=f"{len(self.position)} numbers",
-                expected="two (r, z) for a ring or three (x, y, z) for a point [m]",
-                hint="give (r, z) of the contact ring.",
-            )
+        refuse_if(
+            len(self.position) not in (2, 3),
+            "Refinement.position",
+            got=f"{len(self.position)} numbers",
+            expected="two (r, z) for a ring or three (x, y, z) for a point [m]",
+            hint="give (r, z) of the contact ring.",
+        )
         require_positive("Refinement.size", self.size, "m")
         require_nonnegative("Refinement.radius", self.radius, "m")
 
@@ -90,13 +90,13 @@ class MeshSizing:
         require_positive("MeshSizing.size", self.size, "m")
         for name, size in self.surfaces.items():
             require_positive(f"MeshSizing.surfaces['{name}']", size, "m")
-        if not 0 < self.grading <= 1:
-            raise InputError(
-                "MeshSizing.grading",
-                got=f"{self.grading:g}",
-                expected="a number above 0 and up to 1",
-                hint="0.3 is usual; smaller values grow more slowly.",
-            )
+        refuse_if(
+            not 0 < self.grading <= 1,
+            "MeshSizing.grading",
+            got=f"{self.grading:g}",
+            expected="a number above 0 and up to 1",
+            hint="0.3 is usual; smaller values grow more slowly.",
+        )
 
     @property
     def smallest(self) -> float:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import ElementBlock, FaceTable, Mesh, Surface
 from klack.mesh.occ import MM, box_mm, glue, revolved_solids
@@ -86,22 +86,22 @@ def read_step(path: Path) -> Any:
     """
     from netgen.occ import OCCGeometry
 
-    if not path.is_file():
-        raise InputError(
-            str(path),
-            got="no such file",
-            expected="a STEP file (.step, .stp)",
-            hint="check the path; it is relative to where you started the program.",
-        )
+    refuse_if(
+        not path.is_file(),
+        str(path),
+        got="no such file",
+        expected="a STEP file (.step, .stp)",
+        hint="check the path; it is relative to where you started the program.",
+    )
     with path.open("rb") as file:
         start = file.read(2048).lstrip().decode("latin-1")
-    if not start.startswith("ISO-10303-21"):
-        raise InputError(
-            str(path),
-            got=f"a file that starts with {start[:24]!r}" if start else "an empty file",
-            expected="a STEP file, which starts with 'ISO-10303-21;'",
-            hint="export the part as STEP (AP214 or AP242) from the CAD program.",
-        )
+    refuse_if(
+        not start.startswith("ISO-10303-21"),
+        str(path),
+        got=f"a file that starts with {start[:24]!r}" if start else "an empty file",
+        expected="a STEP file, which starts with 'ISO-10303-21;'",
+        hint="export the part as STEP (AP214 or AP242) from the CAD program.",
+    )
     require_readable_step(path)
     try:
         shape = OCCGeometry(str(path)).shape
@@ -112,13 +112,13 @@ def read_step(path: Path) -> Any:
             expected="at least one closed solid",
             hint="open it in a CAD program, repair it and export it again.",
         ) from error
-    if not shape.solids:
-        raise InputError(
-            str(path),
-            got="no solid",
-            expected="at least one closed solid",
-            hint="export solids, not surfaces or a wire frame.",
-        )
+    refuse_if(
+        not shape.solids,
+        str(path),
+        got="no solid",
+        expected="at least one closed solid",
+        hint="export solids, not surfaces or a wire frame.",
+    )
     _require_areas(str(path), shape)
     return _glued(str(path), list(shape.solids))
 
@@ -137,13 +137,13 @@ def _require_areas(where: str, shape: Any) -> None:
 def _glued(where: str, solids: list[Any]) -> Any:
     """One shape of solids that share faces; rejects overlap."""
     shape = glue(solids)
-    if len(shape.solids) != len(solids):
-        raise InputError(
-            where,
-            got=f"{len(shape.solids)} regions of space from {len(solids)} solids",
-            expected="solids that touch at faces and do not overlap",
-            hint="cut the common volume out of one of the solids in the CAD program.",
-        )
+    refuse_if(
+        len(shape.solids) != len(solids),
+        where,
+        got=f"{len(shape.solids)} regions of space from {len(solids)} solids",
+        expected="solids that touch at faces and do not overlap",
+        hint="cut the common volume out of one of the solids in the CAD program.",
+    )
     return shape
 
 
@@ -259,13 +259,13 @@ def _abaqus_order(points: NDArray[np.float64], nodes: NDArray[np.int64]) -> NDAr
     middle = points[nodes[:, edges]].mean(axis=2)  # (n, 6, 3)
     gap = np.linalg.norm(points[nodes[:, 4:]][:, None, :, :] - middle[:, :, None, :], axis=-1)
     order = np.median(gap, axis=0).argmin(axis=1)
-    if len(set(order.tolist())) != 6:
-        raise InputError(
-            "netgen mesh",
-            got="mid nodes that are not each near the middle of one edge",
-            expected="one mid node per edge",
-            hint="choose a smaller element size.",
-        )
+    refuse_if(
+        len(set(order.tolist())) != 6,
+        "netgen mesh",
+        got="mid nodes that are not each near the middle of one edge",
+        expected="one mid node per edge",
+        hint="choose a smaller element size.",
+    )
     nodes = np.hstack([nodes[:, :4], nodes[:, 4 + order]])
     # swapping corners 0 and 1 swaps edges (1,2)-(2,0) and (0,3)-(1,3)
     nodes[flip] = nodes[flip][:, [1, 0, 2, 3, 4, 6, 5, 8, 7, 9]]

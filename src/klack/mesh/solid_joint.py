@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from klack.mesh.joint import FlatJoint, Joint, JointError, across
+from klack.mesh.joint import FlatJoint, Joint, JointError, across, refuse_joint_if
 from klack.mesh.mesh import Mesh
 from klack.mesh.parting import parted
 
@@ -23,8 +23,9 @@ def solid_joint(mesh: Mesh, name: str) -> Joint:
     faces = _Faces.of(mesh, name)
     points, sizes, ways = faces.points, faces.sizes, faces.ways
     centre, extent = points.mean(axis=0), faces.extent
-    if sizes[1] < _FLAT * sizes[2]:
-        raise _no_cylinder(name, "a flat face, or one with very little curvature")
+    _no_cylinder_if(
+        sizes[1] < _FLAT * sizes[2], name, "a flat face, or one with very little curvature"
+    )
 
     def cylinder(x: Floats) -> tuple[Floats, Floats]:
         axis = ways[:, 0] + ways[:, 1:] @ x[:2]
@@ -37,8 +38,11 @@ def solid_joint(mesh: Mesh, name: str) -> Joint:
     middle, axis = cylinder(found.x)
     radius = extent * float(found.x[4])
     out = np.einsum("fi,fi->f", faces.normal, across(faces.middle, middle, axis))
-    if np.abs(found.fun).max() * extent > _EVEN * radius or out.min() * out.max() <= 0.0:
-        raise _no_cylinder(name, "faces that do not form one cylinder")
+    _no_cylinder_if(
+        np.abs(found.fun).max() * extent > _EVEN * radius or out.min() * out.max() <= 0.0,
+        name,
+        "faces that do not form one cylinder",
+    )
     one, two = faces.solids
     return Joint(
         name=name,
@@ -63,13 +67,13 @@ def flat_solid_joint(mesh: Mesh, name: str, ends: tuple[str, str]) -> FlatJoint:
     faces = _Faces.of(mesh, name)
     axis = faces.ways[:, 2] * np.sign(faces.ways[np.abs(faces.ways[:, 2]).argmax(), 2])
     up = faces.normal @ axis
-    if np.ptp(faces.points @ axis) > _EVEN * faces.extent or up.min() * up.max() <= 0.0:
-        raise JointError(
-            name,
-            got="faces that are not one plane",
-            expected="a flat face: bolts press at a right angle to it",
-            hint="name the flat face in the CAD file; a cone or a step is not computed.",
-        )
+    refuse_joint_if(
+        np.ptp(faces.points @ axis) > _EVEN * faces.extent or up.min() * up.max() <= 0.0,
+        name,
+        got="faces that are not one plane",
+        expected="a flat face: bolts press at a right angle to it",
+        hint="name the flat face in the CAD file; a cone or a step is not computed.",
+    )
     for end in ends:
         if end not in mesh.surfaces:
             raise JointError(
@@ -141,8 +145,9 @@ class _Faces:
         return float(np.ptp(self.points, axis=0).max())
 
 
-def _no_cylinder(name: str, got: str) -> JointError:
-    return JointError(
+def _no_cylinder_if(wrong: object, name: str, got: str) -> None:
+    refuse_joint_if(
+        wrong,
         name,
         got=got,
         expected="a cylinder: faces of one radius round one axis",

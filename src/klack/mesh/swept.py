@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.machine.memory import require_memory
 from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import ElementBlock, FaceBlock, Mesh, Surface
@@ -105,20 +105,20 @@ def sweep(meridian: Mesh, layers: int, start_angle: float = 0.0) -> Mesh:
 
 def _require_sweepable(meridian: Mesh, layers: int) -> None:
     families = sorted({block.family for block in meridian.blocks})
-    if families != ["tri6"]:
-        raise InputError(
-            "sweep: meridian",
-            got=f"elements {', '.join(families) or 'none'}",
-            expected="tri6 only",
-            hint="make the meridian with mesh_meridian.",
-        )
-    if layers < 6:
-        raise InputError(
-            "sweep: layers",
-            got=str(layers),
-            expected="at least 6 around the circumference",
-            hint="12 to 24 are usual.",
-        )
+    refuse_if(
+        families != ["tri6"],
+        "sweep: meridian",
+        got=f"elements {', '.join(families) or 'none'}",
+        expected="tri6 only",
+        hint="make the meridian with mesh_meridian.",
+    )
+    refuse_if(
+        layers < 6,
+        "sweep: layers",
+        got=str(layers),
+        expected="at least 6 around the circumference",
+        hint="12 to 24 are usual.",
+    )
 
 
 def _ring(meridian: Mesh, layers: int) -> _Ring:

@@ -18,7 +18,7 @@ import numpy as np
 from klack import __version__
 from klack.bodies.elasticity.body import ElasticBody, elastic_body
 from klack.bodies.elasticity.eigen import eigenmodes
-from klack.bodies.elasticity.given_matrices import body_of_matrices
+from klack.bodies.elasticity.given_matrices import checked_body
 from klack.bodies.model_files.reduced_models import read_state_space
 from klack.bodies.model_files.system import on_nodes, read_system
 from klack.bodies.reduction.from_state_space import body_of_state_space
@@ -116,8 +116,8 @@ def _matrices(body: ElasticBody, frequencies: np.ndarray, folder: Path) -> Itera
         here.mkdir()
         files = write_matrices(form, here, K, M, numbers[order // 3], order % 3 + 1)
         placed = on_nodes(read_system(files.stiffness, files.mass, dofs=files.dofs), numbers, 3)
-        given = body_of_matrices(
-            "block", body.mesh, placed.K * UNITS.stiffness, placed.M * UNITS.mass, fixed_nodes=()
+        given, _ = checked_body(
+            "block", body.mesh, placed.K * UNITS.stiffness, placed.M * UNITS.mass
         )
         yield _frequency_check(
             f"matrices, {form}",

@@ -17,7 +17,7 @@ from scipy.sparse import csr_array
 from klack.bodies.elasticity.kernels import add_elements, block_pattern, diagonal_blocks, node_graph
 from klack.bodies.elasticity.quadrature import Purpose, quadrature
 from klack.bodies.elasticity.shape_functions import shape_functions
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.machine.memory import require_memory
 from klack.materials.material import Material
 from klack.mesh.mesh import ElementBlock, Mesh
@@ -123,13 +123,13 @@ def _graph(mesh: Mesh, per_node: int) -> tuple[NDArray[np.int64], NDArray[np.int
     offsets = np.concatenate([[0], np.cumsum(np.concatenate(sizes))]).astype(np.int64)
     start, neighbours = node_graph(elements, offsets, mesh.node_count)
     size = mesh.node_count * per_node
-    if len(neighbours) * per_node**2 > np.iinfo(np.int32).max:
-        raise InputError(
-            "assemble: mesh",
-            got=f"{size} degrees of freedom",
-            expected="fewer than 2^31 matrix entries",
-            hint="use a coarser mesh away from the contact.",
-        )
+    refuse_if(
+        len(neighbours) * per_node**2 > np.iinfo(np.int32).max,
+        "assemble: mesh",
+        got=f"{size} degrees of freedom",
+        expected="fewer than 2^31 matrix entries",
+        hint="use a coarser mesh away from the contact.",
+    )
     entries = len(neighbours)
     require_memory(
         "assemble: mesh",

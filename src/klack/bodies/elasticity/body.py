@@ -25,7 +25,7 @@ from klack.bodies.elasticity.rigid_motions import (
     orthonormal_in_mass,
     rigid_motions,
 )
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.materials.material import Material
 from klack.mesh.mesh import Mesh
 
@@ -192,13 +192,13 @@ def require_support(
 ) -> None:
     """Reject a support that leaves rigid motions free, by their values where it holds."""
     left = motions_left_free(held)
-    if left:
-        raise InputError(
-            f"body '{name}': {key}",
-            got=f"{what} that leave {left} of {held.shape[1]} rigid motions free",
-            expected="a support that constrains the body, or none (a free body)",
-            hint=f"fix nodes that {hint}",
-        )
+    refuse_if(
+        left,
+        f"body '{name}': {key}",
+        got=f"{what} that leave {left} of {held.shape[1]} rigid motions free",
+        expected="a support that constrains the body, or none (a free body)",
+        hint=f"fix nodes that {hint}",
+    )
 
 
 def _check_one_piece(name: str, mesh: Mesh) -> None:

@@ -18,7 +18,7 @@ from scipy.sparse import csr_array
 from klack.bodies.elasticity.body import VibratingBody
 from klack.bodies.elasticity.factorization import Backend
 from klack.bodies.elasticity.statics import Flexibility
-from klack.errors import ConvergenceError, InputError, require_positive
+from klack.errors import ConvergenceError, refuse_if, require_positive
 from klack.machine.cache.entry import Entry
 from klack.machine.memory import require_memory
 
@@ -304,14 +304,14 @@ def rigid_frequencies(body: VibratingBody) -> NDArray[np.float64]:
         return np.zeros(0)
     squares = np.abs(np.linalg.eigvalsh(R.T @ (body.K @ R)))
     frequency = np.sqrt(squares) / (2.0 * np.pi)
-    if not frequency.max() < _RIGID_LIMIT and not squares.max() < _round_off(body):
-        raise InputError(
-            f"eigenmodes of body '{body.name}'",
-            got=f"a rigid motion with a frequency of {frequency.max():.3g} Hz",
-            expected=f"below {_RIGID_LIMIT:g} Hz for a free body",
-            hint="the stiffness matrix includes supports: name these as fixed_nodes, or remove "
-            "them from the matrix.",
-        )
+    refuse_if(
+        not frequency.max() < _RIGID_LIMIT and not squares.max() < _round_off(body),
+        f"eigenmodes of body '{body.name}'",
+        got=f"a rigid motion with a frequency of {frequency.max():.3g} Hz",
+        expected=f"below {_RIGID_LIMIT:g} Hz for a free body",
+        hint="the stiffness matrix includes supports: name these as fixed_nodes, or remove "
+        "them from the matrix.",
+    )
     return frequency
 
 
@@ -322,23 +322,23 @@ def _round_off(body: VibratingBody) -> float:
 
 
 def _check_request(body: VibratingBody, count: int | None, max_frequency: float | None) -> None:
-    if count is None and max_frequency is None:
-        raise InputError(
-            f"eigenmodes of body '{body.name}'",
-            got="neither count nor max_frequency",
-            expected="at least one of them",
-            hint="use count=50, or max_frequency=300e3 (Hz).",
-        )
+    refuse_if(
+        count is None and max_frequency is None,
+        f"eigenmodes of body '{body.name}'",
+        got="neither count nor max_frequency",
+        expected="at least one of them",
+        hint="use count=50, or max_frequency=300e3 (Hz).",
+    )
     if max_frequency is not None:
         require_positive("eigenmodes: max_frequency", max_frequency, "Hz")
     available = len(body.free) - body.rigid_modes.shape[1]
-    if count is not None and not 0 < count <= available:
-        raise InputError(
-            f"eigenmodes of body '{body.name}': count",
-            got=f"{count}",
-            expected=f"between 1 and {available}",
-            hint="request fewer modes, or refine the mesh.",
-        )
+    refuse_if(
+        count is not None and not 0 < count <= available,
+        f"eigenmodes of body '{body.name}': count",
+        got=f"{count}",
+        expected=f"between 1 and {available}",
+        hint="request fewer modes, or refine the mesh.",
+    )
 
 
 def _dense(body: VibratingBody) -> NDArray[np.float64]:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from klack.bodies.elasticity.budget import WITHOUT, Budget
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 
 __all__ = [
     "Backend",
@@ -52,30 +52,24 @@ class Factorization(Protocol):
     @property
     def backend(self) -> str:
         """Name of the solver."""
-        ...
 
     @property
     def size(self) -> int:
         """Number of rows."""
-        ...
 
     @property
     def nonzeros(self) -> int | None:
         """Entries of the factor; None where the solver does not report them."""
-        ...
 
     @property
     def memory(self) -> int | None:
         """Peak memory [byte]; None where the solver does not report it."""
-        ...
 
     def solve(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
         """Solve A X = B, B of shape (n,) or (n, m); 2-D results are column-major."""
-        ...
 
     def close(self) -> None:
         """Give the memory back; a second call does nothing."""
-        ...
 
     def __enter__(self) -> Self: ...
 
@@ -129,13 +123,13 @@ def factorize(
     >>> bool(np.allclose(x, [2 / 3, 1 / 3]))
     True
     """
-    if A.shape[0] != A.shape[1] or A.shape[0] == 0:
-        raise InputError(
-            "factorize: A",
-            got=f"a matrix of shape {A.shape}",
-            expected="a square matrix with at least one row",
-            hint="at least one degree of freedom must stay free.",
-        )
+    refuse_if(
+        A.shape[0] != A.shape[1] or A.shape[0] == 0,
+        "factorize: A",
+        got=f"a matrix of shape {A.shape}",
+        expected="a square matrix with at least one row",
+        hint="at least one degree of freedom must stay free.",
+    )
     A = A.tocsr()
     if not (A.diagonal() > 0).all():
         raise not_positive_definite(
@@ -195,13 +189,13 @@ def chosen_backend(backend: str) -> str:
     names = available_backends()
     if backend == "auto":
         return names[0]
-    if backend not in names:
-        raise InputError(
-            "factorize: backend",
-            got=f"'{backend}'",
-            expected=f"'auto' or one that is installed here: {', '.join(names)}",
-            hint="use 'auto', or install the package of that solver.",
-        )
+    refuse_if(
+        backend not in names,
+        "factorize: backend",
+        got=f"'{backend}'",
+        expected=f"'auto' or one that is installed here: {', '.join(names)}",
+        hint="use 'auto', or install the package of that solver.",
+    )
     return backend
 
 

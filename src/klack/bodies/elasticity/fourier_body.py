@@ -31,7 +31,7 @@ from klack.bodies.elasticity.assembly import assemble_order
 from klack.bodies.elasticity.body import checked_nodes, require_support
 from klack.bodies.elasticity.layer import Layer, LayerStiffness, layer_stiffness, with_layers
 from klack.bodies.elasticity.rigid_motions import held_best, on_axis, orthonormal_in_mass
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.materials.material import Material
 from klack.mesh.mesh import Mesh
 
@@ -165,20 +165,20 @@ def fourier_body(
         As of :func:`~klack.bodies.elasticity.body.elastic_body`.
     """
     where = f"body '{name}': Fourier order {order}"
-    if mesh.dimension != 2:
-        raise InputError(
-            where,
-            got="a solid",
-            expected="the half section of a body of revolution",
-            hint="modes of all orders are among those of a solid already.",
-        )
-    if order < 0:
-        raise InputError(
-            where,
-            got=f"{order}",
-            expected="0 or more",
-            hint="1 is bending; -1 is the same motion.",
-        )
+    refuse_if(
+        mesh.dimension != 2,
+        where,
+        got="a solid",
+        expected="the half section of a body of revolution",
+        hint="modes of all orders are among those of a solid already.",
+    )
+    refuse_if(
+        order < 0,
+        where,
+        got=f"{order}",
+        expected="0 or more",
+        hint="1 is bending; -1 is the same motion.",
+    )
     nodes = checked_nodes(name, mesh, fixed_nodes)
     K, M = assemble_order(mesh, materials, order)
     found = tuple(layer_stiffness(name, mesh, layer, K, order) for layer in layers)

@@ -37,12 +37,12 @@ from klack.bodies.elasticity.rigid_motions import (
     without_rigid_strain,
 )
 from klack.bodies.elasticity.statics import Flexibility
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.input.unit_systems import UnitSystem
 from klack.mesh.mesh import Mesh
 from klack.units import format_si
 
-__all__ = ["MatrixReport", "body_of_matrices", "check_matrices", "checked_body"]
+__all__ = ["MatrixReport", "check_matrices", "checked_body"]
 
 
 _DENSE = 400
@@ -64,14 +64,13 @@ def require_positive_mass(where: str, M: csr_array, free: NDArray[np.int64]) -> 
             scaled, k=1, which="SA", tol=1e-2, v0=start, return_eigenvectors=False
         )
         smallest = float(values[0])
-    if not smallest > 0:
-        raise InputError(
-            where,
-            got=f"a mass matrix with a negative eigenvalue ({smallest:.2g} of its diagonal)",
-            expected="a positive definite mass matrix",
-            hint="the entry is K, or only the off-diagonal part of M; use a consistent mass "
-            "matrix.",
-        )
+    refuse_if(
+        not smallest > 0,
+        where,
+        got=f"a mass matrix with a negative eigenvalue ({smallest:.2g} of its diagonal)",
+        expected="a positive definite mass matrix",
+        hint="the entry is K, or only the off-diagonal part of M; use a consistent mass matrix.",
+    )
 
 
 def first_frequency(where: str, body: ElasticBody) -> float:
@@ -238,18 +237,6 @@ def checked_body(
     return ElasticBody(name=name, mesh=mesh, K=K, M=M, fixed=fixed), report
 
 
-def body_of_matrices(
-    name: str,
-    mesh: Mesh,
-    K: csr_array,
-    M: csr_array,
-    *,
-    fixed_nodes: Iterable[int] = (),
-) -> ElasticBody:
-    """Make a body from given matrices in SI; see :func:`checked_body`."""
-    return checked_body(name, mesh, K, M, fixed_nodes=fixed_nodes)[0]
-
-
 class _Namer:
     def __init__(self, numbers: NDArray[np.int64], dimension: int) -> None:
         self._numbers, self._letters = numbers, "rz" if dimension == 2 else "xyz"
@@ -261,13 +248,13 @@ class _Namer:
 
 def _require_sizes(where: str, K: csr_array, M: csr_array, mesh: Mesh) -> None:
     n = mesh.dof_count
-    if K.shape != (n, n) or M.shape != (n, n):
-        raise InputError(
-            where,
-            got=f"K of shape {K.shape} and M of shape {M.shape}",
-            expected=f"({n}, {n}) for {mesh.node_count} nodes",
-            hint="the mesh must be that of the model that wrote the matrices.",
-        )
+    refuse_if(
+        K.shape != (n, n) or M.shape != (n, n),
+        where,
+        got=f"K of shape {K.shape} and M of shape {M.shape}",
+        expected=f"({n}, {n}) for {mesh.node_count} nodes",
+        hint="the mesh must be that of the model that wrote the matrices.",
+    )
 
 
 def _require_positive_diagonals(
@@ -309,26 +296,26 @@ def _require_one_mass(
     crossed = max(
         (abs(float(along[a] @ moved[b])) for a in ways for b in ways if a != b), default=0.0
     )
-    if not max(unlike, crossed) <= _SAME_MASS * mean and not len(absent):
-        raise InputError(
-            where,
-            got=f"masses of {', '.join(f'{m:.6g}' for m in mass.values())} kg along x, y, z and "
-            f"{crossed:.3g} kg of coupling",
-            expected="the same mass in all directions, and no coupling",
-            hint="the order of the rows differs (give 'dofs'), or nodes have "
-            "rotated coordinate systems.",
-        )
+    refuse_if(
+        not max(unlike, crossed) <= _SAME_MASS * mean and not len(absent),
+        where,
+        got=f"masses of {', '.join(f'{m:.6g}' for m in mass.values())} kg along x, y, z and "
+        f"{crossed:.3g} kg of coupling",
+        expected="the same mass in all directions, and no coupling",
+        hint="the order of the rows differs (give 'dofs'), or nodes have "
+        "rotated coordinate systems.",
+    )
     nodal = np.mean([moved[way][way::d] for way in ways], axis=0)
     centre = np.asarray(nodal @ x / nodal.sum())
     low, high = x.min(axis=0), x.max(axis=0)
     slack = 1e-6 * (high - low)
-    if np.any(centre < low - slack) or np.any(centre > high + slack):
-        raise InputError(
-            where,
-            got=f"a centre of mass at ({', '.join(f'{1e3 * c:.4g}' for c in centre)}) mm",
-            expected="a point within the bounding box of the nodes",
-            hint="the mass matrix has negative parts, or belongs to different nodes.",
-        )
+    refuse_if(
+        np.any(centre < low - slack) or np.any(centre > high + slack),
+        where,
+        got=f"a centre of mass at ({', '.join(f'{1e3 * c:.4g}' for c in centre)}) mm",
+        expected="a point within the bounding box of the nodes",
+        hint="the mass matrix has negative parts, or belongs to different nodes.",
+    )
     if d == 2:
         centre[0] = 0.0
     return mean, centre

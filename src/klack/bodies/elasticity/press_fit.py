@@ -31,7 +31,7 @@ from klack.bodies.elasticity.loads import face_points, over_faces
 from klack.bodies.elasticity.rigid_motions import held_best, held_dofs, rigid_motions
 from klack.bodies.elasticity.stress import StressField, von_mises
 from klack.materials.material import Material
-from klack.mesh.joint import FlatJoint, Joint, JointError
+from klack.mesh.joint import FlatJoint, Joint, JointError, refuse_joint_if
 from klack.mesh.mesh import ElementBlock, FaceBlock, FacePair, Mesh
 from klack.mesh.parting import parted
 
@@ -126,13 +126,13 @@ def pressed_state(
     _require_all_pressed(body, joints)
     masters = np.concatenate([each.nodes[0] for each in sides])
     slaves = np.concatenate([each.nodes[1] for each in sides])
-    if len(np.unique(slaves)) < len(slaves) or np.isin(slaves, masters).any():
-        raise JointError(
-            joints[-1].name,
-            got="joints that meet in a corner",
-            expected="a single overlap at every node",
-            hint="give edges of one cylinder the same name.",
-        )
+    refuse_joint_if(
+        len(np.unique(slaves)) < len(slaves) or np.isin(slaves, masters).any(),
+        joints[-1].name,
+        got="joints that meet in a corner",
+        expected="a single overlap at every node",
+        hint="give edges of one cylinder the same name.",
+    )
     normal = np.vstack(
         [joint.outwards(apart.points[s.nodes[1]]) for joint, s in zip(joints, sides, strict=True)]
     )

@@ -30,7 +30,7 @@ from klack.bodies.elasticity.budget import WITHOUT, Budget
 from klack.bodies.elasticity.condensation import condensed_inverse
 from klack.bodies.elasticity.factor_memory import FactorMemoryError
 from klack.bodies.elasticity.factorization import Backend, Factorization, chosen_backend, factorize
-from klack.errors import ConvergenceError, InputError
+from klack.errors import ConvergenceError, InputError, refuse_if
 from klack.files.closing import Closing
 from klack.machine.cache.content import content_key
 from klack.machine.cache.entry import Entry
@@ -239,13 +239,13 @@ class Flexibility(Closing):
             Entries at fixed degrees of freedom are taken by the support.
         """
         F = np.asarray(F, dtype=np.float64)
-        if F.ndim not in (1, 2) or len(F) != self.body.dof_count:
-            raise InputError(
-                f"Flexibility of body '{self.body.name}': F",
-                got=f"shape {F.shape}",
-                expected=f"({self.body.dof_count},) or ({self.body.dof_count}, m)",
-                hint="give one force per degree of freedom of the mesh, fixed ones included.",
-            )
+        refuse_if(
+            F.ndim not in (1, 2) or len(F) != self.body.dof_count,
+            f"Flexibility of body '{self.body.name}': F",
+            got=f"shape {F.shape}",
+            expected=f"({self.body.dof_count},) or ({self.body.dof_count}, m)",
+            hint="give one force per degree of freedom of the mesh, fixed ones included.",
+        )
         U = np.zeros(F.shape, order="F")
         if F.ndim == 1:
             U[:] = self._solve_block(F[:, None])[:, 0]

@@ -15,7 +15,7 @@ import scipy
 from numpy.typing import NDArray
 
 from klack.bodies.elasticity.shape_functions import reference_nodes, shape_functions
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.mesh.mesh import ElementBlock, Mesh
 from klack.mesh.rigid import Pose
 from klack.units import format_si
@@ -80,14 +80,13 @@ def locate(
     if best.distance > _SHARED * size:
         found = [_nearest(mesh, item, point) for item in found]
         best = min(found, key=lambda item: item.distance)
-    if best.distance > _SNAP * size:
-        raise InputError(
-            where,
-            got=f"a point at {_text(point, pose)}, {format_si(best.distance, 'm')} outside the "
-            "body",
-            expected=f"a point of the body; the nearest one is {_text(best.place, pose)}",
-            hint="use that point, or correct the coordinates, which refer to the drawing.",
-        )
+    refuse_if(
+        best.distance > _SNAP * size,
+        where,
+        got=f"a point at {_text(point, pose)}, {format_si(best.distance, 'm')} outside the body",
+        expected=f"a point of the body; the nearest one is {_text(best.place, pose)}",
+        hint="use that point, or correct the coordinates, which refer to the drawing.",
+    )
     near = best.distance + _SHARED * size
     return tuple(item for item in found if item.distance <= near)
 

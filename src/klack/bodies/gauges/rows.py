@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from klack.bodies.elasticity.shape_functions import shape_functions
 from klack.bodies.gauges.located_point import LocatedPoint, locate
-from klack.errors import InputError, require_nonnegative
+from klack.errors import InputError, refuse_if, require_nonnegative
 from klack.materials.material import Material
 from klack.mesh.mesh import Mesh
 from klack.mesh.rigid import Pose
@@ -62,13 +62,13 @@ class Line:
 
     def __post_init__(self) -> None:
         require_nonnegative(f"{self.where}: length", self.length, "m")
-        if isinstance(self.direction, str) and len(self.at) != 2:
-            raise InputError(
-                f"{self.where}: direction",
-                got=f"'{self.direction}' on a solid",
-                expected="x, y, z or three numbers",
-                hint="'around' is a direction of bodies of revolution.",
-            )
+        refuse_if(
+            isinstance(self.direction, str) and len(self.at) != 2,
+            f"{self.where}: direction",
+            got=f"'{self.direction}' on a solid",
+            expected="x, y, z or three numbers",
+            hint="'around' is a direction of bodies of revolution.",
+        )
 
     def found(self, mesh: Mesh, place: Floats) -> tuple[LocatedPoint, ...]:
         """See :func:`klack.bodies.gauges.located_point.locate`."""

@@ -20,7 +20,7 @@ from klack.bodies.model_files.system_matrix import (
     choose_matrix,
     symmetric_matrix,
 )
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 
 __all__ = ["read_ansys_full"]
 
@@ -41,31 +41,38 @@ class _Records:
     def integers(self, at: int) -> tuple[NDArray[np.int32], int]:
         """Integers of the record at word ``at``, and the next record."""
         data, flags, behind = self._record(at)
-        if not flags & _INTEGER:
-            raise _damaged(self.path, f"numbers instead of integers at byte {4 * at}")
+        _damaged_if(
+            not flags & _INTEGER, self.path, f"numbers instead of integers at byte {4 * at}"
+        )
         return data, behind
 
     def numbers(self, at: int) -> tuple[NDArray[np.float64], int]:
         """Doubles of the record at word ``at``, and the next record."""
         data, flags, behind = self._record(at)
-        if flags & (_INTEGER | _SINGLE) or len(data) % 2:
-            raise _damaged(self.path, f"integers instead of numbers at byte {4 * at}")
+        _damaged_if(
+            flags & (_INTEGER | _SINGLE) or len(data) % 2,
+            self.path,
+            f"integers instead of numbers at byte {4 * at}",
+        )
         return data.view(data.dtype.newbyteorder("=")).view(np.float64), behind
 
     def _record(self, at: int) -> tuple[NDArray[np.int32], int, int]:
         words = self.words
         count = int(words[at]) if 0 <= at < len(words) - 2 else 0
         behind = at + count + 3
-        if count <= 0 or behind > len(words) or words[behind - 1] != count:
-            raise _damaged(self.path, f"no complete record at byte {4 * at}")
+        _damaged_if(
+            count <= 0 or behind > len(words) or words[behind - 1] != count,
+            self.path,
+            f"no complete record at byte {4 * at}",
+        )
         flags = int(words[at + 1]) & 0xFFFFFFFF
-        if flags & (_ZLIB | _SPARSE):
-            raise InputError(
-                str(self.path),
-                got="compressed records",
-                expected="records that are not compressed",
-                hint="write the matrices with HBMAT in ASCII form (see the page on matrices).",
-            )
+        refuse_if(
+            flags & (_ZLIB | _SPARSE),
+            str(self.path),
+            got="compressed records",
+            expected="records that are not compressed",
+            hint="write the matrices with HBMAT in ASCII form (see the page on matrices).",
+        )
         return words[at + 2 : behind - 1], flags, behind
 
 
@@ -82,18 +89,17 @@ def read_ansys_full(path: Path, name: str | None, role: Role | None) -> SystemMa
     file = _Records(path, words)
     _, at = file.integers(0)
     head, at = file.integers(at)
-    if len(head) < 40 or head[0] != _FULL_FILE:
-        raise _damaged(path, f"a file of kind {head[0]}")
+    _damaged_if(len(head) < 40 or head[0] != _FULL_FILE, path, f"a file of kind {head[0]}")
     _check_kind(path, head)
     chosen = choose_matrix(str(path), ("K", "M"), name, role)
     start, entries = (_STIFFNESS, _K_ENTRIES) if chosen == "K" else (_MASS, _M_ENTRIES)
-    if not _long(head, entries) or not _long(head, start):
-        raise InputError(
-            str(path),
-            got=f"no matrix {chosen}",
-            expected="stiffness and mass",
-            hint="write the file in a modal analysis (ANTYPE,MODAL and WRFULL).",
-        )
+    refuse_if(
+        not _long(head, entries) or not _long(head, start),
+        str(path),
+        got=f"no matrix {chosen}",
+        expected="stiffness and mass",
+        hint="write the file in a modal analysis (ANTYPE,MODAL and WRFULL).",
+    )
     rows, held = _places(file, head, at)
     row, column, value = _entries(file, head, _long(head, start), _long(head, entries))
     free = np.flatnonzero(~held)
@@ -138,15 +144,18 @@ def _places(
     marks, _ = file.integers(at)
     equations, directions = int(head[_EQUATIONS]), int(head[_DOFS])
     uniform = len(counts) == len(nodes) and bool(np.all(counts == len(labels)))
-    if not uniform or directions != len(labels) or equations != len(nodes) * len(labels):
-        raise InputError(
-            str(file.path),
-            got=f"{equations} equations of {len(nodes)} nodes with {len(labels)} directions",
-            expected="nodes that all have the same degrees of freedom",
-            hint="export a model of solid elements only, without mass, contact or beam elements.",
-        )
-    if len(marks) != equations or np.any(nodes < 1) or np.any((labels < 1) | (labels > 6)):
-        raise _damaged(file.path, "inconsistent nodes, directions or marks")
+    refuse_if(
+        not uniform or directions != len(labels) or equations != len(nodes) * len(labels),
+        str(file.path),
+        got=f"{equations} equations of {len(nodes)} nodes with {len(labels)} directions",
+        expected="nodes that all have the same degrees of freedom",
+        hint="export a model of solid elements only, without mass, contact or beam elements.",
+    )
+    _damaged_if(
+        len(marks) != equations or np.any(nodes < 1) or np.any((labels < 1) | (labels > 6)),
+        file.path,
+        "inconsistent nodes, directions or marks",
+    )
     rows = RowPlaces(
         np.repeat(nodes, len(labels)).astype(np.int64),
         np.tile(labels, len(nodes)).astype(np.int64),
@@ -163,8 +172,9 @@ def _entries(
     for _ in range(equations):
         part, at = file.integers(at)
         value, at = file.numbers(at)
-        if len(part) != len(value):
-            raise _damaged(file.path, f"{len(part)} columns with {len(value)} values")
+        _damaged_if(
+            len(part) != len(value), file.path, f"{len(part)} columns with {len(value)} values"
+        )
         columns.append(part)
         values.append(value)
         lengths.append(len(part))
@@ -172,8 +182,11 @@ def _entries(
         if read >= expected:
             break
     column: NDArray[np.int64] = np.concatenate(columns).astype(np.int64) - 1
-    if read != expected or column.min() < 0 or column.max() >= equations:
-        raise _damaged(file.path, f"{read} entries instead of {expected}, or columns out of range")
+    _damaged_if(
+        read != expected or column.min() < 0 or column.max() >= equations,
+        file.path,
+        f"{read} entries instead of {expected}, or columns out of range",
+    )
     row = np.repeat(column[np.cumsum(lengths) - 1], lengths)
     return row, column, np.concatenate(values)
 
@@ -185,3 +198,8 @@ def _damaged(path: Path, got: str) -> InputError:
         expected="a .full file of ANSYS with assembled matrices",
         hint="write it with WRFULL,1 in a modal analysis; copy it in binary mode.",
     )
+
+
+def _damaged_if(wrong: object, path: Path, got: str) -> None:
+    if wrong:
+        raise _damaged(path, got)

@@ -14,7 +14,7 @@ from klack.bodies.model_files.system_matrix import (
     read_row_places,
     symmetric_matrix,
 )
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 
 __all__ = [
     "is_matrix_market",
@@ -81,13 +81,13 @@ def _check_heading(path: Path, heading: list[str]) -> None:
         and heading[3] in ("real", "integer", "double")
         and heading[4] in ("symmetric", "general")
     )
-    if not good:
-        raise InputError(
-            f"{path}:1",
-            got=f"'{' '.join(heading[1:])}'",
-            expected="matrix, coordinate or array, real or integer, symmetric or general",
-            hint="write the real part of K and M of an undamped model.",
-        )
+    refuse_if(
+        not good,
+        f"{path}:1",
+        got=f"'{' '.join(heading[1:])}'",
+        expected="matrix, coordinate or array, real or integer, symmetric or general",
+        hint="write the real part of K and M of an undamped model.",
+    )
 
 
 def _sizes(path: Path, stream: BinaryIO) -> tuple[tuple[int, ...], int]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from klack.bodies.model_files.number_lines import FixedFormat, fixed_numbers, free_numbers
 from klack.bodies.model_files.system_matrix import Role, SystemMatrix, symmetric_matrix
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 
 __all__ = ["read_harwell_boeing"]
 
@@ -62,13 +62,13 @@ def _formats(line: str) -> tuple[FixedFormat, FixedFormat, FixedFormat]:
 
 
 def _check_kind(path: Path, kind: str, rows: int, columns: int) -> None:
-    if kind not in ("RSA", "RUA", "ISA", "IUA") or rows != columns:
-        raise InputError(
-            f"{path}:3",
-            got=f"a matrix of kind '{kind[:8]}' with {rows} rows and {columns} columns",
-            expected="RSA or RUA (real, symmetric or not, assembled), square",
-            hint="write K and M of an undamped model; HBMAT with Form = ASCII.",
-        )
+    refuse_if(
+        kind not in ("RSA", "RUA", "ISA", "IUA") or rows != columns,
+        f"{path}:3",
+        got=f"a matrix of kind '{kind[:8]}' with {rows} rows and {columns} columns",
+        expected="RSA or RUA (real, symmetric or not, assembled), square",
+        hint="write K and M of an undamped model; HBMAT with Form = ASCII.",
+    )
 
 
 def _section(

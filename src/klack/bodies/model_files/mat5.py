@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 
 __all__ = ["MatValue", "read_mat5"]
 
@@ -54,8 +54,7 @@ class _Budget:
 
     def take(self, size: int) -> None:
         self.left -= size
-        if self.left < 0:
-            raise _damaged(self.path, "more numbers than fit into the file")
+        _damaged_if(self.left < 0, self.path, "more numbers than fit into the file")
 
 
 @dataclass(frozen=True)
@@ -70,6 +69,11 @@ def _damaged(path: Path, what: str) -> InputError:
     )
 
 
+def _damaged_if(wrong: object, path: Path, what: str) -> None:
+    if wrong:
+        raise _damaged(path, what)
+
+
 def read_mat5(path: Path, *, largest: int = _LARGEST) -> dict[str, MatValue]:
     """Read all variables of a file.
 
@@ -81,13 +85,13 @@ def read_mat5(path: Path, *, largest: int = _LARGEST) -> dict[str, MatValue]:
         Numbers as float64 or complex128 arrays (sparse ones csc_array), texts as tuples of str,
         cell arrays as lists, structures as dicts, or lists of dicts where there are several.
     """
-    if path.stat().st_size > largest:
-        raise InputError(
-            str(path),
-            got=f"a file of {path.stat().st_size / 2**30:.3g} GB",
-            expected=f"at most {largest / 2**30:.3g} GB",
-            hint="store only the matrices that are needed.",
-        )
+    refuse_if(
+        path.stat().st_size > largest,
+        str(path),
+        got=f"a file of {path.stat().st_size / 2**30:.3g} GB",
+        expected=f"at most {largest / 2**30:.3g} GB",
+        hint="store only the matrices that are needed.",
+    )
     data = memoryview(path.read_bytes())
     order = _byte_order(path, bytes(data[:128]))
     budget = _Budget(path, largest)
@@ -107,18 +111,24 @@ def read_mat5(path: Path, *, largest: int = _LARGEST) -> dict[str, MatValue]:
 
 
 def _byte_order(path: Path, head: bytes) -> str:
-    if head[:4] == b"\x89HDF" or head[124:126] in (b"\x00\x02", b"\x02\x00"):
-        raise InputError(
-            str(path), got="a MATLAB file of version 7.3", expected="version 7", hint=_HINT
-        )
+    refuse_if(
+        head[:4] == b"\x89HDF" or head[124:126] in (b"\x00\x02", b"\x02\x00"),
+        str(path),
+        got="a MATLAB file of version 7.3",
+        expected="version 7",
+        hint=_HINT,
+    )
     if len(head) == 128 and head[126:128] == b"IM" and head[124:126] == b"\x00\x01":
         return "<"
     if len(head) == 128 and head[126:128] == b"MI" and head[124:126] == b"\x01\x00":
         return ">"
-    if _is_version_4(head):
-        raise InputError(
-            str(path), got="a MATLAB file of version 4", expected="version 5 to 7.2", hint=_HINT
-        )
+    refuse_if(
+        _is_version_4(head),
+        str(path),
+        got="a MATLAB file of version 4",
+        expected="version 5 to 7.2",
+        hint=_HINT,
+    )
     raise _damaged(path, "no header of version 5")
 
 
@@ -145,8 +155,7 @@ def _unpacked(budget: _Budget, data: memoryview) -> memoryview:
         plain = machine.decompress(data, max(budget.left, 1))
     except zlib.error as error:
         raise _damaged(budget.path, str(error)) from error
-    if not machine.eof:
-        raise _damaged(budget.path, "a compressed variable is truncated or too large")
+    _damaged_if(not machine.eof, budget.path, "a compressed variable is truncated or too large")
     budget.take(len(plain))
     return memoryview(plain)
 
@@ -158,22 +167,19 @@ def _elements(
     at = 0
     while at < len(data):
         if len(data) - at < 8:
-            if aligned or any(data[at:]):
-                raise _damaged(budget.path, "cut off")
+            _damaged_if(aligned or any(data[at:]), budget.path, "cut off")
             return
         first, second = struct.unpack_from(f"{order}II", data, at)
         if first >> 16:  # four bytes or fewer, inside of the tag
             kind, size, start = first & 0xFFFF, first >> 16, at + 4
-            if size > 4:
-                raise _damaged(budget.path, f"a small element of {size} bytes")
+            _damaged_if(size > 4, budget.path, f"a small element of {size} bytes")
             end = at + 8
         else:
             kind, size, start = first, second, at + 8
             end = start + size
             if aligned or kind == _MATRIX:
                 end += -size % 8
-        if start + size > len(data):
-            raise _damaged(budget.path, "cut off")
+        _damaged_if(start + size > len(data), budget.path, "cut off")
         yield _Element(kind, data[start : start + size])
         at = end
 
@@ -186,17 +192,18 @@ def _matrix(budget: _Budget, data: memoryview, order: str, depth: int) -> tuple[
     parts = _elements(budget, data, order)
     if len(data) == 0:
         return "", np.zeros((0, 0))
-    if depth > _DEEPEST:
-        raise _damaged(budget.path, "structures nested too deeply")
+    _damaged_if(depth > _DEEPEST, budget.path, "structures nested too deeply")
     flags = _integers(budget, next(parts, None), order)
-    if len(flags) < 1:
-        raise _damaged(budget.path, "a variable without a type")
+    _damaged_if(len(flags) < 1, budget.path, "a variable without a type")
     kind, marks = int(flags[0]) & 0xFF, int(flags[0]) >> 8 & 0xFF
     if kind not in (_CELL, _STRUCTURE, _OBJECT, _TEXT, _SPARSE, *_NUMERIC):
         return "", None  # functions and opaque objects have another order
     shape = tuple(int(n) for n in _integers(budget, next(parts, None), order))
-    if not 2 <= len(shape) <= 8 or any(n < 0 for n in shape):
-        raise _damaged(budget.path, f"a variable of shape {shape[:8]}")
+    _damaged_if(
+        not 2 <= len(shape) <= 8 or any(n < 0 for n in shape),
+        budget.path,
+        f"a variable of shape {shape[:8]}",
+    )
     name = _text(budget, next(parts, None))
     if kind == _CELL:
         return name, _cells(budget, parts, order, shape, depth)
@@ -218,18 +225,17 @@ def _matrix(budget: _Budget, data: memoryview, order: str, depth: int) -> tuple[
 def _raw(budget: _Budget, element: _Element | None, order: str) -> NDArray[Any]:
     if element is None:
         raise _damaged(budget.path, "a variable without numbers")
-    if element.kind not in _DTYPE:
-        raise _damaged(budget.path, f"numbers of the unknown type {element.kind}")
+    _damaged_if(
+        element.kind not in _DTYPE, budget.path, f"numbers of the unknown type {element.kind}"
+    )
     dtype = np.dtype(order + _DTYPE[element.kind])
-    if len(element.data) % dtype.itemsize:
-        raise _damaged(budget.path, "half a number")
+    _damaged_if(len(element.data) % dtype.itemsize, budget.path, "half a number")
     return np.frombuffer(element.data, dtype=dtype)
 
 
 def _integers(budget: _Budget, element: _Element | None, order: str) -> NDArray[np.int64]:
     values = _raw(budget, element, order)
-    if values.dtype.kind == "f":
-        raise _damaged(budget.path, "a count that is not a whole number")
+    _damaged_if(values.dtype.kind == "f", budget.path, "a count that is not a whole number")
     return values.astype(np.int64)
 
 
@@ -237,8 +243,9 @@ def _numbers(
     budget: _Budget, element: _Element | None, order: str, shape: tuple[int, ...]
 ) -> NDArray[np.float64]:
     values = _raw(budget, element, order)
-    if prod(shape) != len(values):
-        raise _damaged(budget.path, f"{len(values)} numbers for the shape {shape}")
+    _damaged_if(
+        prod(shape) != len(values), budget.path, f"{len(values)} numbers for the shape {shape}"
+    )
     budget.take(8 * len(values))
     return values.astype(np.float64).reshape(shape, order="F")
 
@@ -255,18 +262,23 @@ def _sparse(
     values = _raw(budget, next(parts, None), order)
     if is_complex:
         imaginary = _raw(budget, next(parts, None), order)
-        if len(imaginary) != len(values):
-            raise _damaged(budget.path, "a sparse matrix with half of its complex numbers")
+        _damaged_if(
+            len(imaginary) != len(values),
+            budget.path,
+            "a sparse matrix with half of its complex numbers",
+        )
         values = values + 1j * imaginary
     fits = len(shape) == 2 and len(starts) == shape[1] + 1
     fits = fits and starts[0] == 0 and bool(np.all(np.diff(starts) >= 0))
     fits = fits and starts[-1] <= min(len(rows), len(values))
-    if not fits:
-        raise _damaged(budget.path, "a sparse matrix with inconsistent columns")
+    _damaged_if(not fits, budget.path, "a sparse matrix with inconsistent columns")
     count = int(starts[-1])
     rows = rows[:count]
-    if count and (rows.min() < 0 or rows.max() >= shape[0]):
-        raise _damaged(budget.path, "a sparse matrix with rows out of range")
+    _damaged_if(
+        count and (rows.min() < 0 or rows.max() >= shape[0]),
+        budget.path,
+        "a sparse matrix with rows out of range",
+    )
     budget.take(24 * count)
     matrix = csc_array(
         (values[:count].astype(np.complex128 if is_complex else np.float64), rows, starts),
@@ -295,8 +307,7 @@ def _texts(
         text = bytes(element.data).decode(encoding, errors="replace")
     else:
         codes = _raw(budget, element, order)
-        if codes.dtype.kind == "f":
-            raise _damaged(budget.path, "a text of invalid numbers")
+        _damaged_if(codes.dtype.kind == "f", budget.path, "a text of invalid numbers")
         text = "".join(chr(int(code) & 0xFFFF) for code in codes)
     if len(shape) != 2 or len(text) != prod(shape):
         return (text.strip(),)
@@ -307,8 +318,9 @@ def _cells(
     budget: _Budget, parts: Iterator[_Element], order: str, shape: tuple[int, ...], depth: int
 ) -> list[MatValue]:
     values = [_inner(budget, element, order, depth) for element in parts]
-    if len(values) != prod(shape):
-        raise _damaged(budget.path, f"{len(values)} cells for the shape {shape}")
+    _damaged_if(
+        len(values) != prod(shape), budget.path, f"{len(values)} cells for the shape {shape}"
+    )
     return values
 
 
@@ -325,8 +337,11 @@ def _structures(
         plain[i : i + step].split(b"\0")[0].decode("latin-1") for i in range(0, len(plain), step)
     ]
     values = [_inner(budget, element, order, depth) for element in parts]
-    if len(values) != prod(shape) * len(fields):
-        raise _damaged(budget.path, f"{len(values)} values for {len(fields)} fields")
+    _damaged_if(
+        len(values) != prod(shape) * len(fields),
+        budget.path,
+        f"{len(values)} values for {len(fields)} fields",
+    )
     count = len(fields)
     items = [
         dict(zip(fields, values[i * count : (i + 1) * count], strict=True))
@@ -336,6 +351,7 @@ def _structures(
 
 
 def _inner(budget: _Budget, element: _Element, order: str, depth: int) -> MatValue:
-    if element.kind != _MATRIX:
-        raise _damaged(budget.path, f"an element of type {element.kind} in a structure")
+    _damaged_if(
+        element.kind != _MATRIX, budget.path, f"an element of type {element.kind} in a structure"
+    )
     return _matrix(budget, element.data, order, depth + 1)[1]

@@ -25,7 +25,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 
 __all__ = ["read_listing"]
 
@@ -93,13 +93,13 @@ def read_listing(path: Path) -> tuple[Arrays, Texts]:
     data = path.read_bytes()
     if b"\0" in data[:4096] and not data.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise _refused(path, 0, "a binary file", "text")
-    if re.search(rb"^\s*(MODELDEF|SML)\b", data[:4000], re.IGNORECASE | re.MULTILINE):
-        raise InputError(
-            str(path),
-            got="a model in the SML language",
-            expected="dense numbers or Matrix Market form",
-            hint="write it with the file format 0 or 1 of SPMWRITE.",
-        )
+    refuse_if(
+        re.search(rb"^\s*(MODELDEF|SML)\b", data[:4000], re.IGNORECASE | re.MULTILINE),
+        str(path),
+        got="a model in the SML language",
+        expected="dense numbers or Matrix Market form",
+        hint="write it with the file format 0 or 1 of SPMWRITE.",
+    )
     # line by line: a list of short lines would take many times the size of the file
     with io.TextIOWrapper(io.BytesIO(data), encoding=_encoding(data), newline=None) as text:
         blocks, texts = _blocks(path, text)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from klack.bodies.model_files.named_arrays import NamedArrays, read_named_arrays
 from klack.bodies.model_files.uff import FileModalData, read_uff_modes
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 
 __all__ = ["read_modal_data"]
 
@@ -35,10 +35,13 @@ _LABELS = ("ports", "port_names", "labels", "names", "dofs")
 
 def read_modal_data(path: Path) -> FileModalData:
     """Read modes from ``.uff``/``.unv``, ``.mat``, ``.npz`` or a CSV table."""
-    if not path.is_file():
-        raise InputError(
-            str(path), got="no such file", expected="a file of modal data", hint="check it."
-        )
+    refuse_if(
+        not path.is_file(),
+        str(path),
+        got="no such file",
+        expected="a file of modal data",
+        hint="check it.",
+    )
     suffix = path.suffix.lower()
     if suffix in _UFF:
         data = read_uff_modes(path)
@@ -48,10 +51,13 @@ def read_modal_data(path: Path) -> FileModalData:
         data = _of_table(path)
     numbers = [data.frequency, data.modal_mass, data.shapes]
     numbers += [item for item in (data.damping, data.residual) if item is not None]
-    if not all(np.all(np.isfinite(item)) for item in numbers):
-        raise InputError(
-            str(path), got="numbers that are not finite", expected="finite numbers", hint="mend it."
-        )
+    refuse_if(
+        not all(np.all(np.isfinite(item)) for item in numbers),
+        str(path),
+        got="numbers that are not finite",
+        expected="finite numbers",
+        hint="mend it.",
+    )
     if not np.all(data.modal_mass > 0):
         worst = int(np.argmin(data.modal_mass))
         raise InputError(
@@ -117,28 +123,34 @@ def _vector(held: NamedArrays, name: str, array: Floats | None, count: int | Non
 
 
 def _of_table(path: Path) -> FileModalData:
-    if path.stat().st_size > _LARGEST:
-        raise InputError(
-            str(path), got="more than 256 MB", expected="a table of modes", hint="reduce it."
-        )
+    refuse_if(
+        path.stat().st_size > _LARGEST,
+        str(path),
+        got="more than 256 MB",
+        expected="a table of modes",
+        hint="reduce it.",
+    )
     data = path.read_bytes()
-    if b"\0" in data[:4096]:
-        raise InputError(
-            str(path), got="a binary file", expected="a CSV table of modes", hint="see the guide."
-        )
+    refuse_if(
+        b"\0" in data[:4096],
+        str(path),
+        got="a binary file",
+        expected="a CSV table of modes",
+        hint="see the guide.",
+    )
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
         text = data.decode("latin-1")
     lines = [(i, line) for i, line in enumerate(text.splitlines(), 1) if line.strip()]
     lines = [(i, line) for i, line in lines if not line.lstrip().startswith(("#", "%", "!"))]
-    if len(lines) < 2:
-        raise InputError(
-            str(path),
-            got=f"{len(lines)} lines",
-            expected="a header and one line for each mode",
-            hint="the header begins with 'frequency [Hz]'.",
-        )
+    refuse_if(
+        len(lines) < 2,
+        str(path),
+        got=f"{len(lines)} lines",
+        expected="a header and one line for each mode",
+        hint="the header begins with 'frequency [Hz]'.",
+    )
     mark = max(",;\t", key=lines[0][1].count)
     head = _cells(path, *lines[0], mark)
     if len(head) < 2 or not _is(head[0], ("frequency", "frequencies", "freq", "f")):
@@ -148,13 +160,13 @@ def _of_table(path: Path) -> FileModalData:
             expected="frequency [Hz], damping, modal mass, then a column for each port",
             hint="damping and modal mass may be left out.",
         )
-    if "khz" in head[0].lower() or "rad" in head[0].lower():
-        raise InputError(
-            f"{path}, line {lines[0][0]}",
-            got=f"'{head[0]}'",
-            expected="frequencies in Hz",
-            hint="convert the first column.",
-        )
+    refuse_if(
+        "khz" in head[0].lower() or "rad" in head[0].lower(),
+        f"{path}, line {lines[0][0]}",
+        got=f"'{head[0]}'",
+        expected="frequencies in Hz",
+        hint="convert the first column.",
+    )
     rows = []
     for number, line in lines[1:]:
         cells = _cells(path, number, line, mark)

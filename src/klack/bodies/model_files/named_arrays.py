@@ -15,7 +15,7 @@ from scipy.sparse import csc_array
 
 from klack.bodies.model_files.mat5 import MatValue, read_mat5
 from klack.bodies.model_files.matrix_listing import read_listing
-from klack.errors import InputError, foreign_reading
+from klack.errors import InputError, foreign_reading, refuse_if
 
 __all__ = ["NamedArrays", "read_named_arrays"]
 
@@ -85,10 +85,13 @@ def read_named_arrays(path: Path) -> NamedArrays:
         ``.mat`` (MATLAB up to 7.2, Octave ``save -v6`` or ``-v7``), ``.npz``, or text: see
         :func:`klack.bodies.model_files.matrix_listing.read_listing`.
     """
-    if not path.is_file():
-        raise InputError(
-            str(path), got="no such file", expected="a file of a reduced model", hint="check it."
-        )
+    refuse_if(
+        not path.is_file(),
+        str(path),
+        got="no such file",
+        expected="a file of a reduced model",
+        hint="check it.",
+    )
     suffix = path.suffix.lower()
     if suffix == ".mat":
         arrays, texts = _matlab(path)
@@ -102,8 +105,9 @@ def read_named_arrays(path: Path) -> NamedArrays:
 Read = tuple[dict[str, NDArray[np.float64]], dict[str, tuple[str, ...]]]
 
 
-def _too_large(path: Path, size: int) -> InputError:
-    return InputError(
+def _require_small(path: Path, size: int) -> None:
+    refuse_if(
+        size > _LARGEST,
         str(path),
         got=f"arrays of {size / 2**30:.3g} GB",
         expected="at most 1 GB",
@@ -130,20 +134,19 @@ def _collect(
     texts: dict[str, tuple[str, ...]],
 ) -> None:
     """Sort one value of a MATLAB file into numbers and texts; ignore others."""
-    if isinstance(value, np.ndarray | csc_array) and np.iscomplexobj(value):
-        raise InputError(
-            f"{path}: {key}",
-            got="complex numbers",
-            expected="real numbers",
-            hint="matrices of a model are real; save the real part.",
-        )
+    refuse_if(
+        isinstance(value, np.ndarray | csc_array) and np.iscomplexobj(value),
+        f"{path}: {key}",
+        got="complex numbers",
+        expected="real numbers",
+        hint="matrices of a model are real; save the real part.",
+    )
     if isinstance(value, dict):
         for name, item in value.items():
             _collect(path, f"{key}.{name}", item, arrays, texts)
     elif isinstance(value, csc_array):
         size = 8 * value.shape[0] * value.shape[1]
-        if size > _LARGEST:
-            raise _too_large(path, size)
+        _require_small(path, size)
         arrays[key] = value.toarray()
     elif isinstance(value, np.ndarray) and value.ndim == 2:
         arrays[key] = value
@@ -164,8 +167,7 @@ def _numpy(path: Path) -> Read:
     hint = "write it again with numpy.savez, only arrays of numbers and texts."
     with foreign_reading(str(path), "a NumPy file", hint), zipfile.ZipFile(path) as archive:
         size = sum(item.file_size for item in archive.infolist())
-        if size > _LARGEST:
-            raise _too_large(path, size)
+        _require_small(path, size)
         for item in archive.infolist():
             if item.filename.endswith(".npy"):
                 value = _entry(path, archive, item)

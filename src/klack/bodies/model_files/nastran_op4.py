@@ -20,7 +20,7 @@ from klack.bodies.model_files.system_matrix import (
     choose_matrix,
     symmetric_matrix,
 )
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 
 __all__ = ["read_nastran_op4"]
 
@@ -51,13 +51,13 @@ class Op4Header:
         """Check columns, rows, form and type: real and square."""
         columns, rows, _, kind = head
         name = name.strip(" \0")
-        if kind not in (_SINGLE, _DOUBLE) or abs(rows) != columns or columns < 1:
-            raise InputError(
-                f"{where}: {name}",
-                got=f"a matrix of {abs(rows)} rows, {columns} columns and type {kind}",
-                expected="a square matrix of type 1 or 2 (real)",
-                hint="write only K and M, of a model without damping.",
-            )
+        refuse_if(
+            kind not in (_SINGLE, _DOUBLE) or abs(rows) != columns or columns < 1,
+            f"{where}: {name}",
+            got=f"a matrix of {abs(rows)} rows, {columns} columns and type {kind}",
+            expected="a square matrix of type 1 or 2 (real)",
+            hint="write only K and M, of a model without damping.",
+        )
         return cls(
             name=name,
             columns=columns,
@@ -113,15 +113,13 @@ class Op4Strings:
                 length = (packed >> 16) - 1
                 row = packed - ((length + 1) << 16)
                 at += 1
-            if length < 0 or at + length > words:
-                raise _damaged(where)
+            _damaged_if(length < 0 or at + length > words, where)
             self._add(where, column, row, first + at * self.word, length, per_value)
             at += length
 
     def _add(self, where: str, column: int, row: int, first: int, words: int, per: int) -> None:
         count = words // per
-        if words % per or row < 1 or row - 1 + count > self.header.columns:
-            raise _damaged(where)
+        _damaged_if(words % per or row < 1 or row - 1 + count > self.header.columns, where)
         self.column.append(column)
         self.row.append(row)
         self.first.append(first)
@@ -160,8 +158,9 @@ def _within(count: NDArray[np.int64], kind: type) -> NDArray[np.int64]:
     return np.subtract(np.arange(total, dtype=kind), first, out=first)
 
 
-def _damaged(where: str) -> InputError:
-    return InputError(
+def _damaged_if(wrong: object, where: str) -> None:
+    refuse_if(
+        wrong,
         where,
         got="a string of numbers that does not fit its column",
         expected="strings inside the matrix",
@@ -332,8 +331,7 @@ def _binary(path: Path, data: NDArray[np.uint8], order: str) -> list[Op4Strings]
     while at < end:
         begin, at = at, _behind(path, data, at, mark)
         length = at - begin - 8
-        if length not in _WORD_OF_HEADER:
-            raise _damaged_record(path, begin, "no heading of a matrix")
+        _damaged_record_if(length not in _WORD_OF_HEADER, path, begin, "no heading of a matrix")
         word = _WORD_OF_HEADER[length]
         head = data[begin + 4 : begin + 4 + 4 * word].view(f"{order}i{word}")
         name = data[begin + 4 + 4 * word : at - 4].tobytes().decode("ascii", "replace")
@@ -342,14 +340,22 @@ def _binary(path: Path, data: NDArray[np.uint8], order: str) -> list[Op4Strings]
         while True:
             begin, at = at, _behind(path, data, at, mark)
             body = data[begin + 4 : at - 4]
-            if len(body) < 3 * word or (len(body) - 3 * word) % word:
-                raise _damaged_record(path, begin, "no column of a matrix")
+            _damaged_record_if(
+                len(body) < 3 * word or (len(body) - 3 * word) % word,
+                path,
+                begin,
+                "no column of a matrix",
+            )
             column, row, words = (int(n) for n in body[: 3 * word].view(f"{order}i{word}"))
             if column > header.columns:
                 break
             first = begin + 4 + 3 * word
-            if words * word != len(body) - 3 * word or column < 1:
-                raise _damaged_record(path, begin, f"column {column} with {words} words")
+            _damaged_record_if(
+                words * word != len(body) - 3 * word or column < 1,
+                path,
+                begin,
+                f"column {column} with {words} words",
+            )
             strings.add_column(f"{path}, byte {begin}", column, row, first, words)
         result.append(strings)
     return result
@@ -359,13 +365,18 @@ def _behind(path: Path, data: NDArray[np.uint8], at: int, mark: str) -> int:
     """End of the record at a byte; its two lengths must agree."""
     length = int(data[at : at + 4].view(mark)[0]) if at + 8 <= len(data) else -1
     behind = at + length + 8
-    if length < 0 or behind > len(data) or data[behind - 4 : behind].view(mark)[0] != length:
-        raise _damaged_record(path, at, "no whole record")
+    _damaged_record_if(
+        length < 0 or behind > len(data) or data[behind - 4 : behind].view(mark)[0] != length,
+        path,
+        at,
+        "no whole record",
+    )
     return behind
 
 
-def _damaged_record(path: Path, at: int, got: str) -> InputError:
-    return InputError(
+def _damaged_record_if(wrong: object, path: Path, at: int, got: str) -> None:
+    refuse_if(
+        wrong,
         f"{path}, byte {at}",
         got=got,
         expected="records of OUTPUT4",

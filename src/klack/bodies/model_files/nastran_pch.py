@@ -18,7 +18,7 @@ from klack.bodies.model_files.system_matrix import (
     choose_matrix,
     symmetric_matrix,
 )
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 
 __all__ = ["read_nastran_pch"]
 
@@ -148,13 +148,13 @@ def _check(place: str, name: str, again: bool, words: list[bytes]) -> None:
         form, kind = int(words[2]), int(words[3])
     except (IndexError, ValueError):
         raise _wrong(place, b" ".join(words)) from None
-    if again or form not in (_SQUARE, _SYMMETRIC) or kind not in _REAL:
-        raise InputError(
-            place,
-            got=f"matrix '{name}' {'again' if again else f'of form {form} and type {kind}'}",
-            expected="each matrix once, of form 1 or 6 (square, symmetric) and type 1 or 2 (real)",
-            hint="write K and M of a model without damping.",
-        )
+    refuse_if(
+        again or form not in (_SQUARE, _SYMMETRIC) or kind not in _REAL,
+        place,
+        got=f"matrix '{name}' {'again' if again else f'of form {form} and type {kind}'}",
+        expected="each matrix once, of form 1 or 6 (square, symmetric) and type 1 or 2 (real)",
+        hint="write K and M of a model without damping.",
+    )
 
 
 def _no_numbers(where: str) -> InputError:

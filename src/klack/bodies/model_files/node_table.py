@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.bodies.model_files.number_lines import number_rows, numbers_in, whole_numbers
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.mesh.files.catalogue import MESH_FORMATS
 from klack.mesh.files.mesh_file import read_mesh_file
 
@@ -35,20 +35,27 @@ def read_node_table(
     """
     if path.suffix.lower() in MESH_FORMATS and not _is_table(path, dimension):
         model = read_mesh_file(path, unit_length)
-        if model.mesh.dimension != dimension:
-            raise _wrong(str(path), f"nodes of dimension {model.mesh.dimension}", dimension)
+        _wrong_if(
+            model.mesh.dimension != dimension,
+            str(path),
+            f"nodes of dimension {model.mesh.dimension}",
+            dimension,
+        )
         return model.node_numbers, model.mesh.points
     table = _rows(path, dimension + 1)
-    if not len(table):
-        raise _wrong(str(path), "no nodes", dimension)
+    _wrong_if(not len(table), str(path), "no nodes", dimension)
     numbers = whole_numbers(str(path), table[:, 0], "a node number")
-    if len(np.unique(numbers)) < len(numbers):
-        raise _wrong(str(path), "a node number twice", dimension)
+    _wrong_if(len(np.unique(numbers)) < len(numbers), str(path), "a node number twice", dimension)
     points = table[:, 1:] * unit_length
-    if not np.all(np.isfinite(points)):
-        raise _wrong(str(path), "coordinates that are not finite", dimension)
-    if dimension == 2 and points[:, 0].min() < 0:
-        raise _wrong(str(path), f"r = {points[:, 0].min():g} m", dimension)
+    _wrong_if(
+        not np.all(np.isfinite(points)), str(path), "coordinates that are not finite", dimension
+    )
+    _wrong_if(
+        dimension == 2 and points[:, 0].min() < 0,
+        str(path),
+        f"r = {points[:, 0].min():g} m",
+        dimension,
+    )
     return numbers, points
 
 
@@ -93,8 +100,9 @@ def _rows(path: Path, columns: int) -> NDArray[np.float64]:
         return number_rows(stream, columns, where=str(path), line=line, comments=_COMMENTS)
 
 
-def _wrong(where: str, got: str, dimension: int) -> InputError:
-    return InputError(
+def _wrong_if(wrong: object, where: str, got: str, dimension: int) -> None:
+    refuse_if(
+        wrong,
         where,
         got=got,
         expected="number, x, y, z of each node" if dimension == 3 else "number, r, z of each node",

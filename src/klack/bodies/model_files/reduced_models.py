@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from klack.bodies.model_files.matrices import read_matrix
 from klack.bodies.model_files.named_arrays import read_named_arrays
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 
 __all__ = ["FileReducedMatrices", "FileStateSpace", "read_reduced_matrices", "read_state_space"]
 
@@ -136,11 +136,11 @@ def _of_nastran(path: Path) -> FileReducedMatrices:
     """KAA and MAA of a superelement; their rows have no names."""
     K, M = (read_matrix(path, role=role) for role in ("stiffness", "mass"))
     rows = K.matrix.shape[0]
-    if rows > _MOST_ROWS or M.matrix.shape != K.matrix.shape:
-        raise InputError(
-            str(path),
-            got=f"{rows} rows of stiffness and {M.matrix.shape[0]} of mass",
-            expected=f"an equal number of both, at most {_MOST_ROWS}",
-            hint="put full matrices into 'matrices'; this key is for reduced ones.",
-        )
+    refuse_if(
+        rows > _MOST_ROWS or M.matrix.shape != K.matrix.shape,
+        str(path),
+        got=f"{rows} rows of stiffness and {M.matrix.shape[0]} of mass",
+        expected=f"an equal number of both, at most {_MOST_ROWS}",
+        hint="put full matrices into 'matrices'; this key is for reduced ones.",
+    )
     return FileReducedMatrices(path=path, K=K.matrix.toarray(), M=M.matrix.toarray())

@@ -17,7 +17,7 @@ from klack.bodies.model_files.system_matrix import (
     choose_matrix,
     symmetric_matrix,
 )
-from klack.errors import InputError, foreign_reading, optional_package
+from klack.errors import InputError, foreign_reading, optional_package, refuse_if
 
 __all__ = ["read_matlab_matrix", "read_numpy_matrix"]
 
@@ -42,13 +42,13 @@ def compressed_matrix(
         and bool(np.all(pointer[1:] >= pointer[:-1]))
         and int(pointer[-1]) <= min(len(index), len(value))
     )
-    if not ordered:
-        raise InputError(
-            where,
-            got=f"{len(pointer)} pointers, {len(index)} indices and {len(value)} values",
-            expected=f"a sparse matrix of {size} columns",
-            hint="the file is damaged; store the matrix again.",
-        )
+    refuse_if(
+        not ordered,
+        where,
+        got=f"{len(pointer)} pointers, {len(index)} indices and {len(value)} values",
+        expected=f"a sparse matrix of {size} columns",
+        hint="the file is damaged; store the matrix again.",
+    )
     counts = np.diff(pointer.astype(np.int64))
     column = np.repeat(np.arange(size), counts)
     used = int(pointer[-1])
@@ -61,13 +61,13 @@ def triplet_matrix(where: str, row: Any, column: Any, value: Any, shape: Any) ->
     row, column, value = (np.asarray(part).ravel() for part in (row, column, value))
     _real(where, value)
     whole = row.dtype.kind in _WHOLE and column.dtype.kind in _WHOLE
-    if not whole or not len(row) == len(column) == len(value):
-        raise InputError(
-            where,
-            got=f"{len(row)} rows, {len(column)} columns and {len(value)} values",
-            expected="an equal number of each, all of them whole numbers",
-            hint="the file is damaged; store the matrix again.",
-        )
+    refuse_if(
+        not whole or not len(row) == len(column) == len(value),
+        where,
+        got=f"{len(row)} rows, {len(column)} columns and {len(value)} values",
+        expected="an equal number of each, all of them whole numbers",
+        hint="the file is damaged; store the matrix again.",
+    )
     row, column, value = row.astype(np.int64), column.astype(np.int64), value.astype(np.float64)
     kept = (value != 0) | (row == column)
     return symmetric_matrix(where, row[kept], column[kept], value[kept], size)
@@ -84,13 +84,13 @@ def dense_matrix(where: str, values: Any) -> Checked:
 
 def _square(where: str, shape: Any) -> int:
     sizes = [int(n) for n in np.asarray(shape).ravel()[:3]]
-    if len(sizes) != 2 or sizes[0] != sizes[1] or sizes[0] < 1:
-        raise InputError(
-            where,
-            got=f"an array of shape {tuple(sizes)}",
-            expected="a square matrix",
-            hint="store K and M as they are, one matrix each.",
-        )
+    refuse_if(
+        len(sizes) != 2 or sizes[0] != sizes[1] or sizes[0] < 1,
+        where,
+        got=f"an array of shape {tuple(sizes)}",
+        expected="a square matrix",
+        hint="store K and M as they are, one matrix each.",
+    )
     return sizes[0]
 
 
@@ -204,13 +204,16 @@ def _rows(arrays: _Arrays) -> RowPlaces | None:
     whole = (
         node.dtype.kind in "iu" and direction.dtype.kind in "iu" and node.shape == direction.shape
     )
-    if not whole or node.ndim != 1 or np.any(node < 1) or np.any((direction < 1) | (direction > 6)):
-        raise InputError(
-            f"{arrays.path}: node, direction",
-            got=f"arrays of shapes {node.shape} and {direction.shape}",
-            expected="whole numbers per row: nodes from 1, directions 1 to 6",
-            hint="store the node number and 1, 2, 3 (x, y, z) of each row.",
-        )
+    refuse_if(
+        not whole
+        or node.ndim != 1
+        or np.any(node < 1)
+        or np.any((direction < 1) | (direction > 6)),
+        f"{arrays.path}: node, direction",
+        got=f"arrays of shapes {node.shape} and {direction.shape}",
+        expected="whole numbers per row: nodes from 1, directions 1 to 6",
+        hint="store the node number and 1, 2, 3 (x, y, z) of each row.",
+    )
     return RowPlaces(node.astype(np.int64), direction.astype(np.int64))
 
 

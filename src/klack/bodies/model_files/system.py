@@ -10,7 +10,7 @@ from scipy.sparse import coo_array, csr_array
 
 from klack.bodies.model_files.matrices import read_matrix
 from klack.bodies.model_files.system_matrix import RowPlaces, SystemMatrix, read_row_places
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 
 __all__ = ["FileSystem", "NodeSystem", "on_nodes", "read_system"]
 
@@ -83,13 +83,13 @@ def read_system(
     K = read_matrix(stiffness, name=stiffness_name, role="stiffness")
     M = read_matrix(mass, name=mass_name, role="mass")
     where = str(stiffness) if stiffness == mass else f"{stiffness}, {mass.name}"
-    if stiffness == mass and K.name == M.name:
-        raise InputError(
-            where,
-            got=f"the matrix '{K.name}' as stiffness and as mass",
-            expected="two matrices",
-            hint="name them with stiffness_name and mass_name, or give the file of the other one.",
-        )
+    refuse_if(
+        stiffness == mass and K.name == M.name,
+        where,
+        got=f"the matrix '{K.name}' as stiffness and as mass",
+        expected="two matrices",
+        hint="name them with stiffness_name and mass_name, or give the file of the other one.",
+    )
     notes = (*(f"K: {note}" for note in K.notes), *(f"M: {note}" for note in M.notes))
     rows, m_rows = K.rows, M.rows
     if dofs is not None:
@@ -117,13 +117,13 @@ def _check_rows(
 ) -> None:
     n = K.matrix.shape[0]
     # matrices by node and direction may leave out places without entries
-    if M.matrix.shape[0] != n and m_rows is None:
-        raise InputError(
-            where,
-            got=f"K with {n} rows and M with {M.matrix.shape[0]}",
-            expected="the same rows",
-            hint="write both in one run, with the same boundary conditions.",
-        )
+    refuse_if(
+        M.matrix.shape[0] != n and m_rows is None,
+        where,
+        got=f"K with {n} rows and M with {M.matrix.shape[0]}",
+        expected="the same rows",
+        hint="write both in one run, with the same boundary conditions.",
+    )
     if rows is not None and len(rows.node) != n:
         raise InputError(
             str(dofs or where),

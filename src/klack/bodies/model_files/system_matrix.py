@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 
 __all__ = [
     "Role",
@@ -126,13 +126,13 @@ def symmetric_matrix(
     """
     _check_entries(where, row, column, value, size)
     A = coo_array((value, (row, column)), shape=(size, size)).tocsr()
-    if A.nnz < len(value):
-        raise InputError(
-            where,
-            got=f"{len(value) - A.nnz} duplicate entries",
-            expected="each entry once",
-            hint="write the matrix again; do not join files of several steps.",
-        )
+    refuse_if(
+        A.nnz < len(value),
+        where,
+        got=f"{len(value) - A.nnz} duplicate entries",
+        expected="each entry once",
+        hint="write the matrix again; do not join files of several steps.",
+    )
     below, above = bool(np.any(row > column)), bool(np.any(row < column))
     if not (below or above):
         return A, ("it is diagonal",)
@@ -166,14 +166,14 @@ def _asymmetry_notes(where: str, A: csr_array, difference: NDArray[np.float64]) 
     """Notes on asymmetry; reject a clear one."""
     size = float(np.linalg.norm(A.data))
     asymmetry = float(np.linalg.norm(difference)) / size if size else 0.0
-    if not asymmetry <= _LARGEST_ASYMMETRY:
-        raise InputError(
-            where,
-            got=f"a matrix that is not symmetric: |A - A^T| / |A| = {asymmetry:.2g}",
-            expected=f"at most {_LARGEST_ASYMMETRY:g}",
-            hint="write K and M of a linear elastic model without friction, "
-            "follower loads, rotating frame or dampers.",
-        )
+    refuse_if(
+        not asymmetry <= _LARGEST_ASYMMETRY,
+        where,
+        got=f"a matrix that is not symmetric: |A - A^T| / |A| = {asymmetry:.2g}",
+        expected=f"at most {_LARGEST_ASYMMETRY:g}",
+        hint="write K and M of a linear elastic model without friction, "
+        "follower loads, rotating frame or dampers.",
+    )
     if asymmetry <= _SEEN_ASYMMETRY:
         return ()
     return (f"asymmetry {asymmetry:.1g}, made symmetric",)
@@ -186,13 +186,13 @@ def _check_entries(
     value: NDArray[np.float64],
     size: int,
 ) -> None:
-    if size < 1 or len(value) < size:
-        raise InputError(
-            where,
-            got=f"{size} rows with {len(value)} entries",
-            expected="one entry or more in every row",
-            hint="the file is truncated, or its mass matrix has nodes without mass.",
-        )
+    refuse_if(
+        size < 1 or len(value) < size,
+        where,
+        got=f"{size} rows with {len(value)} entries",
+        expected="one entry or more in every row",
+        hint="the file is truncated, or its mass matrix has nodes without mass.",
+    )
     for index in (row, column):
         low, high = int(index.min()), int(index.max())
         if low < 0 or high >= size:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 
 __all__ = ["FileModalData", "read_uff_modes"]
 
@@ -215,10 +215,13 @@ def read_uff_modes(path: Path) -> FileModalData:
     Rejects complex modes and a file without dataset 55: frequency responses (dataset 58) need a
     modal analysis first.
     """
-    if path.stat().st_size > _LARGEST:
-        raise InputError(
-            str(path), got="more than 256 MB", expected="a file of modes", hint="export fewer nodes"
-        )
+    refuse_if(
+        path.stat().st_size > _LARGEST,
+        str(path),
+        got="more than 256 MB",
+        expected="a file of modes",
+        hint="export fewer nodes",
+    )
     lines = path.read_bytes().decode("latin-1").splitlines()
     modes: list[_Mode] = []
     responses: list[Receptance] = []
@@ -233,14 +236,14 @@ def read_uff_modes(path: Path) -> FileModalData:
             responses += [response] if response is not None else []
         elif kind == "164":
             units = _units(path, lines, first, last)
-    if not modes:
-        raise InputError(
-            str(path),
-            got=f"datasets {', '.join(dict.fromkeys(kinds)) or '(none)'}",
-            expected="mode shapes (dataset 55)",
-            hint="frequency responses (dataset 58) are not modes; run the modal analysis "
-            "first and export its mass-normalised shapes.",
-        )
+    refuse_if(
+        not modes,
+        str(path),
+        got=f"datasets {', '.join(dict.fromkeys(kinds)) or '(none)'}",
+        expected="mode shapes (dataset 55)",
+        hint="frequency responses (dataset 58) are not modes; run the modal analysis "
+        "first and export its mass-normalised shapes.",
+    )
     if len({mode.nodes for mode in modes}) > 1 or len({m.shapes.shape for m in modes}) > 1:
         odd = next(mode for mode in modes if mode.nodes != modes[0].nodes or mode is modes[-1])
         raise uff_refusal(
@@ -266,13 +269,13 @@ def _mode(path: Path, lines: list[str], first: int, end: int) -> _Mode:
         raise uff_refusal(path, first, "a short dataset 55", "a mode with its nodes")
     head = uff_whole(path, lines, first + 5, end, 6)
     _, analysis, _, quantity, number_type, width = head[:6]
-    if analysis == _COMPLEX_MODE or number_type == 5:
-        raise InputError(
-            f"{path}, line {first + 6}",
-            got="a complex mode",
-            expected="real normal modes (analysis type 2, real data)",
-            hint="export normal modes; damping is a ratio given with the shape.",
-        )
+    refuse_if(
+        analysis == _COMPLEX_MODE or number_type == 5,
+        f"{path}, line {first + 6}",
+        got="a complex mode",
+        expected="real normal modes (analysis type 2, real data)",
+        hint="export normal modes; damping is a ratio given with the shape.",
+    )
     if analysis != _NORMAL_MODE or quantity not in (0, _DISPLACEMENT) or not 1 <= width <= 6:
         raise uff_refusal(
             path,

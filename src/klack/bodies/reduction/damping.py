@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from klack.bodies.elasticity.body import VibratingBody
 from klack.bodies.elasticity.layer import layer_damping
-from klack.errors import InputError, require_nonnegative
+from klack.errors import refuse_if, require_nonnegative
 
 __all__ = ["Damping", "LossFactor", "ModalDamping", "RayleighDamping", "damping_ratios"]
 
@@ -42,13 +42,13 @@ class ModalDamping:
         omega = np.asarray(omega, dtype=float)
         ratio = np.asarray(self.ratio, dtype=float)
         elastic = omega > 0
-        if ratio.ndim and ratio.shape != (int(elastic.sum()),):
-            raise InputError(
-                "ModalDamping.ratio",
-                got=f"{ratio.size} ratios",
-                expected=f"one ratio, or one for each of the {int(elastic.sum())} elastic modes",
-                hint="give a single number, or reduce again with that many modes.",
-            )
+        refuse_if(
+            ratio.ndim and ratio.shape != (int(elastic.sum()),),
+            "ModalDamping.ratio",
+            got=f"{ratio.size} ratios",
+            expected=f"one ratio, or one for each of the {int(elastic.sum())} elastic modes",
+            hint="give a single number, or reduce again with that many modes.",
+        )
         result = np.zeros(omega.shape)
         result[elastic] = ratio
         return result

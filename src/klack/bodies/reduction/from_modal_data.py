@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from klack.bodies.reduction.damping import Damping
 from klack.bodies.reduction.given_modes import RIGID_FREQUENCY, ModesAtPorts, body_of_modes
 from klack.bodies.reduction.reduced_body import ReducedBody
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 
 __all__ = ["body_of_craig_bampton", "body_of_modal_data", "fit_residual"]
 
@@ -106,13 +106,13 @@ def body_of_craig_bampton(
             )
     omega2, shapes = _all_modes(where, 0.5 * (K + K.T), 0.5 * (M + M.T))
     limit = (2.0 * np.pi * RIGID_FREQUENCY) ** 2 + 1e-12 * float(np.max(np.abs(omega2)))
-    if omega2[0] < -limit:
-        raise InputError(
-            f"{where}: K",
-            got=f"a negative stiffness (lowest omega^2 {omega2[0]:.4g} 1/s^2)",
-            expected="a stiffness of 0 or more in every direction: otherwise the body is unstable",
-            hint="export K without preload and geometric stiffness.",
-        )
+    refuse_if(
+        omega2[0] < -limit,
+        f"{where}: K",
+        got=f"a negative stiffness (lowest omega^2 {omega2[0]:.4g} 1/s^2)",
+        expected="a stiffness of 0 or more in every direction: otherwise the body is unstable",
+        hint="export K without preload and geometric stiffness.",
+    )
     rigid = omega2 < limit
     at_ports = shapes[list(rows)].T
     omega = np.sqrt(omega2[~rigid])
@@ -186,13 +186,13 @@ def fit_residual(
         Modes, rigid ones included; product of their shapes at both places.
     """
     low = frequency <= _HIGHEST * float(omega.max(initial=0.0)) / (2.0 * np.pi)
-    if np.sum(low) < _FEWEST:
-        raise InputError(
-            where,
-            got=f"{int(np.sum(low))} frequencies below half of the highest mode",
-            expected=f"at least {_FEWEST}",
-            hint="export the responses over the range of the modes, or leave them out.",
-        )
+    refuse_if(
+        np.sum(low) < _FEWEST,
+        where,
+        got=f"{int(np.sum(low))} frequencies below half of the highest mode",
+        expected=f"at least {_FEWEST}",
+        hint="export the responses over the range of the modes, or leave them out.",
+    )
     w = 2.0 * np.pi * frequency[low, None]
     modal = np.sum(product / (omega**2 - w**2 + 2j * damping * omega * w), axis=1)
     missing = response[low] - modal
@@ -200,11 +200,11 @@ def fit_residual(
     residual = float(np.sum(weight * missing.real) / np.sum(weight))
     size = np.maximum(np.abs(response[low]), 1e-300)
     apart = float(np.median(np.abs(missing - residual) / size))
-    if not apart <= _AGREEMENT:
-        raise InputError(
-            where,
-            got=f"responses with a median difference of {100 * apart:.3g} % from the modes",
-            expected="at most 10 %",
-            hint="modes and responses belong to different bodies, supports or units.",
-        )
+    refuse_if(
+        not apart <= _AGREEMENT,
+        where,
+        got=f"responses with a median difference of {100 * apart:.3g} % from the modes",
+        expected="at most 10 %",
+        hint="modes and responses belong to different bodies, supports or units.",
+    )
     return residual

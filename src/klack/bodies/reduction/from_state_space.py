@@ -28,7 +28,7 @@ from klack.bodies.reduction.given_modes import (
     shapes_of_gram,
 )
 from klack.bodies.reduction.reduced_body import ReducedBody, StateSpace
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.input.unit_systems import UnitSystem
 
 __all__ = ["body_of_state_space", "modes_of_state_space", "state_space_in_si"]
@@ -128,22 +128,24 @@ def _split_rigid(
     zero = np.zeros((len(C), B.shape[1]))
     if V0.shape[1] == 0:
         return zero, (A, B, C)
-    if V0.shape[1] != 2 * chains or W0.shape[1] != V0.shape[1]:
-        raise InputError(
-            f"{where}: poles at zero",
-            got=f"{V0.shape[1]} of them in {chains} chains",
-            expected="two for each rigid motion: its displacement and its velocity",
-            hint="a body is free or supported; drag on the rigid motion is not part of it, and "
-            "integrated outputs are not possible.",
-        )
+    refuse_if(
+        V0.shape[1] != 2 * chains or W0.shape[1] != V0.shape[1],
+        f"{where}: poles at zero",
+        got=f"{V0.shape[1]} of them in {chains} chains",
+        expected="two for each rigid motion: its displacement and its velocity",
+        hint="a body is free or supported; drag on the rigid motion is not part of it, and "
+        "integrated outputs are not possible.",
+    )
     inner = W0.T @ V0
     into, out = np.linalg.solve(inner, W0.T @ B), C @ V0
     turn = np.linalg.solve(inner, W0.T @ A @ V0)
     jump, rigid = out @ into, out @ turn @ into
     # a displacement does not jump when a force sets in; a velocity does
     speed = float(np.linalg.norm(turn, 2))
-    if np.max(np.abs(jump)) * speed > TOLERANCE * max(np.max(np.abs(rigid)), 1e-300):
-        raise _not_displacement(f"{where}: rigid motion")
+    _not_displacement_if(
+        np.max(np.abs(jump)) * speed > TOLERANCE * max(np.max(np.abs(rigid)), 1e-300),
+        f"{where}: rigid motion",
+    )
     V1, W1 = scipy.linalg.null_space(W0.T), scipy.linalg.null_space(V0.T)
     middle = W1.T @ V1
     rest = (
@@ -197,14 +199,14 @@ def _check_stable(where: str, poles: Complex) -> None:
     growth = poles.real - _STABLE * size - _ROUND_OFF * size.max()
     growth[slow] = -1.0
     worst = int(np.argmax(growth))
-    if growth[worst] > 0:
-        raise InputError(
-            f"{where}: stability",
-            got=f"a pole that grows by {poles[worst].real:.4g} 1/s at "
-            f"{abs(poles[worst].imag) / (2e3 * np.pi):.6g} kHz",
-            expected="poles that decay or persist",
-            hint="the model is unstable and would create energy; reduce the body again.",
-        )
+    refuse_if(
+        growth[worst] > 0,
+        f"{where}: stability",
+        got=f"a pole that grows by {poles[worst].real:.4g} 1/s at "
+        f"{abs(poles[worst].imag) / (2e3 * np.pi):.6g} kHz",
+        expected="poles that decay or persist",
+        hint="the model is unstable and would create energy; reduce the body again.",
+    )
 
 
 _Pair = tuple[float, float, Complex, int]
@@ -264,8 +266,7 @@ def _check_gram(where: str, ports: Sequence[str], G: Complex, largest: float) ->
     limit = TOLERANCE * own + _NOISE * largest
     turned = float(np.max(np.abs(G.imag)))
     if turned > limit:
-        if turned > 0.5 * own:
-            raise _not_displacement(where)
+        _not_displacement_if(turned > 0.5 * own, where)
         raise InputError(
             where,
             got=f"a complex shape ({100 * turned / own:.2g} % out of phase)",
@@ -274,8 +275,9 @@ def _check_gram(where: str, ports: Sequence[str], G: Complex, largest: float) ->
             "at one point.",
         )
     own_share = np.diag(G.real)
-    if own_share.min() < -limit:
-        raise _makes_energy(where, ports[int(np.argmin(own_share))], float(own_share.min()))
+    _makes_energy_if(
+        own_share.min() < -limit, where, ports[int(np.argmin(own_share))], float(own_share.min())
+    )
     apart = np.abs(G.real - G.real.T)
     if np.max(apart) > limit:
         i, j = (int(k) for k in np.unravel_index(int(np.argmax(apart)), apart.shape))
@@ -289,12 +291,14 @@ def _check_gram(where: str, ports: Sequence[str], G: Complex, largest: float) ->
             "node is not that of a loaded area.",
         )
     values, vectors = np.linalg.eigh(0.5 * (G.real + G.real.T))
-    if values[0] < -limit:
-        raise _makes_energy(where, ports[int(np.argmax(np.abs(vectors[:, 0])))], float(values[0]))
+    _makes_energy_if(
+        values[0] < -limit, where, ports[int(np.argmax(np.abs(vectors[:, 0])))], float(values[0])
+    )
 
 
-def _makes_energy(where: str, port: str, share: float) -> InputError:
-    return InputError(
+def _makes_energy_if(wrong: object, where: str, port: str, share: float) -> None:
+    refuse_if(
+        wrong,
         where,
         got=f"a share of {share:.6g} 1/kg at port '{port}'",
         expected="shares of 0 or more (passivity): force and displacement have the same direction",
@@ -303,8 +307,9 @@ def _makes_energy(where: str, port: str, share: float) -> InputError:
     )
 
 
-def _not_displacement(where: str) -> InputError:
-    return InputError(
+def _not_displacement_if(wrong: object, where: str) -> None:
+    refuse_if(
+        wrong,
         where,
         got="an output that follows the force like a velocity",
         expected="displacements",

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.bodies.reduction.reduced_body import ReducedBody
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 
 __all__ = ["RIGID_FREQUENCY", "TOLERANCE", "ModesAtPorts", "body_of_modes", "shapes_of_gram"]
 
@@ -176,13 +176,13 @@ def _axial(where: str, ports: Sequence[str], rigid: Floats) -> Floats:
 
 def _checked_mass(where: str, axial: Floats, rank: int, mass: float | None) -> float:
     found = float(axial @ axial)
-    if mass is None and rank > 1:
-        raise InputError(
-            f"{where}: mass",
-            got=f"{rank} rigid motions at the ports, and no mass",
-            expected="the mass, which separates translation from rotation",
-            hint="add 'mass: 5 g' to the reduced model, or give ports on the axis only.",
-        )
+    refuse_if(
+        mass is None and rank > 1,
+        f"{where}: mass",
+        got=f"{rank} rigid motions at the ports, and no mass",
+        expected="the mass, which separates translation from rotation",
+        hint="add 'mass: 5 g' to the reduced model, or give ports on the axis only.",
+    )
     if mass is not None and abs(found - mass) > _MASS * mass:
         raise InputError(
             f"{where}: mass",

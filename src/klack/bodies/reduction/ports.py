@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from klack.bodies.elasticity.quadrature import quadrature
 from klack.bodies.elasticity.shape_functions import shape_functions
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.mesh.mesh import FaceBlock, Mesh, Surface
 
 __all__ = [
@@ -114,13 +114,13 @@ class Observer:
 def _weights(where: str, values: ArrayLike) -> NDArray[np.float64]:
     array = np.array(values, dtype=float)
     usable = array.ndim == 1 and bool(np.all(np.isfinite(array))) and bool(np.any(array))
-    if not usable:
-        raise InputError(
-            where,
-            got=f"an array of shape {array.shape} with {np.count_nonzero(array)} non-zero entries",
-            expected="one finite number per degree of freedom, not all of them zero",
-            hint="check that the surface has faces and that the load is not zero.",
-        )
+    refuse_if(
+        not usable,
+        where,
+        got=f"an array of shape {array.shape} with {np.count_nonzero(array)} non-zero entries",
+        expected="one finite number per degree of freedom, not all of them zero",
+        hint="check that the surface has faces and that the load is not zero.",
+    )
     array.setflags(write=False)
     return array
 
@@ -141,8 +141,7 @@ def surface_port(mesh: Mesh, surface: str | Surface, direction: Direction, *, na
     surface = mesh.surface(surface) if isinstance(surface, str) else surface
     where = f"port '{name}' on surface '{surface.name}'"
     unit = _unit_vector(mesh, direction, where)
-    if mesh.dimension == 2 and abs(unit[0]) > 0:
-        raise _radial(where)
+    _radial_if(mesh.dimension == 2 and abs(unit[0]) > 0, where)
     weights = np.zeros(mesh.node_count)
     for block in surface.blocks:
         at = face_samples(mesh, block)
@@ -199,8 +198,7 @@ def node_set_port(mesh: Mesh, node_set: str, direction: Direction, *, name: str)
             hint="name the set in geometry.nodes.sets, or in the mesh file.",
         )
     unit = _unit_vector(mesh, direction, where)
-    if mesh.dimension == 2 and abs(unit[0]) > 0:
-        raise _radial(where)
+    _radial_if(mesh.dimension == 2 and abs(unit[0]) > 0, where)
     pattern = np.zeros((mesh.node_count, mesh.dimension))
     pattern[nodes] = unit / len(nodes)
     return Port(name, pattern.ravel())
@@ -221,13 +219,13 @@ def node_observer(
     unit = _unit_vector(mesh, direction, where)
     if isinstance(place, int | np.integer):
         node = int(place)
-        if not 0 <= node < mesh.node_count:
-            raise InputError(
-                where,
-                got=f"node {node}",
-                expected=f"0 to {mesh.node_count - 1}",
-                hint="give a node number of this mesh, or a point [m].",
-            )
+        refuse_if(
+            not 0 <= node < mesh.node_count,
+            where,
+            got=f"node {node}",
+            expected=f"0 to {mesh.node_count - 1}",
+            hint="give a node number of this mesh, or a point [m].",
+        )
     else:
         node = int(np.argmin(np.sum((mesh.points - np.asarray(place, float)) ** 2, axis=1)))
     weights = np.zeros((mesh.node_count, mesh.dimension))
@@ -242,18 +240,19 @@ def _unit_vector(mesh: Mesh, direction: Direction, where: str) -> NDArray[np.flo
     else:
         vector = np.asarray(direction, dtype=float)
     length = float(np.linalg.norm(vector)) if vector.shape == (mesh.dimension,) else 0.0
-    if not (np.isfinite(length) and length > 0):
-        raise InputError(
-            where,
-            got=f"direction {direction!r}",
-            expected=f"one of {', '.join(names)}, or a vector of {mesh.dimension} numbers",
-            hint="an axisymmetric body has the directions r and z, a solid x, y and z.",
-        )
+    refuse_if(
+        not (np.isfinite(length) and length > 0),
+        where,
+        got=f"direction {direction!r}",
+        expected=f"one of {', '.join(names)}, or a vector of {mesh.dimension} numbers",
+        hint="an axisymmetric body has the directions r and z, a solid x, y and z.",
+    )
     return vector / length
 
 
-def _radial(where: str) -> InputError:
-    return InputError(
+def _radial_if(wrong: object, where: str) -> None:
+    refuse_if(
+        wrong,
         where,
         got="a radial direction on an axisymmetric body",
         expected="'z'",
@@ -262,10 +261,10 @@ def _radial(where: str) -> InputError:
 
 
 def _require_area(where: str, area: float) -> None:
-    if not area > 0:
-        raise InputError(
-            where,
-            got="a surface without area or without resultant",
-            expected="at least one face, not closed on itself",
-            hint="check the name of the surface in the mesh.",
-        )
+    refuse_if(
+        not area > 0,
+        where,
+        got="a surface without area or without resultant",
+        expected="at least one face, not closed on itself",
+        hint="check the name of the surface in the mesh.",
+    )

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from klack.bodies.reduction.reduced_body import ReducedBody, port_among
-from klack.errors import InputError
+from klack.errors import refuse_if
 
 __all__ = ["Receptance", "frequency_axis", "modal_sum", "observed_receptance", "reduced_receptance"]
 
@@ -123,13 +123,13 @@ def modal_sum(
 def frequency_axis(where: str, frequencies: ArrayLike) -> NDArray[np.float64]:
     """Check frequencies [Hz]: one-dimensional, above zero, ascending."""
     axis = np.asarray(frequencies, dtype=float)
-    if axis.ndim != 1 or not axis.size or not axis[0] > 0 or not np.all(np.diff(axis) > 0):
-        raise InputError(
-            where,
-            got=f"{axis.size} values of shape {axis.shape}",
-            expected="one row of ascending frequencies above 0 Hz",
-            hint="for example numpy.geomspace(1e3, 1e6, 700).",
-        )
+    refuse_if(
+        axis.ndim != 1 or not axis.size or not axis[0] > 0 or not np.all(np.diff(axis) > 0),
+        where,
+        got=f"{axis.size} values of shape {axis.shape}",
+        expected="one row of ascending frequencies above 0 Hz",
+        hint="for example numpy.geomspace(1e3, 1e6, 700).",
+    )
     return axis
 
 

@@ -25,7 +25,7 @@ from klack.bodies.reduction.damping import Damping, damping_ratios
 from klack.bodies.reduction.ports import Observer, Port
 from klack.bodies.reduction.reduced_body import Recovery, ReducedBody, surface_faces
 from klack.bodies.reduction.selection import ByCount, ByFrequency, ModeSelection, select
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 
 __all__ = ["Correction", "at_ports", "kept_modes", "reduce_body"]
 
@@ -143,13 +143,13 @@ def _no_modes(body: ElasticBody) -> Modes:
 def _patterns(body: ElasticBody, ports: Sequence[Port]) -> NDArray[np.float64]:
     where = f"reduction of body '{body.name}': ports"
     names = [port.name for port in ports]
-    if not names or len(set(names)) < len(names):
-        raise InputError(
-            where,
-            got=f"the names {names}",
-            expected="at least one port, each with its own name",
-            hint="name one port for each contact.",
-        )
+    refuse_if(
+        not names or len(set(names)) < len(names),
+        where,
+        got=f"the names {names}",
+        expected="at least one port, each with its own name",
+        hint="name one port for each contact.",
+    )
     for port in ports:
         _require_length(f"{where}: '{port.name}'", port.pattern, body.dof_count)
     return np.column_stack([port.pattern for port in ports])
@@ -167,13 +167,13 @@ def _observed(
 
 
 def _require_length(where: str, values: NDArray[np.float64], length: int) -> None:
-    if values.shape != (length,):
-        raise InputError(
-            where,
-            got=f"{len(values)} weights",
-            expected=f"{length}, one for each degree of freedom of the body",
-            hint="define the port with the mesh of this body.",
-        )
+    refuse_if(
+        values.shape != (length,),
+        where,
+        got=f"{len(values)} weights",
+        expected=f"{length}, one for each degree of freedom of the body",
+        hint="define the port with the mesh of this body.",
+    )
 
 
 def _recovery(

@@ -10,7 +10,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.files.whole import whole_file
 from klack.mesh.mesh import Mesh, simplices
 
@@ -61,32 +61,32 @@ def read_arrays(path: Path, kind: str, version: int, required: Sequence[str]) ->
         ) from error
     _check_kind(where, arrays, kind, version)
     missing = [key for key in required if key not in arrays]
-    if missing:
-        raise InputError(
-            where,
-            got=f"a file without {', '.join(missing)}",
-            expected=f"a complete {kind} file of version {version}",
-            hint="the file is damaged or was edited; write it again.",
-        )
+    refuse_if(
+        missing,
+        where,
+        got=f"a file without {', '.join(missing)}",
+        expected=f"a complete {kind} file of version {version}",
+        hint="the file is damaged or was edited; write it again.",
+    )
     return arrays
 
 
 def _check_kind(where: str, arrays: Arrays, kind: str, version: int) -> None:
     found = str(arrays["format"]) if "format" in arrays else "nothing known"
-    if found != kind or "version" not in arrays:
-        raise InputError(
-            where,
-            got=f"a file that holds {found}",
-            expected=kind,
-            hint="choose a file written by klack for this purpose.",
-        )
-    if int(arrays["version"]) > version:
-        raise InputError(
-            where,
-            got=f"version {int(arrays['version'])}",
-            expected=f"version {version} or older",
-            hint="the file was written by a newer version of klack; update klack.",
-        )
+    refuse_if(
+        found != kind or "version" not in arrays,
+        where,
+        got=f"a file that holds {found}",
+        expected=kind,
+        hint="choose a file written by klack for this purpose.",
+    )
+    refuse_if(
+        int(arrays["version"]) > version,
+        where,
+        got=f"version {int(arrays['version'])}",
+        expected=f"version {version} or older",
+        hint="the file was written by a newer version of klack; update klack.",
+    )
 
 
 def port_among(known: Sequence[str], name: str, where: str, what: str, hint: str) -> int:
@@ -229,13 +229,13 @@ class ReducedBody:
                     hint="modes are rows, ports and observers are columns.",
                 )
         rigid = np.asarray(self.omega) == 0
-        if not (np.all(rigid[: self.rigid_count]) and not np.any(rigid[self.rigid_count :])):
-            raise InputError(
-                f"reduced body '{self.name}': omega",
-                got=f"{int(rigid.sum())} zero frequencies",
-                expected=f"exactly the first {self.rigid_count} (rigid_count)",
-                hint="rigid modes come first, elastic modes above 0 rad/s follow.",
-            )
+        refuse_if(
+            not (np.all(rigid[: self.rigid_count]) and not np.any(rigid[self.rigid_count :])),
+            f"reduced body '{self.name}': omega",
+            got=f"{int(rigid.sum())} zero frequencies",
+            expected=f"exactly the first {self.rigid_count} (rigid_count)",
+            hint="rigid modes come first, elastic modes above 0 rad/s follow.",
+        )
 
     @property
     def moves(self) -> bool:

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError, require_positive
+from klack.errors import refuse_if, require_positive
 
 __all__ = ["ByCount", "ByFrequency", "ByParticipation", "ModeSelection", "participation", "select"]
 
@@ -50,13 +50,13 @@ class ByParticipation:
 
     def __post_init__(self) -> None:
         _require_count("ByParticipation.count", self.count)
-        if self.pool < self.count:
-            raise InputError(
-                "ByParticipation.pool",
-                got=f"a pool of {self.pool} modes",
-                expected=f"at least the {self.count} modes to keep",
-                hint="a pool of three to five times the count is a good choice.",
-            )
+        refuse_if(
+            self.pool < self.count,
+            "ByParticipation.pool",
+            got=f"a pool of {self.pool} modes",
+            expected=f"at least the {self.count} modes to keep",
+            hint="a pool of three to five times the count is a good choice.",
+        )
 
 
 ModeSelection = ByCount | ByFrequency | ByParticipation
@@ -98,13 +98,13 @@ def select(
     if isinstance(selection, ByFrequency):
         return np.flatnonzero(omega <= 2.0 * np.pi * selection.maximum)
     needed = selection.pool if isinstance(selection, ByParticipation) else selection.count
-    if len(omega) < needed:
-        raise InputError(
-            f"mode selection {selection}",
-            got=f"a pool of {len(omega)} computed modes",
-            expected=f"at least {needed}",
-            hint="compute more modes, or request fewer.",
-        )
+    refuse_if(
+        len(omega) < needed,
+        f"mode selection {selection}",
+        got=f"a pool of {len(omega)} computed modes",
+        expected=f"at least {needed}",
+        hint="compute more modes, or request fewer.",
+    )
     if isinstance(selection, ByCount):
         return np.arange(selection.count)
     share = participation(omega[:needed], port_shapes[:needed])
@@ -112,7 +112,6 @@ def select(
 
 
 def _require_count(where: str, count: int) -> None:
-    if count < 0:
-        raise InputError(
-            where, got=f"{count}", expected="0 or more modes", hint="give a whole number."
-        )
+    refuse_if(
+        count < 0, where, got=f"{count}", expected="0 or more modes", hint="give a whole number."
+    )

@@ -13,7 +13,7 @@ from klack.bodies.reduction.damping import Damping, damping_ratios
 from klack.bodies.reduction.ports import Port, face_samples
 from klack.bodies.reduction.reduce import at_ports
 from klack.bodies.reduction.reduced_body import port_among
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import FaceBlock, Surface
 
@@ -188,13 +188,13 @@ def build_structure(
     left_out
         Whose faces never count, whatever other surface they are in.
     """
-    if not body.is_fixed:
-        raise InputError(
-            f"structure of body '{body.name}'",
-            got="an unsupported body",
-            expected="a held body",
-            hint="name a support in bodies." + body.name + ".fixed.",
-        )
+    refuse_if(
+        not body.is_fixed,
+        f"structure of body '{body.name}'",
+        got="an unsupported body",
+        expected="a held body",
+        hint="name a support in bodies." + body.name + ".fixed.",
+    )
     patterns = np.column_stack([np.empty((body.dof_count, 0)), *(p.port.pattern for p in ports)])
     shapes = at_ports(modes.shapes, patterns)
     rest = deflections - modes.shapes @ (shapes / modes.omega[:, None] ** 2)

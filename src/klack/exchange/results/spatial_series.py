@@ -266,8 +266,10 @@ def _pair(stop: str, modes: ModalMoments, shapes: Mapping[str, BodyShapes]) -> t
         if stop in body.is_upper and name != modes.bodies[0] and name in modes.bodies
     ]
     needle = modes.bodies[0]
-    if len(others) != 1 or needle not in shapes or stop not in shapes[needle].is_upper:
-        raise _other_bodies(f"no stop '{stop}' of two of the bodies {', '.join(modes.bodies)}")
+    _other_bodies_if(
+        len(others) != 1 or needle not in shapes or stop not in shapes[needle].is_upper,
+        f"no stop '{stop}' of two of the bodies {', '.join(modes.bodies)}",
+    )
     return needle, others[0]
 
 
@@ -297,16 +299,19 @@ def _parts(
 def _require_same(name: str, found: BodyShapes, q: Floats, marks: Floats) -> None:
     """Reject other shapes: mesh, sign or pairing of modes may differ."""
     here = shape_marks(found.shapes)
-    if found.shapes.shape[1] != q.shape[1]:
-        raise _other_bodies(
-            f"{found.shapes.shape[1]} modes of '{name}', and {q.shape[1]} in the result"
-        )
-    if len(marks) != len(here) or np.any(np.abs(here - marks) > _SAME * np.abs(here).max()):
-        raise _other_bodies(f"modes of '{name}' whose shapes differ from the result")
+    _other_bodies_if(
+        found.shapes.shape[1] != q.shape[1],
+        f"{found.shapes.shape[1]} modes of '{name}', and {q.shape[1]} in the result",
+    )
+    _other_bodies_if(
+        len(marks) != len(here) or np.any(np.abs(here - marks) > _SAME * np.abs(here).max()),
+        f"modes of '{name}' whose shapes differ from the result",
+    )
 
 
-def _other_bodies(got: str) -> InputError:
-    return InputError(
+def _other_bodies_if(wrong: object, got: str) -> None:
+    refuse_if(
+        wrong,
         "bodies of the case in the result",
         got=got,
         expected="the bodies that the stroke was computed with",

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import AccuracyWarning, InputError, require_positive
+from klack.errors import AccuracyWarning, InputError, refuse_if, require_positive
 from klack.mesh.families import FAMILIES
 from klack.mesh.files.mesh_model import FileMaterial, MeshModel
 from klack.mesh.files.named_faces import LOOSE, MarkedFaces, loose_faces, named_faces
@@ -23,6 +23,7 @@ __all__ = [
     "FileElements",
     "FileMesh",
     "mesh_model",
+    "renumbered",
     "require_right_of_axis",
     "require_sound",
     "same_nodes",
@@ -53,13 +54,13 @@ def require_right_of_axis(path: Path, mesh: Mesh, numbers: Ints) -> None:
     if mesh.dimension != 2:
         return
     lowest = int(np.argmin(mesh.points[:, 0]))
-    if mesh.points[lowest, 0] < 0:
-        raise InputError(
-            f"{path}: node {numbers[lowest]}",
-            got=f"r = x = {mesh.points[lowest, 0] * 1e3:.6g} mm",
-            expected="r >= 0: the axis of an axisymmetric mesh is x = 0",
-            hint="draw the half of the section at positive x.",
-        )
+    refuse_if(
+        mesh.points[lowest, 0] < 0,
+        f"{path}: node {numbers[lowest]}",
+        got=f"r = x = {mesh.points[lowest, 0] * 1e3:.6g} mm",
+        expected="r >= 0: the axis of an axisymmetric mesh is x = 0",
+        hint="draw the half of the section at positive x.",
+    )
 
 
 def require_sound(path: Path, mesh: Mesh, numbers: Sequence[Ints]) -> None:
@@ -215,7 +216,7 @@ def mesh_model(
             ElementBlock(b.family, b.connectivity[:, _TETRAHEDRA[b.family]], b.solid)
             for b in blocks
         )
-    sets = {name: own for name, members in sets.items() if len(own := _renumbered(new, members))}
+    sets = {name: own for name, members in sets.items() if len(own := renumbered(new, members))}
     surfaces, inner = named_faces(
         str(path),
         blocks,
@@ -240,13 +241,13 @@ def mesh_model(
 
 def _dimension(path: Path, solids: tuple[FileElements, ...]) -> int:
     dimensions = {FAMILIES[part.family].dimension for part in solids}
-    if len(dimensions) != 1:
-        raise InputError(
-            str(path),
-            got="no solid elements" if not dimensions else "solid and plane elements",
-            expected="solid elements (tetrahedra, hexahedra, wedges)",
-            hint="save the volume elements too; the file may be truncated.",
-        )
+    refuse_if(
+        len(dimensions) != 1,
+        str(path),
+        got="no solid elements" if not dimensions else "solid and plane elements",
+        expected="solid elements (tetrahedra, hexahedra, wedges)",
+        hint="save the volume elements too; the file may be truncated.",
+    )
     return dimensions.pop()
 
 
@@ -334,7 +335,8 @@ def _kept(path: Path, blocks: tuple[ElementBlock, ...], wanted: Sequence[str] | 
     return [i for i, block in enumerate(blocks) if wanted is None or block.solid in wanted]
 
 
-def _renumbered(new: Ints, nodes: Ints) -> Ints:
+def renumbered(new: Ints, nodes: Ints) -> Ints:
+    """New numbers of those nodes that have one."""
     kept = new[nodes]
     return kept[kept >= 0]
 

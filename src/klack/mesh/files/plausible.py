@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.mesh.mesh import Mesh
 from klack.units import format_si
 
@@ -77,19 +77,19 @@ LARGEST_BYTES = 2_000_000_000
 
 def read_bytes(path: Path, kind: str) -> bytes:
     """Content of a mesh file; rejects it if missing, empty or too large."""
-    if not path.is_file():
-        raise InputError(
-            str(path),
-            got="no such file",
-            expected=kind,
-            hint="check the path; it is relative to where you started the program.",
-        )
+    refuse_if(
+        not path.is_file(),
+        str(path),
+        got="no such file",
+        expected=kind,
+        hint="check the path; it is relative to where you started the program.",
+    )
     size = path.stat().st_size
-    if not 0 < size <= LARGEST_BYTES:
-        raise InputError(
-            str(path),
-            got="an empty file" if size == 0 else f"{size / 1e9:.3g} GB",
-            expected=f"{kind}, at most {LARGEST_BYTES / 1e9:.3g} GB",
-            hint="write the mesh only, without results or steps.",
-        )
+    refuse_if(
+        not 0 < size <= LARGEST_BYTES,
+        str(path),
+        got="an empty file" if size == 0 else f"{size / 1e9:.3g} GB",
+        expected=f"{kind}, at most {LARGEST_BYTES / 1e9:.3g} GB",
+        hint="write the mesh only, without results or steps.",
+    )
     return path.read_bytes()

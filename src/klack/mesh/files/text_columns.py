@@ -4,8 +4,9 @@ The text stays one array of bytes; blocks of columns are cut out of many lines a
 without a loop over lines.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ __all__ = ["Ranges", "TextLines", "integers", "reals", "within"]
 _CHUNK = 50_000  # lines at a time: bounds the memory for their indices
 
 Cells = NDArray[np.uint8]
+_Number = TypeVar("_Number", np.int64, np.float64)
 
 
 @dataclass(frozen=True)
@@ -91,22 +93,27 @@ class TextLines:
     ) -> NDArray[np.int64]:
         """Whole numbers in the first ``count`` fields, shape (len(rows), count)."""
         out = np.empty((len(rows), count), dtype=np.int64)
-        for begin in range(0, len(rows), _CHUNK):
-            part = rows[begin : begin + _CHUNK]
-            cells = self.cells(part, 0, width, count)
-            out[begin : begin + _CHUNK], good = integers(cells)
-            self._require(good, part, cells, what)
-        return out
+        return self._fill(out, rows, 0, width, what, integers)
 
     def real(
         self, rows: NDArray[np.int64], first: int, width: int, count: int, what: str
     ) -> NDArray[np.float64]:
         """Real numbers in ``count`` fields from column ``first`` on; see :meth:`whole`."""
-        out = np.empty((len(rows), count))
+        return self._fill(np.empty((len(rows), count)), rows, first, width, what, reals)
+
+    def _fill(
+        self,
+        out: NDArray[_Number],
+        rows: NDArray[np.int64],
+        first: int,
+        width: int,
+        what: str,
+        read: Callable[[Cells], tuple[NDArray[_Number], NDArray[np.bool_]]],
+    ) -> NDArray[_Number]:
         for begin in range(0, len(rows), _CHUNK):
             part = rows[begin : begin + _CHUNK]
-            cells = self.cells(part, first, width, count)
-            out[begin : begin + _CHUNK], good = reals(cells)
+            cells = self.cells(part, first, width, out.shape[1])
+            out[begin : begin + _CHUNK], good = read(cells)
             self._require(good, part, cells, what)
         return out
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import AccuracyWarning, InputError
+from klack.errors import AccuracyWarning, InputError, refuse_if
 from klack.mesh.families import FAMILIES
 from klack.mesh.files.abaqus.keywords import DataLine, Keyword, read_keywords
 from klack.mesh.files.abaqus.numbers import is_integer, number, records
@@ -65,44 +65,44 @@ def read_placement(keyword: Keyword) -> Placement:
     .. math:: x' = R\,(x + t - a) + a .
     """
     rows = [[number(line, t) for t in line.fields] for line in keyword.lines() if line.fields]
-    if [len(row) for row in rows] not in ([], [3], [3, 7]):
-        raise InputError(
-            f"{keyword.place}: *INSTANCE",
-            got=f"data lines of {', '.join(str(len(row)) for row in rows[:8])} numbers",
-            expected="a translation (3 numbers) and, if rotated, two points and an angle (7)",
-            hint="write both lines, with zeros for no translation.",
-        )
+    refuse_if(
+        [len(row) for row in rows] not in ([], [3], [3, 7]),
+        f"{keyword.place}: *INSTANCE",
+        got=f"data lines of {', '.join(str(len(row)) for row in rows[:8])} numbers",
+        expected="a translation (3 numbers) and, if rotated, two points and an angle (7)",
+        hint="write both lines, with zeros for no translation.",
+    )
     shift = np.array(rows[0] if rows else [0.0, 0.0, 0.0])
     if len(rows) < 2:
         return Placement(shift, np.eye(3), np.zeros(3))
     a, b, angle = np.array(rows[1][:3]), np.array(rows[1][3:6]), np.deg2rad(rows[1][6])
     length = float(np.linalg.norm(b - a))
-    if not (length > 0 and np.isfinite(length)):
-        raise InputError(
-            f"{keyword.place}: *INSTANCE",
-            got=f"an axis of length {length:g}",
-            expected="two different points of the axis",
-            hint="check the second data line: two points and an angle in degrees.",
-        )
+    refuse_if(
+        not (length > 0 and np.isfinite(length)),
+        f"{keyword.place}: *INSTANCE",
+        got=f"an axis of length {length:g}",
+        expected="two different points of the axis",
+        hint="check the second data line: two points and an angle in degrees.",
+    )
     return Placement(shift, rotation_matrix((b - a) / length * angle), a)
 
 
 def add_instance(root: Scope, name: str, part: Scope, placement: Placement, place: str) -> None:
     """Put an instance into the assembly, its sets and surfaces as ``name.set``."""
-    if name.upper() in root.instances:
-        raise InputError(
-            f"{place}: *INSTANCE",
-            got=f"a second instance '{name[:80]}'",
-            expected="every name once",
-            hint="give every instance its own name.",
-        )
-    if root.nodes.count + part.nodes.count > LARGEST_NODES:
-        raise InputError(
-            f"{place}: *INSTANCE",
-            got=f"{root.nodes.count + part.nodes.count} nodes with this instance",
-            expected=f"at most {LARGEST_NODES}",
-            hint="leave out unneeded instances.",
-        )
+    refuse_if(
+        name.upper() in root.instances,
+        f"{place}: *INSTANCE",
+        got=f"a second instance '{name[:80]}'",
+        expected="every name once",
+        hint="give every instance its own name.",
+    )
+    refuse_if(
+        root.nodes.count + part.nodes.count > LARGEST_NODES,
+        f"{place}: *INSTANCE",
+        got=f"{root.nodes.count + part.nodes.count} nodes with this instance",
+        expected=f"at most {LARGEST_NODES}",
+        hint="leave out unneeded instances.",
+    )
     _require_revolution(part, placement, place)
     node, element = root.nodes.count, root.elements.count
     root.instances[name.upper()] = Instance(name, part, node, element)
@@ -123,13 +123,13 @@ def add_instance(root: Scope, name: str, part: Scope, placement: Placement, plac
 
 def _require_revolution(part: Scope, placement: Placement, place: str) -> None:
     flat = any(group.solid and FAMILIES[group.family].dimension == 2 for group in part.groups)
-    if flat and not placement.along_axis:
-        raise InputError(
-            f"{place}: *INSTANCE",
-            got="an axisymmetric part that is rotated, or moved away from its axis",
-            expected="a translation along y, which is the axis",
-            hint="draw the part at its radius.",
-        )
+    refuse_if(
+        flat and not placement.along_axis,
+        f"{place}: *INSTANCE",
+        got="an axisymmetric part that is rotated, or moved away from its axis",
+        expected="a translation along y, which is the axis",
+        hint="draw the part at its radius.",
+    )
 
 
 Integers = NDArray[np.int64]
@@ -346,23 +346,23 @@ class _Reader:
         self._require_closed(keyword)
         name = keyword.parameter("NAME" if keyword.name == "PART" else "PART").upper()
         if keyword.name == "PART":
-            if name in self.parts:
-                raise InputError(
-                    f"{keyword.place}: *PART",
-                    got=f"a second part '{keyword.parameter('NAME')[:80]}'",
-                    expected="every name once",
-                    hint="look for a file that is included twice.",
-                )
+            refuse_if(
+                name in self.parts,
+                f"{keyword.place}: *PART",
+                got=f"a second part '{keyword.parameter('NAME')[:80]}'",
+                expected="every name once",
+                hint="look for a file that is included twice.",
+            )
             self.scope = Scope(solids_only=self.root.solids_only)
         else:
             keyword.parameter("NAME")
-            if name not in self.parts:
-                raise InputError(
-                    f"{keyword.place}: *INSTANCE",
-                    got=f"PART={keyword.parameter('PART')[:80]}",
-                    expected=f"a part that is defined above ({', '.join(self.parts) or 'none'})",
-                    hint="check the spelling; instances of results files are not read.",
-                )
+            refuse_if(
+                name not in self.parts,
+                f"{keyword.place}: *INSTANCE",
+                got=f"PART={keyword.parameter('PART')[:80]}",
+                expected=f"a part that is defined above ({', '.join(self.parts) or 'none'})",
+                hint="check the spelling; instances of results files are not read.",
+            )
             self.scope = self.parts[name].copy()
             self.placement = read_placement(keyword)
         self.opened = keyword
@@ -427,13 +427,13 @@ class _Reader:
 
     def _add_only_part(self) -> None:
         """A part without an assembly is taken as drawn."""
-        if len(self.parts) > 1 or self.root.groups:
-            raise InputError(
-                str(self.path),
-                got=f"{len(self.parts)} parts and no *INSTANCE",
-                expected="an assembly with instances of the parts",
-                hint="write the whole model, or one part per file.",
-            )
+        refuse_if(
+            len(self.parts) > 1 or self.root.groups,
+            str(self.path),
+            got=f"{len(self.parts)} parts and no *INSTANCE",
+            expected="an assembly with instances of the parts",
+            hint="write the whole model, or one part per file.",
+        )
         ((name, part),) = self.parts.items()
         placement = read_placement(Keyword("INSTANCE", {}, str(self.path)))
         add_instance(self.root, name, part, placement, str(self.path))

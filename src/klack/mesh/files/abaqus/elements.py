@@ -8,7 +8,7 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.mesh.families import FAMILIES
 from klack.mesh.files.abaqus.keywords import DataLine, Keyword
 from klack.mesh.files.abaqus.numbers import integer, integer_records, records
@@ -102,13 +102,13 @@ def read_elements(keyword: Keyword, *, solids_only: bool) -> tuple[str, bool, ND
         own = [integer(line, line.fields[0]) for line in keyword.lines() if line.fields]
         return "", False, np.array(own, dtype=np.int64).reshape(-1, 1)
     family, solid = _family(keyword, kind)
-    if "OFFSET" in keyword.parameters:
-        raise InputError(
-            f"{keyword.place}: *ELEMENT",
-            got="the parameter OFFSET, which generates node numbers",
-            expected="all nodes listed explicitly",
-            hint="write the file again from the preprocessor, as a flat mesh.",
-        )
+    refuse_if(
+        "OFFSET" in keyword.parameters,
+        f"{keyword.place}: *ELEMENT",
+        got="the parameter OFFSET, which generates node numbers",
+        expected="all nodes listed explicitly",
+        hint="write the file again from the preprocessor, as a flat mesh.",
+    )
     return family, solid, integer_records(keyword, *_record(family, kind))
 
 

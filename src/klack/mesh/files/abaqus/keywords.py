@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.mesh.files.plausible import LARGEST_BYTES
 
 __all__ = ["DataLine", "Keyword", "Segment", "read_keywords"]
@@ -77,13 +77,13 @@ class Keyword:
     def parameter(self, name: str) -> str:
         """Value of a parameter that must be there."""
         value = self.parameters.get(name, "")
-        if not value:
-            raise InputError(
-                f"{self.place}: *{self.name}",
-                got=f"no parameter {name}",
-                expected=f"{name}=...",
-                hint="write the file again from the preprocessor.",
-            )
+        refuse_if(
+            not value,
+            f"{self.place}: *{self.name}",
+            got=f"no parameter {name}",
+            expected=f"{name}=...",
+            hint="write the file again from the preprocessor.",
+        )
         return value
 
     def lines(self) -> Iterator[DataLine]:
@@ -156,13 +156,13 @@ def _keyword(place: str, text: str) -> Keyword:
 
 
 def _require_short(place: str, size: int, longest: int) -> None:
-    if size > longest:
-        raise InputError(
-            place,
-            got=f"a line of {size} bytes",
-            expected=f"at most {longest} bytes",
-            hint="the file is not a keyword file, or its line endings are lost.",
-        )
+    refuse_if(
+        size > longest,
+        place,
+        got=f"a line of {size} bytes",
+        expected=f"at most {longest} bytes",
+        hint="the file is not a keyword file, or its line endings are lost.",
+    )
 
 
 def _next_star(text: bytes, position: int) -> int:
@@ -213,13 +213,13 @@ class _Source:
 
     def _read(self, path: Path) -> bytes:
         raw = self._bytes_of(path)
-        if b"\0" in raw:
-            raise InputError(
-                str(path),
-                got="a binary file",
-                expected="a text file of keywords",
-                hint="export the mesh as .inp from the preprocessor.",
-            )
+        refuse_if(
+            b"\0" in raw,
+            str(path),
+            got="a binary file",
+            expected="a text file of keywords",
+            hint="export the mesh as .inp from the preprocessor.",
+        )
         if b"\r" in raw:
             raw = raw.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
         return raw.removeprefix(b"\xef\xbb\xbf")
@@ -251,20 +251,20 @@ class _Source:
             path = (self._folder / file.replace("\\", "/")).resolve()
         except (OSError, RuntimeError):  # a name that is too long, links in a circle
             path = Path("/")
-        if not path.is_relative_to(self._folder):
-            raise InputError(
-                f"{place}: *INCLUDE",
-                got=f"the file '{file[:200]}'",
-                expected="a file in the folder of the main file or below it",
-                hint="copy it next to the main file.",
-            )
-        if len(above) > _DEEPEST or path in [p.resolve() for p in above]:
-            raise InputError(
-                f"{place}: *INCLUDE",
-                got=f"'{file}', which is included from itself or {len(above)} levels deep",
-                expected=f"includes without a loop and up to {_DEEPEST} levels deep",
-                hint="write the model into one file.",
-            )
+        refuse_if(
+            not path.is_relative_to(self._folder),
+            f"{place}: *INCLUDE",
+            got=f"the file '{file[:200]}'",
+            expected="a file in the folder of the main file or below it",
+            hint="copy it next to the main file.",
+        )
+        refuse_if(
+            len(above) > _DEEPEST or path in [p.resolve() for p in above],
+            f"{place}: *INCLUDE",
+            got=f"'{file}', which is included from itself or {len(above)} levels deep",
+            expected=f"includes without a loop and up to {_DEEPEST} levels deep",
+            hint="write the model into one file.",
+        )
         return path
 
 

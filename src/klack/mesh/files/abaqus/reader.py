@@ -23,7 +23,7 @@ from klack.mesh.files.abaqus.elements import ElementGroup
 from klack.mesh.files.abaqus.faces import FaceFinder, RowBlock, left_out
 from klack.mesh.files.abaqus.scope import Scope
 from klack.mesh.files.abaqus.sets import distinct
-from klack.mesh.files.file_mesh import require_right_of_axis, require_sound
+from klack.mesh.files.file_mesh import renumbered, require_right_of_axis, require_sound
 from klack.mesh.files.mesh_model import MeshModel
 from klack.mesh.files.plausible import require_unit
 from klack.mesh.mesh import ElementBlock, FaceBlock, Mesh, Surface
@@ -86,7 +86,7 @@ def _build(path: Path, deck: Deck, unit_length: float, wanted: Sequence[str] | N
         ),
         surfaces={name: _renumbered(surface, new) for name, surface in surfaces.items()},
         node_sets={
-            name: kept for name, nodes in node_sets.items() if len(kept := _present(new, nodes))
+            name: kept for name, nodes in node_sets.items() if len(kept := renumbered(new, nodes))
         },
     )
     require_right_of_axis(path, mesh, labels[used])
@@ -240,11 +240,6 @@ def _points(scope: Scope) -> NDArray[np.float64]:
     points = scope.points[0] if len(scope.points) == 1 else np.concatenate(scope.points)
     scope.points.clear()
     return points
-
-
-def _present(new: NDArray[np.int64], nodes: NDArray[np.int64]) -> NDArray[np.int64]:
-    kept = new[nodes]
-    return kept[kept >= 0]
 
 
 def _renumbered(surface: Surface, new: NDArray[np.int64]) -> Surface:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.mesh.files.abaqus.elements import ElementGroup, place_of_element, read_elements
 from klack.mesh.files.abaqus.keywords import DataLine, Keyword
 from klack.mesh.files.abaqus.numbers import is_integer, node_records, number
@@ -48,8 +48,11 @@ def read_system(keyword: Keyword) -> NodeSystem | None:
         return None
     if lengths == [3]:
         return NodeSystem(np.array(rows[0]), np.eye(3))
-    if lengths not in ([6], [6, 3]):
-        raise _unfit(keyword, f"data lines of {', '.join(map(str, lengths[:8]))} numbers")
+    _unfit_if(
+        lengths not in ([6], [6, 3]),
+        keyword,
+        f"data lines of {', '.join(map(str, lengths[:8]))} numbers",
+    )
     a, b = np.array(rows[0][:3]), np.array(rows[0][3:])
     first = b - a
     second = np.array(rows[1]) - a if len(rows) == 2 else np.array([-first[1], first[0], 0.0])
@@ -57,14 +60,18 @@ def read_system(keyword: Keyword) -> NodeSystem | None:
         first = np.array([first[0], first[1], 0.0])
     normal = np.cross(first, second)
     size = np.linalg.norm(first) * np.linalg.norm(second)
-    if not (np.isfinite(size) and np.linalg.norm(normal) > _SMALLEST * size):
-        raise _unfit(keyword, "points on one line")
+    _unfit_if(
+        not (np.isfinite(size) and np.linalg.norm(normal) > _SMALLEST * size),
+        keyword,
+        "points on one line",
+    )
     e1, e3 = first / np.linalg.norm(first), normal / np.linalg.norm(normal)
     return NodeSystem(a, np.array([e1, np.cross(e3, e1), e3]))
 
 
-def _unfit(keyword: Keyword, got: str) -> InputError:
-    return InputError(
+def _unfit_if(wrong: object, keyword: Keyword, got: str) -> None:
+    refuse_if(
+        wrong,
         f"{keyword.place}: *SYSTEM",
         got=got,
         expected="an origin (3 numbers), with a point of the x axis (6), and in a second line a "
@@ -198,14 +205,14 @@ class Scope:
         if not is_integer(tail):
             return own.sets.resolve(line.place, text)
         row = scope._entities(kind).numbering.find(np.array([int(tail)]))
-        if row[0] < 0:
-            raise InputError(
-                line.place,
-                got=f"{kind} {text}, which the file does not define",
-                expected=f"numbers of {kind}s of this file",
-                hint="the file may be truncated or edited by hand: write it "
-                "again from the preprocessor.",
-            )
+        refuse_if(
+            row[0] < 0,
+            line.place,
+            got=f"{kind} {text}, which the file does not define",
+            expected=f"numbers of {kind}s of this file",
+            hint="the file may be truncated or edited by hand: write it "
+            "again from the preprocessor.",
+        )
         return row + first
 
     def group_of(self, rows: Integers) -> Integers:

@@ -8,7 +8,7 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.input.problem import one_of
 from klack.mesh.files.abaqus.keywords import DataLine, Keyword
 from klack.mesh.files.abaqus.numbers import CUT_OFF, integer, integer_list, is_integer
@@ -237,13 +237,13 @@ class NamedSets:
 
     def _count(self, place: str, more: int) -> None:
         self.size += more
-        if self.size > LARGEST_MEMBERS:
-            raise InputError(
-                place,
-                got=f"sets with a total of {self.size} members",
-                expected=f"at most {LARGEST_MEMBERS}",
-                hint="remove unneeded sets from the file.",
-            )
+        refuse_if(
+            self.size > LARGEST_MEMBERS,
+            place,
+            got=f"sets with a total of {self.size} members",
+            expected=f"at most {LARGEST_MEMBERS}",
+            hint="remove unneeded sets from the file.",
+        )
 
 
 def read_members(

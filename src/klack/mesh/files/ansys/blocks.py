@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.mesh.files.plausible import read_bytes
 from klack.mesh.files.text_columns import Ranges, TextLines
 
@@ -67,13 +67,13 @@ class Archive:
 def read_archive(path: Path) -> Archive:
     """Read the blocks and commands of an archive."""
     data = read_bytes(path, _KIND)
-    if b"\0" in data[:4096]:
-        raise InputError(
-            str(path),
-            got="a binary file",
-            expected=_KIND,
-            hint="write the mesh with CDWRITE, DB, NAME, CDB (not with SAVE).",
-        )
+    refuse_if(
+        b"\0" in data[:4096],
+        str(path),
+        got="a binary file",
+        expected=_KIND,
+        hint="write the mesh with CDWRITE, DB, NAME, CDB (not with SAVE).",
+    )
     lines = TextLines.of(data, path.name)
     rows = _command_rows(lines)
     nodes: list[NDArray[np.int64]] = []
@@ -102,13 +102,13 @@ def read_archive(path: Path) -> Archive:
                 fields = (fields[0], *(parameters.get(one.upper(), one) for one in fields[1:]))
                 commands.append((row, fields))
                 parameters |= _set(fields)
-    if not nodes or not elements:
-        raise InputError(
-            str(path),
-            got="no EBLOCK of solids" if nodes else "no NBLOCK",
-            expected="nodes (NBLOCK) and solid elements (EBLOCK, 19, SOLID)",
-            hint="write the file in blocks: CDWRITE, DB, NAME, CDB.",
-        )
+    refuse_if(
+        not nodes or not elements,
+        str(path),
+        got="no EBLOCK of solids" if nodes else "no NBLOCK",
+        expected="nodes (NBLOCK) and solid elements (EBLOCK, 19, SOLID)",
+        hint="write the file in blocks: CDWRITE, DB, NAME, CDB.",
+    )
     return Archive(
         lines=lines,
         node_numbers=np.concatenate(nodes),

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.mesh.families import FAMILIES
 from klack.mesh.files.file_mesh import FileElements, FileMesh, mesh_model, same_nodes
 from klack.mesh.files.gmsh.sections import GmshContent, GmshElements, read_content
@@ -109,13 +109,13 @@ def _require_bodies(
     path: Path, content: GmshContent, bodies: list[GmshElements], dimension: int
 ) -> None:
     flat = dimension == 2 and not content.points[:, 2].any()
-    if dimension != 3 and not flat:
-        raise InputError(
-            str(path),
-            got=f"only elements of dimension {dimension} or less" if dimension else "no elements",
-            expected="volume elements, or a plane mesh in z = 0 (axisymmetric: x = r, y = z)",
-            hint="mesh the volume (gmsh -3), and put it into a physical group.",
-        )
+    refuse_if(
+        dimension != 3 and not flat,
+        str(path),
+        got=f"only elements of dimension {dimension} or less" if dimension else "no elements",
+        expected="volume elements, or a plane mesh in z = 0 (axisymmetric: x = r, y = z)",
+        hint="mesh the volume (gmsh -3), and put it into a physical group.",
+    )
     for part in bodies:
         if part.kind in _REFUSED:
             raise InputError(

@@ -9,7 +9,7 @@ from typing import NoReturn, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.input.plain_numbers import plain_numbers
 from klack.mesh.files.plausible import read_bytes
 
@@ -208,13 +208,13 @@ class _Reader:
             if not self._version and name not in ("MeshFormat", "Comments"):
                 break
             at = self._section(name, end + 1)
-        if not self._version:
-            raise InputError(
-                str(self._path),
-                got="no $MeshFormat at its start",
-                expected=_KIND,
-                hint="save the mesh from Gmsh as .msh.",
-            )
+        refuse_if(
+            not self._version,
+            str(self._path),
+            got="no $MeshFormat at its start",
+            expected=_KIND,
+            hint="save the mesh from Gmsh as .msh.",
+        )
         return self._content
 
     def _section(self, name: str, start: int) -> int:
@@ -245,13 +245,13 @@ class _Reader:
             refuse(place, repr(self._data[start : start + 20]), "version, kind and size")
         version = match[1].decode()
         self._content.of_netgen = version == "2.000000"  # no other program writes it so
-        if version not in ("2", "2.000000", "2.1", "2.2", "4.1"):
-            raise InputError(
-                place,
-                got=f"version {version}",
-                expected="2.2 or 4.1",
-                hint="save the mesh with Mesh.MshFileVersion = 4.1 (or 2.2).",
-            )
+        refuse_if(
+            version not in ("2", "2.000000", "2.1", "2.2", "4.1"),
+            place,
+            got=f"version {version}",
+            expected="2.2 or 4.1",
+            hint="save the mesh with Mesh.MshFileVersion = 4.1 (or 2.2).",
+        )
         self._version, self._binary = version, match[2] == b"1"
         self._size = int(match[3])
         if not self._binary:
@@ -322,13 +322,13 @@ class _Reader:
         self._content.elements.append(GmshElements(kind, groups, rows[:, 0], rows[:, 1:]))
 
     def _node_count(self, place: str, kind: int) -> int:
-        if kind not in NODE_COUNTS:
-            raise InputError(
-                place,
-                got=f"element type {kind}",
-                expected="elements of order 1 or 2",
-                hint="mesh with Mesh.ElementOrder = 2 and Mesh.SecondOrderIncomplete = 1.",
-            )
+        refuse_if(
+            kind not in NODE_COUNTS,
+            place,
+            got=f"element type {kind}",
+            expected="elements of order 1 or 2",
+            hint="mesh with Mesh.ElementOrder = 2 and Mesh.SecondOrderIncomplete = 1.",
+        )
         return NODE_COUNTS[kind]
 
     def _old_elements(self, place: str, text: TextStream) -> None:

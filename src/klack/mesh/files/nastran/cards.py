@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.mesh.files.plausible import LARGEST_BYTES, read_bytes
 from klack.mesh.files.text_columns import TextLines
 
@@ -71,38 +71,38 @@ def text_with_includes(path: Path) -> tuple[bytes, tuple[tuple[int, str, int], .
 
 
 def _require_text(file: Path, data: bytes, size: int) -> None:
-    if b"\0" in data[:4096]:
-        raise InputError(
-            str(file),
-            got="a binary file",
-            expected=_KIND,
-            hint="export the mesh as bulk data (.bdf) from the preprocessor.",
-        )
-    if size > LARGEST_BYTES:
-        raise InputError(
-            str(file),
-            got=f"{size / 1e9:.3g} GB with all includes",
-            expected=f"at most {LARGEST_BYTES / 1e9:.3g} GB",
-            hint="write the mesh only, without results or steps.",
-        )
+    refuse_if(
+        b"\0" in data[:4096],
+        str(file),
+        got="a binary file",
+        expected=_KIND,
+        hint="export the mesh as bulk data (.bdf) from the preprocessor.",
+    )
+    refuse_if(
+        size > LARGEST_BYTES,
+        str(file),
+        got=f"{size / 1e9:.3g} GB with all includes",
+        expected=f"at most {LARGEST_BYTES / 1e9:.3g} GB",
+        hint="write the mesh only, without results or steps.",
+    )
 
 
 def _below(place: str, folder: Path, name: str, depth: int, seen: set[Path]) -> Path:
     path = (folder / name).resolve()
-    if not path.is_relative_to(folder):
-        raise InputError(
-            f"{place}: INCLUDE",
-            got=f"the file '{name}'",
-            expected="a file in the folder of the main file or below it",
-            hint="copy it next to the main file.",
-        )
-    if depth > _DEEPEST or path in seen:
-        raise InputError(
-            f"{place}: INCLUDE",
-            got=f"'{name}' for the second time, or {depth} levels deep",
-            expected=f"every file included once, and up to {_DEEPEST} levels deep",
-            hint="write the model into one file.",
-        )
+    refuse_if(
+        not path.is_relative_to(folder),
+        f"{place}: INCLUDE",
+        got=f"the file '{name}'",
+        expected="a file in the folder of the main file or below it",
+        hint="copy it next to the main file.",
+    )
+    refuse_if(
+        depth > _DEEPEST or path in seen,
+        f"{place}: INCLUDE",
+        got=f"'{name}' for the second time, or {depth} levels deep",
+        expected=f"every file included once, and up to {_DEEPEST} levels deep",
+        hint="write the model into one file.",
+    )
     return path
 
 
@@ -303,13 +303,13 @@ def _fields(text: str, place: str) -> list[str]:
     if "," in text:
         head, *words = [word.strip() for word in text.split(",")]
         count = 4 if "*" in head else 8
-        if len([word for word in words[count + 1 :] if word]):
-            raise InputError(
-                place,
-                got=f"{len(words)} fields between commas",
-                expected=f"at most {count} and the mark of a continuation",
-                hint="put the further fields into a continuation line.",
-            )
+        refuse_if(
+            len([word for word in words[count + 1 :] if word]),
+            place,
+            got=f"{len(words)} fields between commas",
+            expected=f"at most {count} and the mark of a continuation",
+            hint="put the further fields into a continuation line.",
+        )
         return (words + [""] * count)[:count]
     text = text.expandtabs(8)
     count, width = (4, 16) if "*" in text[:8] else (8, 8)

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.mesh.families import FAMILIES
 from klack.mesh.files.file_mesh import FileElements, FileMesh, mesh_model
 from klack.mesh.files.mesh_model import FileMaterial, MeshModel
@@ -195,13 +195,13 @@ def _in_basic(
 ) -> NDArray[np.float64]:
     def node(number: int, depth: int) -> NDArray[np.float64]:
         found = np.flatnonzero(label == number)
-        if not len(found):
-            raise InputError(
-                f"{bulk.lines.file}: CORD1: node {number}",
-                got="a node that the file does not define",
-                expected="nodes of this file",
-                hint="the file may be truncated: write it again from the preprocessor.",
-            )
+        refuse_if(
+            not len(found),
+            f"{bulk.lines.file}: CORD1: node {number}",
+            got="a node that the file does not define",
+            expected="nodes of this file",
+            hint="the file may be truncated: write it again from the preprocessor.",
+        )
         at = found[0]
         place = bulk.place(int(line[at]))
         return frames.basic(int(system[at]), x[at : at + 1], place, depth)[0]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.mesh.files.nastran.cards import BulkData, Card
 from klack.mesh.files.text_columns import Ranges, within
 
@@ -203,14 +203,13 @@ class Frames:
         """Coordinates (n, 3) of one system as basic ones."""
         if label == 0:
             return x
-        if label not in self._known or depth > _DEEPEST:
-            raise InputError(
-                f"{place}: coordinate system {label}",
-                got="no CORD1 or CORD2 card for it" if depth <= _DEEPEST else "a loop of systems",
-                expected="a system that the file defines, or 0",
-                hint="the file may be truncated, or the card may be in a file that is not "
-                "included.",
-            )
+        refuse_if(
+            label not in self._known or depth > _DEEPEST,
+            f"{place}: coordinate system {label}",
+            got="no CORD1 or CORD2 card for it" if depth <= _DEEPEST else "a loop of systems",
+            expected="a system that the file defines, or 0",
+            hint="the file may be truncated, or the card may be in a file that is not included.",
+        )
         own = self._known[label]
         if own.nodes is not None:
             corners = np.array([self._node(node, depth + 1) for node in own.nodes])

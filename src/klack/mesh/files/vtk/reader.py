@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.mesh.families import FAMILIES
 from klack.mesh.files.file_mesh import FileElements, FileMesh, mesh_model
 from klack.mesh.files.mesh_model import MeshModel
@@ -169,13 +169,13 @@ def _dimension(path: Path, grid: VtkGrid, *, solids_only: bool) -> int:
             )
     dimensions = {FAMILIES[_CELLS[k][0]].dimension for k in set(grid.types.tolist()) & set(_CELLS)}
     dimension = max(dimensions, default=0)
-    if dimension < 2 or (dimension == 2 and grid.points[:, 2].any()):
-        raise InputError(
-            str(path),
-            got="surface cells only" if dimension == 2 else "no cells with a volume",
-            expected="volume cells, or a plane grid in z = 0 (axisymmetric: x = r, y = z)",
-            hint="save the volume mesh, not its surface.",
-        )
+    refuse_if(
+        dimension < 2 or (dimension == 2 and grid.points[:, 2].any()),
+        str(path),
+        got="surface cells only" if dimension == 2 else "no cells with a volume",
+        expected="volume cells, or a plane grid in z = 0 (axisymmetric: x = r, y = z)",
+        hint="save the volume mesh, not its surface.",
+    )
     return dimension
 
 
