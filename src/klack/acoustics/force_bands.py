@@ -9,10 +9,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from klack.acoustics.spectrum import force_spectrum, held_means
 from klack.acoustics.third_octave import ThirdOctaves, band_edges, band_energies, band_numbers
+from klack.arrays import Floats
 from klack.signals.sampled import Spectrum, TimeSeries
 
 __all__ = [
@@ -23,7 +23,6 @@ __all__ = [
     "force_densities",
 ]
 
-Floats = NDArray[np.float64]
 
 LOWEST, HIGHEST = 17.0, 224e3
 """Limits [Hz] of the bands from 20 Hz to 200 kHz, edges included."""

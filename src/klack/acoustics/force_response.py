@@ -22,8 +22,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Floats
 from klack.bodies.reduction.structure import Structure
 from klack.errors import refuse_if
 from klack.machine.compiling.jit import njit
@@ -61,7 +61,7 @@ def port_forces(
 
 def aligned_forces(
     structure: Structure, forces: Mapping[str, TimeSeries]
-) -> tuple[TimeSeries, NDArray[np.float64]]:
+) -> tuple[TimeSeries, Floats]:
     """One force, for its time axis, and the forces at all ports (n, p) [N], on one grid."""
     refuse_if(
         not forces,
@@ -87,9 +87,6 @@ def aligned_forces(
         )
         result[:, structure.port_index(name)] = force.values
     return first, result
-
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -20,9 +20,8 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from klack.arrays import Matrix, Vector
+from klack.arrays import Complexes, Matrix, Vector
 from klack.errors import refuse_if
 
 __all__ = [
@@ -37,7 +36,7 @@ __all__ = [
     "laplace",
 ]
 
-Complexes = NDArray[np.complex128]
+Complexes = Complexes
 """Complex numbers."""
 
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")

@@ -16,8 +16,8 @@ from both sides of a plate with radiation efficiency ``sigma``.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Floats
 from klack.errors import require_positive
 from klack.materials.material import Material
 
@@ -40,8 +40,6 @@ class Air:
         """Characteristic impedance ``rho c`` [Pa s/m]."""
         return self.density * self.sound_speed
 
-
-Floats = NDArray[np.float64]
 
 _MOST = 2.0  # the formulas have poles that a real plate has not
 

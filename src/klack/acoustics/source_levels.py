@@ -12,7 +12,6 @@ References differ: EN 15657 and klack use 1 nm/s and 1 uN, ISO 9611 uses 50 nm/s
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from klack.acoustics.coupling import Missing, Placement, couple
 from klack.acoustics.interface import Complexes, InterfacePoint, SourceAtMounts
@@ -73,9 +72,7 @@ def exposure(
     return band_energies(density, low=float(limits[0]), high=float(limits[1]))
 
 
-def drive_lines(
-    frequency: Vector, spectrum: Complexes, rate: float
-) -> tuple[Vector, NDArray[np.float64]]:
+def drive_lines(frequency: Vector, spectrum: Complexes, rate: float) -> tuple[Vector, Floats]:
     """Lines of a drive within the known frequencies [Hz] and their rms [unit], shapes (m,).
 
     Parameters

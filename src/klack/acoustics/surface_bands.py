@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from klack.acoustics.boundary.over_frequency import SurfaceRadiation
 from klack.acoustics.force_response import aligned_forces
@@ -22,7 +21,7 @@ from klack.acoustics.mount import Mount, support_mobility
 from klack.acoustics.plate import Air, Plate
 from klack.acoustics.radiation import PLATE, Efficiency, surface_efficiency
 from klack.acoustics.spectrum import force_spectrum
-from klack.arrays import Vector
+from klack.arrays import Complexes, Floats, Vector
 from klack.bodies.reduction.structure import Structure
 from klack.errors import refuse_if, require_positive
 from klack.signals.sampled import TimeSeries
@@ -37,8 +36,6 @@ __all__ = [
     "surface_spectra",
 ]
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 Pushed = tuple[Structure, Mapping[str, TimeSeries]]
 """A body and the forces at its ports."""

@@ -25,9 +25,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, diags_array, vstack
 
+from klack.arrays import Flags, Floats
 from klack.bodies.elasticity.condensation import condensed_inverse
 from klack.bodies.elasticity.factorization import factorize
 from klack.bodies.elasticity.loads import face_points
@@ -50,7 +50,6 @@ from klack.units import format_si
 
 __all__ = ["ClampedState", "clamped_state"]
 
-Floats = NDArray[np.float64]
 
 _TILTS, _PASSES = 1e4, 3  # flexibility against tilting, over that of the parts
 _ASIDE = 1e-3  # of the length of the joint: middles of ends apart; of all forces, their levers
@@ -82,8 +81,8 @@ class ClampedState:
     pressure: Floats
     area: Floats
     middle: Floats
-    closed: NDArray[np.bool_]
-    away: NDArray[np.bool_]
+    closed: Flags
+    away: Flags
     stiffness: float
     distance: float
     stress: Mapping[str, float]
@@ -161,7 +160,7 @@ def _require_whole_plane(parted: PartedBody, joint: FlatJoint) -> None:
             )
 
 
-def _pressed(A: Floats, lever: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+def _pressed(A: Floats, lever: Floats) -> tuple[Floats, Flags]:
     """Contact forces (n,) [N] at an approach of 1 m without a moment, and which points touch.
 
     A soft resistance against tilting, taken back in each pass (method of multipliers, Hestenes

@@ -30,11 +30,10 @@ from itertools import pairwise
 from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.spatial.transform import Rotation
 
-from klack.arrays import Floats
+from klack.arrays import Floats, Ints
 from klack.contact.face_form import FaceForm
 from klack.contact.mortar import COVERED, ContactSpace, HatQuadrature, hat_quadrature
 from klack.contact.pairing import curved_faces, in_space
@@ -63,8 +62,8 @@ class ListedFaces:
     """
 
     faces: CurvedFaces
-    first: NDArray[np.int64]
-    listed: NDArray[np.int64]
+    first: Ints
+    listed: Ints
     within: float
 
     @classmethod
@@ -256,13 +255,13 @@ class RigidGaps:
         Gap of a hat that no longer faces the master: the extent of both surfaces.
     """
 
-    position: NDArray[np.float64]
-    normal: NDArray[np.float64]
+    position: Floats
+    normal: Floats
     weight: csr_array
     near: ListedFaces
-    centre: NDArray[np.float64]
+    centre: Floats
     slave_moves: bool
-    form: NDArray[np.float64]
+    form: Floats
     away: float
 
     @classmethod
@@ -274,7 +273,7 @@ class RigidGaps:
         mesh_b: Mesh,
         surface_b: Surface,
         *,
-        centre: NDArray[np.float64],
+        centre: Floats,
         form: FaceForm | None = None,
     ) -> Self:
         """Prepare the contact points of ``space``, built from these meshes, surfaces and form.
@@ -302,7 +301,7 @@ class RigidGaps:
             away=away,
         )
 
-    def __call__(self, placement: NDArray[np.float64]) -> NDArray[np.float64]:
+    def __call__(self, placement: Floats) -> Floats:
         """Gaps at a rigid placement of body a, shape (nc,) [m].
 
         Parameters
@@ -333,10 +332,10 @@ class Pairing(NamedTuple):
 
     mover: int
     other: int
-    lever: NDArray[np.float64]
+    lever: Floats
     is_upper: bool = True
 
-    def relative(self, placements: NDArray[np.float64]) -> NDArray[np.float64]:
+    def relative(self, placements: Floats) -> Floats:
         """Placement of the mover (6,) as the other sees it, of those (n, 6) of all bodies."""
         placed = placements[self.mover]
         if self.other < 0:
@@ -347,7 +346,7 @@ class Pairing(NamedTuple):
         turn = Rotation.from_matrix(back @ rotation_matrix(placed[3:])).as_rotvec()
         return np.concatenate([shift, turn])
 
-    def slopes(self, bodies: int) -> NDArray[np.float64]:
+    def slopes(self, bodies: int) -> Floats:
         """Its derivatives with the placements, shape (6, 6 bodies)."""
         out = np.zeros((6, bodies, 6))
         out[:, self.mover] = np.eye(6)
@@ -377,12 +376,12 @@ class PlacedGaps:
     contacts: tuple[RigidGaps | RingGaps, ...]
     pairings: tuple[Pairing, ...]
 
-    def __call__(self, placements: NDArray[np.float64]) -> NDArray[np.float64]:
+    def __call__(self, placements: Floats) -> Floats:
         """Gaps (nc,) [m] at placements of the moving bodies, shape (6 bodies,) [m], [rad]."""
         given = placements.reshape(-1, 6)
         return self.between([pair.relative(given) for pair in self.pairings])
 
-    def between(self, relative: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    def between(self, relative: Sequence[Floats]) -> Floats:
         """Gaps (nc,) [m] at the placement of the mover of each contact (6,) [m], [rad]."""
         return np.concatenate(
             [
@@ -392,6 +391,6 @@ class PlacedGaps:
         )
 
 
-def _opposite(placement: NDArray[np.float64]) -> NDArray[np.float64]:
+def _opposite(placement: Floats) -> Floats:
     shift, rotation = placement[:3], placement[3:]
     return np.concatenate([-rotation_matrix(rotation).T @ shift, -rotation])

@@ -7,9 +7,8 @@ that every face family spans; a line of an axisymmetric body becomes a strip aro
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from klack.arrays import Cube, Index, Matrix, Vector
+from klack.arrays import Cube, Flags, Floats, Index, Ints, Matrix, Vector
 from klack.bodies.elasticity.shape_functions import reference_nodes, shape_functions
 from klack.machine.compiling.jit import inner, njit
 from klack.mesh.families import FAMILIES
@@ -42,13 +41,11 @@ class CurvedFaces(NamedTuple):
     centre: Matrix  # (f, 3) [m] middle of the box around each face
     axes: Cube  # (f, 3, 3) its directions in rows
     half: Matrix  # (f, 3) [m] its half widths
-    triangle: NDArray[np.bool_]  # (f,) reference domain: triangle, or square [-1, 1]^2
+    triangle: Flags  # (f,) reference domain: triangle, or square [-1, 1]^2
     deepest: float  # [m] deepest penetration that counts as one
 
 
-def face_polynomials(
-    points: NDArray[np.float64], family: str, connectivity: NDArray[np.int64]
-) -> NDArray[np.float64]:
+def face_polynomials(points: Floats, family: str, connectivity: Ints) -> Floats:
     """Coefficients of every face, shape (f, 8, 3); axisymmetric points as (r, 0, z)."""
     corner = points[connectivity]
     if corner.shape[2] == 3:
@@ -61,9 +58,7 @@ def face_polynomials(
     return coefficients
 
 
-def face_boxes(
-    coefficients: NDArray[np.float64], triangle: NDArray[np.bool_]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def face_boxes(coefficients: Floats, triangle: Flags) -> tuple[Floats, Floats, Floats]:
     """Box around every face: middle (f, 3), directions in rows (f, 3, 3), half widths (f, 3).
 
     The first direction is the longest, the last one the normal. Between samples of a face that is
@@ -93,13 +88,13 @@ def face_boxes(
     return centre, axes, half
 
 
-def _monomials(xi: NDArray[np.float64]) -> NDArray[np.float64]:
+def _monomials(xi: Floats) -> Floats:
     """Values of the monomials at reference points, shape (q, 8)."""
     x, y = xi.T
     return np.stack([np.ones_like(x), x, y, x**2, x * y, y**2, x**2 * y, x * y**2], axis=1)
 
 
-def _monomial_factors(family: str) -> NDArray[np.float64]:
+def _monomial_factors(family: str) -> Floats:
     """Shape function n as sum of monomials m, shape (n, 8)."""
     flat = FAMILIES[family].dimension == 1
     count = len(reference_nodes(family))

@@ -9,10 +9,9 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from klack.arrays import Floats
+from klack.arrays import Flags, Floats, Ints
 from klack.contact.friction import Friction
 from klack.contact.mortar import ContactSpace, around_rows, tangent_rows
 from klack.errors import InputError
@@ -47,10 +46,10 @@ class RingSpace:
 
     section: ContactSpace
     count: int
-    ring: NDArray[np.int64]
-    turn: NDArray[np.int64]
+    ring: Ints
+    turn: Ints
     gap: Floats
-    rim: NDArray[np.bool_]
+    rim: Flags
     beyond: float
 
     @classmethod

@@ -4,16 +4,15 @@ from dataclasses import dataclass, field, replace
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from klack.arrays import Floats
 from klack.errors import refuse_if, require_nonnegative, require_positive
 from klack.hydraulics.liquid import ATMOSPHERE, LiquidLaw, PressureRange, barus_viscosity
 from klack.hydraulics.mixture import LOWEST_PRESSURE, EntrainedGas, Vapour
 from klack.hydraulics.pressure_viscosity import PressureViscosity
 
 __all__ = ["Fluid"]
-
-Values = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,11 +119,11 @@ class Fluid:
         )
         return replace(self, gas=gas)
 
-    def density(self, pressure: ArrayLike) -> Values:
+    def density(self, pressure: ArrayLike) -> Floats:
         """Density [kg/m^3] at the absolute pressure [Pa]."""
         return 1.0 / self.specific_volume(pressure)[0]
 
-    def bulk_modulus(self, pressure: ArrayLike) -> Values:
+    def bulk_modulus(self, pressure: ArrayLike) -> Floats:
         """``rho dp/drho`` [Pa] at the absolute pressure [Pa].
 
         With time constants of the gas that of changes in which none dissolves.
@@ -132,12 +131,12 @@ class Fluid:
         v, slope = self._fast_volume(pressure)
         return -v / slope
 
-    def sound_speed(self, pressure: ArrayLike) -> Values:
+    def sound_speed(self, pressure: ArrayLike) -> Floats:
         """Speed of pressure waves [m/s] in an unbounded fluid at the absolute pressure [Pa]."""
         v, slope = self._fast_volume(pressure)
         return v / np.sqrt(-slope)
 
-    def _fast_volume(self, pressure: ArrayLike) -> tuple[Values, Values]:
+    def _fast_volume(self, pressure: ArrayLike) -> tuple[Floats, Floats]:
         """As :meth:`specific_volume`, with the slope without gas that takes time to dissolve."""
         v, slope = self.specific_volume(pressure)
         if self.has_release_times:
@@ -145,13 +144,13 @@ class Fluid:
             slope = slope - self.gas.dissolving(p) / self.mixture_mass
         return v, slope
 
-    def viscosity(self, pressure: ArrayLike) -> Values:
+    def viscosity(self, pressure: ArrayLike) -> Floats:
         """Dynamic viscosity [Pa s] of the liquid at the absolute pressure [Pa]."""
         if self.viscosity_law is not None:
             return self.base_viscosity * self.viscosity_law.ratio(pressure)
         return barus_viscosity(self.base_viscosity, self.pressure_viscosity, pressure, ATMOSPHERE)
 
-    def specific_volume(self, pressure: ArrayLike) -> tuple[Values, Values]:
+    def specific_volume(self, pressure: ArrayLike) -> tuple[Floats, Floats]:
         """Volume per mass [m^3/kg] and its slope [m^3/(kg Pa)] at the absolute pressure [Pa].
 
         Pressures below 1 Pa are taken as 1 Pa.

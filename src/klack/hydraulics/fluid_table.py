@@ -19,8 +19,8 @@ from functools import lru_cache
 from math import log1p
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Vector
 from klack.errors import ConvergenceError, require_positive
 from klack.hydraulics.fluid import Fluid
 from klack.hydraulics.liquid import HIGHEST_PRESSURE, Murnaghan, Tait
@@ -39,8 +39,6 @@ _ACCURACY = 1e-10  # of the specific volume, relative
 _MOST_PIECES = 20_000
 _INNER = np.array([1.0 / 3.0, 2.0 / 3.0])  # places of a piece that fix its highest factors
 _TESTED = np.array([0.04, 0.15, 0.5, 0.85, 0.96])
-
-Vector = NDArray[np.float64]
 
 
 def fluid_table(fluid: NetworkFluid, ambient_pressure: float) -> Vector:

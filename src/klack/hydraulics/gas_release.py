@@ -22,8 +22,8 @@ from math import exp, log
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Vector
 from klack.hydraulics.fluid import Fluid
 from klack.hydraulics.fluid_table import fluid_at, pressure_at
 from klack.hydraulics.mixture import LOWEST_PRESSURE
@@ -39,7 +39,6 @@ __all__ = [
     "share_moved",
 ]
 
-Vector = NDArray[np.float64]
 
 NO_RELEASE = np.zeros(8)
 """Numbers of a fluid whose gas has no time constants."""

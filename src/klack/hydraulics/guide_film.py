@@ -13,13 +13,11 @@ A rotation of the journal with ``omega`` is a whirl of ``-omega/2``.
 from math import atan2, cos, hypot, pi, sin, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Matrix
 from klack.machine.compiling.jit import inner, njit
 
 __all__ = ["guide_film_damping", "guide_film_force", "guide_film_step"]
-
-Matrix = NDArray[np.float64]
 
 
 @njit

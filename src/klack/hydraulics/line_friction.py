@@ -18,8 +18,9 @@ from math import pi
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from klack.arrays import Floats
 from klack.errors import require_positive
 
 __all__ = [
@@ -33,8 +34,6 @@ __all__ = [
     "zielke_weight",
 ]
 
-Values = NDArray[np.float64]
-
 
 @dataclass(frozen=True, slots=True)
 class ExponentialWeights:
@@ -44,7 +43,7 @@ class ExponentialWeights:
     rates: tuple[float, ...]
     source: str
 
-    def __call__(self, tau: ArrayLike) -> Values:
+    def __call__(self, tau: ArrayLike) -> Floats:
         """``W`` at the dimensionless time ``nu t / R^2``."""
         shape = np.asarray(tau, dtype=float)[..., None]
         return np.sum(np.array(self.factors) * np.exp(-np.array(self.rates) * shape), axis=-1)
@@ -80,7 +79,7 @@ _SERIES_TERMS = 4000  # exp(-j_k^2 tau) < 1e-16 beyond, for tau > 3e-7
 _SERIES_FROM = 3e-7
 
 
-def laminar_weight(tau: ArrayLike) -> Values:
+def laminar_weight(tau: ArrayLike) -> Floats:
     """Exact series of ``W`` for laminar flow at ``tau`` of at least 3e-7."""
     times = np.asarray(tau, dtype=float)
     require_positive(
@@ -97,7 +96,7 @@ def _bessel_zeros() -> tuple[float, ...]:
     return tuple(float(zero) for zero in scipy.special.jn_zeros(2, _SERIES_TERMS))
 
 
-def zielke_weight(tau: ArrayLike) -> Values:
+def zielke_weight(tau: ArrayLike) -> Floats:
     """``W`` of laminar flow by Zielke's two formulas, to 0.05 %.
 
     J. Basic Eng. 90 (1968) 109: five exponentials above ``tau`` = 0.02, below it a series in powers
@@ -109,7 +108,7 @@ def zielke_weight(tau: ArrayLike) -> Values:
     return np.where(times > _ZIELKE_SEAM, late, early)
 
 
-def vardy_brown_weight(tau: ArrayLike, reynolds: float) -> Values:
+def vardy_brown_weight(tau: ArrayLike, reynolds: float) -> Floats:
     r"""``W`` of turbulent flow in a smooth bore.
 
     .. math:: W = \frac{e^{-B\tau}}{2\sqrt{\pi\tau}}, \quad B = \frac{Re^k}{12.86}, \quad
@@ -142,7 +141,7 @@ def laminar_resistance(length: float, diameter: float, viscosity: float) -> floa
 
 def unsteady_terms(
     weights: ExponentialWeights, *, resistance: float, diameter: float, kinematic_viscosity: float
-) -> tuple[Values, Values]:
+) -> tuple[Floats, Floats]:
     """Gains [Pa s/m^3] and rates [1/s] of a :class:`~klack.network.rows.LineRow` by a weighting.
 
     Parameters

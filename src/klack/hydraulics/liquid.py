@@ -5,8 +5,9 @@ from typing import Protocol
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from klack.arrays import Floats
 from klack.errors import refuse_if, require_nonnegative, require_positive
 
 __all__ = [
@@ -33,8 +34,6 @@ _ACCEPTED = 0.1  # error of the bulk modulus within the range of a law
 _OFF = 1.0  # error of the bulk modulus at which a run makes no sense
 _TAIT_HIGHEST = 1500e5  # [Pa]
 
-Values = NDArray[np.float64]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PressureRange:
@@ -59,10 +58,10 @@ class PressureRange:
 class LiquidLaw(Protocol):
     """Density of a liquid over pressure, rising everywhere."""
 
-    def density(self, pressure: ArrayLike) -> Values:
+    def density(self, pressure: ArrayLike) -> Floats:
         """Density [kg/m^3] at the absolute pressure [Pa]."""
 
-    def bulk_modulus(self, pressure: ArrayLike) -> Values:
+    def bulk_modulus(self, pressure: ArrayLike) -> Floats:
         """``rho dp/drho`` [Pa] at the absolute pressure [Pa]."""
 
     @property
@@ -134,7 +133,7 @@ class Murnaghan:
             source=f"its bulk modulus rises linearly, as in real liquids up to {share:g} of it",
         )
 
-    def density(self, pressure: ArrayLike) -> Values:
+    def density(self, pressure: ArrayLike) -> Floats:
         """Density [kg/m^3] at the absolute pressure [Pa]."""
         x = np.asarray(pressure, dtype=float) - self.reference_pressure
         m = self.slope
@@ -142,7 +141,7 @@ class Murnaghan:
             np.log1p(m * x / self.bulk_modulus_at_reference) / m
         )
 
-    def bulk_modulus(self, pressure: ArrayLike) -> Values:
+    def bulk_modulus(self, pressure: ArrayLike) -> Floats:
         """``K_0 + m (p - p_0)`` [Pa] at the absolute pressure [Pa]."""
         x = np.asarray(pressure, dtype=float) - self.reference_pressure
         return self.bulk_modulus_at_reference + self.slope * x
@@ -187,17 +186,17 @@ class Tait:
             highest=_TAIT_HIGHEST, source="Tait's law, after Dymond and Malhotra 1988"
         )
 
-    def _volume(self, pressure: ArrayLike) -> Values:
+    def _volume(self, pressure: ArrayLike) -> Floats:
         """Volume over that at zero pressure."""
         c = 1.0 + self.slope
         p = np.asarray(pressure, dtype=float)
         return np.asarray(1.0 - np.log1p(p * c / self.bulk_modulus_at_zero) / c)
 
-    def density(self, pressure: ArrayLike) -> Values:
+    def density(self, pressure: ArrayLike) -> Floats:
         """Density [kg/m^3] at the absolute pressure [Pa]."""
         return self.density_at_zero / self._volume(pressure)
 
-    def bulk_modulus(self, pressure: ArrayLike) -> Values:
+    def bulk_modulus(self, pressure: ArrayLike) -> Floats:
         """``(K_0 + p (1 + K')) V/V_0`` [Pa] at the absolute pressure [Pa]."""
         p = np.asarray(pressure, dtype=float)
         return (self.bulk_modulus_at_zero + p * (1.0 + self.slope)) * self._volume(p)
@@ -218,9 +217,9 @@ class TabulatedLiquid:
         Increasing.
     """
 
-    pressure: Values
-    density_points: Values
-    slopes: Values
+    pressure: Floats
+    density_points: Floats
+    slopes: Floats
 
     def __init__(self, pressure: ArrayLike, density: ArrayLike) -> None:
         p = np.array(pressure, dtype=float).ravel()
@@ -259,16 +258,16 @@ class TabulatedLiquid:
             source=f"its table goes from {low / 1e5:.4g} to {high / 1e5:.4g} bar",
         )
 
-    def density(self, pressure: ArrayLike) -> Values:
+    def density(self, pressure: ArrayLike) -> Floats:
         """Density [kg/m^3] at the absolute pressure [Pa]."""
         return self._evaluate(pressure)[0]
 
-    def bulk_modulus(self, pressure: ArrayLike) -> Values:
+    def bulk_modulus(self, pressure: ArrayLike) -> Floats:
         """``rho dp/drho`` [Pa] at the absolute pressure [Pa]."""
         rho, slope = self._evaluate(pressure)
         return rho / slope
 
-    def _evaluate(self, pressure: ArrayLike) -> tuple[Values, Values]:
+    def _evaluate(self, pressure: ArrayLike) -> tuple[Floats, Floats]:
         """Density and its slope; Hermite cubics inside, the end tangents outside."""
         p, y, d = self.pressure, self.density_points, self.slopes
         at = np.asarray(pressure, dtype=float)
@@ -284,7 +283,7 @@ class TabulatedLiquid:
         return value, slope
 
 
-def _require_rising(p: Values, rho: Values) -> None:
+def _require_rising(p: Floats, rho: Floats) -> None:
     refuse_if(
         p.size != rho.size or p.size < 2,
         "TabulatedLiquid",
@@ -301,7 +300,7 @@ def _require_rising(p: Values, rho: Values) -> None:
     )
 
 
-def walther_viscosity(temperature: ArrayLike, a: float, b: float) -> Values:
+def walther_viscosity(temperature: ArrayLike, a: float, b: float) -> Floats:
     r"""Kinematic viscosity [m^2/s] of an oil over temperature.
 
     .. math:: \log_{10}\log_{10} Z = A - B\,\log_{10} T, \qquad Z \approx \nu + 0.7
@@ -328,7 +327,7 @@ def walther_viscosity(temperature: ArrayLike, a: float, b: float) -> Values:
 
 def barus_viscosity(
     viscosity: float, coefficient: float, pressure: ArrayLike, reference_pressure: float
-) -> Values:
+) -> Floats:
     r"""Dynamic viscosity [Pa s] under pressure, ``mu exp(alpha (p - p_0))`` (Barus 1893).
 
     Good to 2 % up to 350 bar for alkanes, too steep above some 1000 bar.

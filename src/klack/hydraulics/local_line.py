@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from klack.arrays import Vector
 from klack.errors import refuse_if
 from klack.hydraulics.fluid_table import fluid_at, fluid_table
 from klack.hydraulics.line_cells import (
@@ -31,7 +32,6 @@ from klack.units import format_si
 
 __all__ = ["FRICTIONS", "LocalLine", "steady_state"]
 
-Vector = NDArray[np.float64]
 
 FRICTIONS = ("none", "steady", "kagawa", "turbulent")
 """As the cells count them."""

@@ -7,8 +7,9 @@ Both are volumes per volume of liquid, so that density and stiffness are one fun
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from klack.arrays import Floats
 from klack.errors import InputError, refuse_if, require_positive
 from klack.hydraulics.liquid import ATMOSPHERE, LiquidLaw
 
@@ -20,10 +21,8 @@ LOWEST_PRESSURE = 1.0
 _AIR_DENSITY = 1.204  # [kg/m^3] at 20 degC and one atmosphere
 _LOWEST_BAND = 5.0  # [Pa] lower end of the change of phase
 
-Values = NDArray[np.float64]
 
-
-def _smooth_step(t: Values) -> tuple[Values, Values]:
+def _smooth_step(t: Floats) -> tuple[Floats, Floats]:
     """Cubic from 0 to 1 with flat ends, and its slope."""
     t = np.clip(t, 0.0, 1.0)
     return t * t * (3.0 - 2.0 * t), 6.0 * t * (1.0 - t)
@@ -114,7 +113,7 @@ class EntrainedGas:
         """Gas [kg] per m^3 of mixture at the reference pressure, as air of 20 degC."""
         return self.fraction * _AIR_DENSITY * self.reference_pressure / ATMOSPHERE
 
-    def volume(self, pressure: ArrayLike) -> tuple[Values, Values]:
+    def volume(self, pressure: ArrayLike) -> tuple[Floats, Floats]:
         """Volume [-] per volume of mixture at the reference pressure, and its slope [1/Pa]."""
         p = np.asarray(pressure, dtype=float)
         if self.fraction == 0.0:
@@ -123,13 +122,13 @@ class EntrainedGas:
         share, slope = self._free_share(p)
         return share * all_free, all_free * (slope - share / (self.exponent * p))
 
-    def dissolving(self, pressure: ArrayLike) -> Values:
+    def dissolving(self, pressure: ArrayLike) -> Floats:
         """Part of the slope of :meth:`volume` by gas that dissolves [1/Pa]."""
         p = np.asarray(pressure, dtype=float)
         all_free = self.fraction * (self.reference_pressure / p) ** (1.0 / self.exponent)
         return np.asarray(all_free * self._free_share(p)[1])
 
-    def _free_share(self, p: Values) -> tuple[Values, Values]:
+    def _free_share(self, p: Floats) -> tuple[Floats, Floats]:
         low, high = self.release_pressure, self.saturation_pressure
         if low is None or high is None:
             return np.ones_like(p), np.zeros_like(p)
@@ -173,7 +172,7 @@ class Vapour:
         low = max(self.pressure - self.half_width, 0.5 * self.pressure, _LOWEST_BAND)
         return low, max(self.pressure, low) + self.half_width
 
-    def density_with(self, liquid: LiquidLaw, pressure: ArrayLike) -> tuple[Values, Values]:
+    def density_with(self, liquid: LiquidLaw, pressure: ArrayLike) -> tuple[Floats, Floats]:
         """Density [kg/m^3] of liquid with vapour, and its slope [kg/(m^3 Pa)]."""
         p = np.asarray(pressure, dtype=float)
         low, high = self.kinks

@@ -32,8 +32,9 @@ from math import cos, pi, sin
 from typing import Any, Literal, Protocol, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from klack.arrays import Vector
 from klack.errors import refuse_if, require_positive
 
 __all__ = [
@@ -46,7 +47,6 @@ __all__ = [
     "ring_opening",
 ]
 
-Vector = NDArray[np.float64]
 SeatShape = Literal["flat", "cone", "ball"]
 
 _FEWEST_ANGLES = 8

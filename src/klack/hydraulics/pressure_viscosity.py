@@ -24,8 +24,9 @@ from dataclasses import dataclass
 from math import exp, log, log1p
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from klack.arrays import Floats
 from klack.errors import refuse_if
 from klack.hydraulics.liquid import ATMOSPHERE, HIGHEST_PRESSURE
 from klack.machine.compiling.jit import njit
@@ -40,8 +41,6 @@ _HIGHEST = HIGHEST_PRESSURE / _SCALE
 # Gauss-Legendre with five points on 0 .. 1
 _AT = tuple(float(0.5 + 0.5 * x) for x in np.polynomial.legendre.leggauss(5)[0])
 _WEIGHT = tuple(float(0.5 * w) for w in np.polynomial.legendre.leggauss(5)[1])
-
-Values = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,7 +98,7 @@ class PressureViscosity:
         """What :func:`mean_viscosity_ratio` takes."""
         return self.exponent, self.power
 
-    def ratio(self, pressure: ArrayLike) -> Values:
+    def ratio(self, pressure: ArrayLike) -> Floats:
         """Viscosity at the absolute pressure [Pa] over that at one atmosphere."""
         x = (np.asarray(pressure, dtype=float) - ATMOSPHERE) / _SCALE
         rise = np.expm1(self.power * np.log1p(np.clip(x, _LOWEST, _HIGHEST)))

@@ -25,8 +25,9 @@ from pathlib import Path
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from klack.arrays import Floats
 from klack.errors import AccuracyWarning, InputError, refuse_if
 from klack.hydraulics.fluid_definition import FluidDefinition, FluidState
 from klack.hydraulics.liquid import (
@@ -69,8 +70,6 @@ _DEFAULT_VAPOUR = 10.0  # [Pa]
 _BEYOND, _FAR = 1e-3, 1e-2  # of the bulk modulus, where its own rise is 1 % and 10 %
 _MOLAR = 0.1 / 8.314462618  # [kg K/J]
 
-Values = NDArray[np.float64]
-
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)
 class CompressedLiquid:
@@ -89,7 +88,7 @@ class CompressedLiquid:
     """
 
     name: str
-    pressure: Values
+    pressure: Floats
     density_at_lowest: float
     _fall: "scipy.interpolate.PchipInterpolator"
     _area: "scipy.interpolate.PchipInterpolator"
@@ -122,12 +121,12 @@ class CompressedLiquid:
             source=f"'{self.name}' covers {low / 1e5:.4g} to {high / 1e5:.4g} bar",
         )
 
-    def bulk_modulus(self, pressure: ArrayLike) -> Values:
+    def bulk_modulus(self, pressure: ArrayLike) -> Floats:
         """``rho dp/drho`` [Pa] at the absolute pressure [Pa]; constant beyond the table."""
         p = np.clip(np.asarray(pressure, dtype=float), self.pressure[0], self.pressure[-1])
         return np.asarray(1.0 / self._fall(p))
 
-    def density(self, pressure: ArrayLike) -> Values:
+    def density(self, pressure: ArrayLike) -> Floats:
         """Density [kg/m^3] at the absolute pressure [Pa]."""
         at = np.asarray(pressure, dtype=float)
         p = np.clip(at, self.pressure[0], self.pressure[-1])
@@ -152,12 +151,12 @@ class PropertyTable:
     """
 
     name: str
-    temperature: Values
-    pressure: Values
-    density: Values
-    viscosity: Values
-    bulk_modulus: Values | None = None
-    vapour_pressure: Values | None = None
+    temperature: Floats
+    pressure: Floats
+    density: Floats
+    viscosity: Floats
+    bulk_modulus: Floats | None = None
+    vapour_pressure: Floats | None = None
 
     def at(self, temperature: float) -> FluidState:
         """Properties at a temperature [K]; the viscosity as one exponential over pressure.
@@ -203,7 +202,7 @@ class PropertyTable:
         fall = self._between(1.0 / self.bulk_modulus, temperature)
         return CompressedLiquid(self.name, self.pressure, float(density[0]), fall)
 
-    def _between(self, columns: Values, temperature: float) -> Values:
+    def _between(self, columns: Floats, temperature: float) -> Floats:
         if self.temperature.size == 1:
             return columns[0]
         inside = np.clip(temperature, self.temperature[0], self.temperature[-1])
@@ -212,7 +211,7 @@ class PropertyTable:
         )
 
 
-def _exponential(pressure: Values, viscosity: Values) -> tuple[float, float, float]:
+def _exponential(pressure: Floats, viscosity: Floats) -> tuple[float, float, float]:
     """Viscosity at one atmosphere, its relative slope, and the largest deviation of both."""
     x, y = pressure - ATMOSPHERE, np.log(viscosity)
     slope, base = (float(c) for c in np.polyfit(x, y, 1))
@@ -265,7 +264,7 @@ def read_property_table(path: Path) -> PropertyTable:
     )
 
 
-def _require_rising(where: str, T: Values, p: Values, rho: Values) -> None:
+def _require_rising(where: str, T: Floats, p: Floats, rho: Floats) -> None:
     falls = np.argwhere(np.diff(rho, axis=1) <= 0.0)
     if falls.size:
         i, k = falls[0]
@@ -278,7 +277,7 @@ def _require_rising(where: str, T: Values, p: Values, rho: Values) -> None:
         )
 
 
-def _stiffness(where: str, T: Values, p: Values, columns: dict[str, Values]) -> Values | None:
+def _stiffness(where: str, T: Floats, p: Floats, columns: dict[str, Floats]) -> Floats | None:
     """Bulk modulus of the table, checked against sound speed and density."""
     K, rho = columns.get("bulk modulus"), columns["density"]
     if "sound speed" in columns:
@@ -309,7 +308,7 @@ def _stiffness(where: str, T: Values, p: Values, columns: dict[str, Values]) -> 
     return np.asarray(K)
 
 
-def _read(path: Path) -> tuple[list[str], Values]:
+def _read(path: Path) -> tuple[list[str], Floats]:
     """Names of the columns and their numbers in SI, shape (rows, columns)."""
     where = f"fluid table '{path.name}'"
     size = path.stat().st_size

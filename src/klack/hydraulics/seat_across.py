@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from klack.arrays import Vector
 from klack.hydraulics.off_axis_seat import SeatFace, pressure_load
 from klack.input.section import Section
 from klack.network.across import SideInputs
@@ -19,7 +19,6 @@ from klack.units import Length
 
 __all__ = ["SeatAcross", "SeatPlace"]
 
-Vector = NDArray[np.float64]
 
 _ANGLES = 24  # exact to round-off while nothing overlaps
 

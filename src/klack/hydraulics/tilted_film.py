@@ -19,9 +19,8 @@ from math import pi
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from klack.arrays import Cube, Matrix, Vector
+from klack.arrays import Cube, Floats, Matrix, Vector
 from klack.errors import refuse_if, require_nonnegative, require_positive
 from klack.hydraulics.ring_system import Ring, ring_of, solve_ring
 from klack.machine.compiling.jit import FAST, inner, njit
@@ -46,7 +45,6 @@ __all__ = [
     "solved_film",
 ]
 
-Array = NDArray[np.float64]
 
 _POINTS, _FEWER = 12, 8  # Gauss points between two circles: faces that touch have kinks there
 _FEWEST_SECTORS = 4
@@ -94,17 +92,17 @@ class SectorFilm:
 
     inner_radius: float
     outer_radius: float
-    angles: Array
-    radii: Array
+    angles: Floats
+    radii: Floats
     spread: float
     shared: int
-    between: Array
-    along: Array
-    around: Array
-    load: Array
-    head: Array
-    inward: Array
-    area: Array
+    between: Floats
+    along: Floats
+    around: Floats
+    load: Floats
+    head: Floats
+    inward: Floats
+    area: Floats
 
     @property
     def sectors(self) -> int:
@@ -116,7 +114,7 @@ class SectorFilm:
         """Number of heights in a sector."""
         return self.radii.size
 
-    def rows(self) -> Array:
+    def rows(self) -> Floats:
         """Heights per lift and both tilts; shape (S N, 3) [-], [m], [m].
 
         Lift along +z, ``h = z + r (tilt_x cos + tilt_y sin)``.  These rows, transposed, times the
@@ -202,8 +200,8 @@ def sector_film(
 
 
 def _radial_functions(
-    inner: float, outer: float, inside: Array, count: int
-) -> tuple[Array, Array, int]:
+    inner: float, outer: float, inside: Floats, count: int
+) -> tuple[Floats, Floats, int]:
     """Functions of the radius, zero at both edges, their slopes [1/m], and how many are shared."""
     width, r = outer - inner, inner + inside
     s, s_slope = 2.0 * inside / width - 1.0, 2.0 / width
@@ -228,14 +226,14 @@ def _radial_functions(
 
 def sector_forces(
     film: SectorFilm,
-    heights: Array,
-    closing: Array,
+    heights: Floats,
+    closing: Floats,
     viscosity: float,
     *,
     tension: float = np.inf,
     inner_pressure: float = 0.0,
     outer_pressure: float = 0.0,
-) -> Array:
+) -> Floats:
     """Forces [N] that press the faces apart, at one instant; shape (S, N).
 
     Parameters
@@ -259,15 +257,15 @@ def sector_forces(
 
 def sector_step(
     film: SectorFilm,
-    before: Array,
-    after: Array,
+    before: Floats,
+    after: Floats,
     step: float,
     viscosity: float,
     *,
     tension: float = np.inf,
     inner_pressure: float = 0.0,
     outer_pressure: float = 0.0,
-) -> tuple[Array, Array]:
+) -> tuple[Floats, Floats]:
     r"""Mean forces (S, N) [N] over a step, and slopes (S N, S N) [N/m] with the heights after.
 
     A point that goes from ``x_0`` to ``x_1`` has the mobility of the height with
@@ -295,12 +293,12 @@ def sector_step(
     return solved_film(film, mobility, (before - after) / step, change, edges, tension, 1.0 / step)
 
 
-def mean_mobility(before: Array, after: Array, viscosity: float) -> Array:
+def mean_mobility(before: Floats, after: Floats, viscosity: float) -> Floats:
     """Mobility [m^3/(Pa s)] of points between two heights: see :func:`sector_step`."""
     return np.asarray(before**2 * after**2 / (6.0 * viscosity * (before + after)))
 
 
-def _edges(film: SectorFilm, inner: float, outer: float) -> tuple[Array, Array]:
+def _edges(film: SectorFilm, inner: float, outer: float) -> tuple[Floats, Floats]:
     """Driving [Pa] and forces on the circles [N] of parallel faces between both pressures."""
     if film.inner_radius == 0.0:
         inner = outer
@@ -309,13 +307,13 @@ def _edges(film: SectorFilm, inner: float, outer: float) -> tuple[Array, Array]:
 
 def solved_film(
     film: SectorFilm,
-    mobility: Array,
-    closing: Array,
-    change: Array,
-    edges: tuple[Array, Array],
+    mobility: Floats,
+    closing: Floats,
+    change: Floats,
+    edges: tuple[Floats, Floats],
     tension: float,
     rate: float,
-) -> tuple[Array, Array]:
+) -> tuple[Floats, Floats]:
     """Forces on the circles, shape (S, N) [N], and with a rate their slopes with the heights.
 
     Parameters
@@ -342,7 +340,7 @@ def solved_film(
     return room.rows[at.force : at.closing, :S].T.copy(), slopes
 
 
-def _require_heights(where: str, film: SectorFilm, heights: Array) -> None:
+def _require_heights(where: str, film: SectorFilm, heights: Floats) -> None:
     refuse_if(
         heights.shape != (film.sectors, film.circles),
         where,
@@ -373,7 +371,7 @@ class Land(NamedTuple):
     area: Vector  # (N,)
 
 
-def land_of(film: SectorFilm, ways: Array) -> Land:
+def land_of(film: SectorFilm, ways: Floats) -> Land:
     """Return the arrays of a film, for slopes along some ways of its heights, shape (S N, w)."""
     apart = ways.T.reshape(ways.shape[1], film.sectors, film.circles).transpose(0, 2, 1)
     load = film.between.T @ film.load

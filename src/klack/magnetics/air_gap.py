@@ -23,8 +23,9 @@ from math import pi
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from klack.arrays import Vector
 from klack.magnetics.iron import VACUUM_PERMEABILITY
 
 __all__ = [
@@ -39,8 +40,6 @@ __all__ = [
     "slot_loss",
     "step_excess",
 ]
-
-Vector = NDArray[np.float64]
 
 
 def face_permeance(area: float, gap: ArrayLike) -> Vector:

@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Vector
 from klack.errors import AccuracyWarning, InputError
 from klack.magnetics.coupled_step import coupled_step
 from klack.magnetics.coupled_table import (
@@ -25,7 +25,6 @@ from klack.network.rows import Book, Channel, ElementRow, Rows
 
 __all__ = ["PlacedMagnet", "coupled_rows"]
 
-Vector = NDArray[np.float64]
 
 _OF_WINDING = (("voltage", "V", 5), ("current", "A", 4), ("driver state", "-", 0))
 _PLAIN = ("electric", "ohmic")

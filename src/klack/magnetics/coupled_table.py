@@ -14,8 +14,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Vector
 from klack.errors import InputError, refuse_if, require_positive
 from klack.magnetics.circuit import MagneticCircuit
 from klack.magnetics.driver import DriveProgram
@@ -34,7 +34,6 @@ __all__ = [
     "independent_ways",
 ]
 
-Vector = NDArray[np.float64]
 
 MOST_WINDINGS = 8
 """Most windings, and most magnets, in one system."""

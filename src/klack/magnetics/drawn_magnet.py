@@ -27,8 +27,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Vector
 from klack.errors import (
     ConvergenceError,
     InputError,
@@ -45,7 +45,6 @@ from klack.units import format_si
 
 __all__ = ["DrawnMagnet", "DrawnPart", "FieldMap", "section"]
 
-Vector = NDArray[np.float64]
 
 _ORDER = 3
 _FAR = 5.0  # air around, over the size of the magnet

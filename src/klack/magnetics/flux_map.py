@@ -20,14 +20,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from klack.arrays import Vector
 from klack.errors import AccuracyWarning, InputError, refuse_if
 from klack.units import format_si
 
 __all__ = ["FluxMap", "ForceComparison"]
 
-Vector = NDArray[np.float64]
 
 _LINKAGES = 129
 _ACCEPTED = 0.05  # largest disagreement of a given force, of its peak

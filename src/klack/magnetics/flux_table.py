@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Vector
 from klack.errors import refuse_if
 from klack.magnetics.circuit import MagneticBranch, MagneticCircuit
 from klack.magnetics.hysteresis import STOPS_PER_PART, IronStops
@@ -38,7 +38,6 @@ __all__ = [
     "tubes_of",
 ]
 
-Vector = NDArray[np.float64]
 
 HEADER = 12
 """Numbers in front of a plant; see :func:`circuit_numbers`."""

@@ -33,8 +33,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from klack.arrays import Vector
 from klack.errors import InputError, refuse_if, require_positive
 from klack.magnetics.iron import VACUUM_PERMEABILITY, IronCurve, measured
 
@@ -48,7 +49,6 @@ __all__ = [
     "measured_width",
 ]
 
-Vector = NDArray[np.float64]
 
 STOPS_PER_PART = 8
 """Stops of a part of iron."""

@@ -26,8 +26,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from klack.arrays import Vector
 from klack.errors import refuse_if, require_positive
 from klack.magnetics.reluctance import IronReluctance
 from klack.magnetics.tabulation import hermite_grid
@@ -48,8 +49,6 @@ VACUUM_PERMEABILITY = 4e-7 * np.pi
 _MU0 = VACUUM_PERMEABILITY
 _HIGHEST = 4.0  # [T]
 _TOLERANCE = 1e-7
-
-Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -33,8 +33,8 @@ from math import pi
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from klack.arrays import Vector
 from klack.magnetics.air_gap import (
     cylinder_wall,
     edges_beside_wall,
@@ -69,8 +69,6 @@ _EDGE = 2.0 * pi * RADIUS
 _WALL = cylinder_wall(RADIUS, YOKE_INNER)
 _LEAKAGE = ring_permeance(RADIUS, YOKE_INNER, 1.0)  # [H/m]
 _SIDE = _WINDOW - POLE - MOST_GAP  # armature inside the window at the largest gap
-
-Vector = NDArray[np.float64]
 
 
 def lifting_magnet(iron: IronCurve | None = None) -> MagneticCircuit:

@@ -19,13 +19,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.arrays import Vector
 from klack.errors import InputError, refuse_if
 from klack.magnetics.map_text import KINDS, CellTable, read_cells, read_number, read_unit
 from klack.units import QuantityError, format_si, parse_quantity
 
 __all__ = ["MapTable", "read_map", "read_matrix"]
 
-Vector = NDArray[np.float64]
 
 _UNITS = {"current": "A", "gap": "m", "linkage": "Wb", "force": "N"}
 _NAMES = {

@@ -18,8 +18,8 @@ on each side.
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Vector
 from klack.machine.compiling.jit import inner
 from klack.magnetics.flux_map import FluxMap
 from klack.magnetics.flux_table import BRANCH_SIZE, HEADER, MAP
@@ -31,8 +31,6 @@ _FLUX = HEADER + 1 + BRANCH_SIZE
 _MOST = 60
 _SETTLED = 1e-14
 _ROUND = 2e-15
-
-Vector = NDArray[np.float64]
 
 
 def map_numbers(flux_map: FluxMap) -> Vector:

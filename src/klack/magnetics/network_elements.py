@@ -12,9 +12,9 @@ from math import pi, sqrt
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from klack.arrays import Vector
 from klack.input.problem import refuse_key_if
 from klack.input.section import Name, Number, Section
 from klack.magnetics.circuit import MagneticBranch
@@ -27,7 +27,6 @@ from klack.units import Area, Current, FluxDensity, Length, Permeance, Resistanc
 
 __all__ = ["MovingGap", "NetworkElement", "WorkingGaps"]
 
-Vector = NDArray[np.float64]
 _TREE, _REST, _LEAKAGE, _GAP = range(4)  # ranks: what the spanning tree takes first
 _TOLERANCE = 1e-8
 

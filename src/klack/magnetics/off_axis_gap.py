@@ -18,8 +18,9 @@ from functools import cache
 from math import pi
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from klack.arrays import Vector
 from klack.errors import InputError
 from klack.magnetics.iron import VACUUM_PERMEABILITY
 
@@ -28,8 +29,6 @@ __all__ = [
     "guide_ring",
     "tilted_ring_face",
 ]
-
-Vector = NDArray[np.float64]
 
 
 def eccentric_ring(

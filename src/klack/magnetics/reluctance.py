@@ -28,13 +28,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from klack.arrays import Ints, Vector
 from klack.errors import InputError, refuse_if, require_nonnegative
 
 __all__ = ["GapReluctance", "IronReluctance", "LinearReluctance", "ReluctanceLaw"]
 
-Vector = NDArray[np.float64]
 
 _ROUND_OFF = 32.0 * float(np.finfo(float).eps)  # of the values of a cubic: what differences leave
 
@@ -248,8 +248,8 @@ def _two_sided_rows(x: Vector, y: Vector, dy: Vector) -> Vector:
     return _with_integral(np.vstack((line, _cubic_rows(x, y, dy), last)))
 
 
-def _locate(rows: Vector, x: Vector) -> tuple[NDArray[np.int64], Vector]:
-    i: NDArray[np.int64] = np.maximum(np.searchsorted(rows[:, 0], x, side="right") - 1, 0)
+def _locate(rows: Vector, x: Vector) -> tuple[Ints, Vector]:
+    i: Ints = np.maximum(np.searchsorted(rows[:, 0], x, side="right") - 1, 0)
     return i, x - rows[i, 0]
 
 

@@ -16,8 +16,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Vector
 from klack.errors import ConvergenceError
 from klack.magnetics.circuit import MagneticCircuit
 from klack.magnetics.flux_table import tubes_of
@@ -26,7 +26,6 @@ from klack.magnetics.static import StaticState, static_state
 
 __all__ = ["magnetised_otherwise", "remanent_state"]
 
-Vector = NDArray[np.float64]
 
 _STRONG = 1e6  # [A] magnetomotive force that saturates any iron
 _MOST = 200

@@ -19,8 +19,8 @@ from dataclasses import dataclass
 from math import hypot
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Vector
 from klack.magnetics.air_gap import face_permeance
 from klack.magnetics.off_axis_gap import eccentric_ring, guide_ring, tilted_ring_face
 from klack.magnetics.quiet_step import FRONT
@@ -28,8 +28,6 @@ from klack.magnetics.solenoid_parts import PoleGap
 from klack.network.across import SideInputs
 
 __all__ = ["ArmaturePull", "ArmatureRing"]
-
-Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

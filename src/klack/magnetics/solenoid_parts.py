@@ -4,10 +4,9 @@ from dataclasses import dataclass
 from math import pi
 from typing import Literal, Self
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from klack.arrays import Vector
 from klack.errors import InputError
 from klack.input.problem import CaseProblem, refuse_key_if
 from klack.input.section import Count, Number, Section
@@ -54,8 +53,6 @@ __all__ = [
     "PoleGap",
     "SolidIron",
 ]
-
-Vector = NDArray[np.float64]
 
 
 class PoleGap(Section):

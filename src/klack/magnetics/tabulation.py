@@ -3,11 +3,11 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
+
+from klack.arrays import Flags, Vector
 
 __all__ = ["hermite_grid"]
 
-Vector = NDArray[np.float64]
 _MOST_POINTS = 2000
 
 
@@ -42,9 +42,7 @@ def hermite_grid(
     return x
 
 
-def _misses(
-    curve: Callable[[Vector], tuple[Vector, Vector]], x: Vector, tolerance: float
-) -> NDArray[np.bool_]:
+def _misses(curve: Callable[[Vector], tuple[Vector, Vector]], x: Vector, tolerance: float) -> Flags:
     y, dy = curve(x)
     h = np.diff(x)
     secant = np.diff(y) / h

@@ -5,16 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 
+from klack.arrays import Ints
 from klack.mesh.families import FAMILIES
 from klack.mesh.joint import JointError
 from klack.mesh.mesh import FaceBlock, FacePair, FaceTable, Mesh, Surface
 
 __all__ = ["parted"]
-
-Ints = NDArray[np.int64]
 
 
 def parted(mesh: Mesh, names: Iterable[str]) -> tuple[Mesh, Ints]:

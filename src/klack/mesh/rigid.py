@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
+
+from klack.arrays import Vector
 
 __all__ = ["Pose", "rigid_placement", "rotation_matrix"]
-
-Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -49,7 +48,7 @@ class Pose:
         return (np.asarray(points) - self.about - self.shift) @ R + self.about
 
 
-def rotation_matrix(rotation: Vector) -> NDArray[np.float64]:
+def rotation_matrix(rotation: Vector) -> Vector:
     r"""Matrix (3, 3) of a rotation vector (3,) [rad].
 
     .. math:: R = I + \frac{\sin\theta}{\theta} W + \frac{1 - \cos\theta}{\theta^2} W^2,

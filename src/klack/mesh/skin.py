@@ -9,15 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 
+from klack.arrays import Floats, Ints
 from klack.mesh.mesh import FaceBlock, Mesh, outer_surface, simplices
 
 __all__ = ["Skin", "skin_of_mesh"]
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 _CREASE = np.cos(np.radians(35.0))
 """Angle of normals from which neighbouring triangles are parts of their own."""

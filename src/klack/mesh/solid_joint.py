@@ -3,16 +3,15 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from klack.arrays import Floats
 from klack.mesh.joint import FlatJoint, Joint, JointError, across, refuse_joint_if
 from klack.mesh.mesh import Mesh
 from klack.mesh.parting import parted
 
 __all__ = ["flat_solid_joint", "solid_joint"]
 
-Floats = NDArray[np.float64]
 
 _EVEN = 1e-5  # of radius or extent: how far nodes are from a cylinder or a plane
 _FLAT = 1e-2  # turn of the normals, from which a face is round: 20 deg

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Floats
 from klack.errors import InputError
 from klack.mesh.occ import MM, box_mm
 from klack.mesh.profile import Arc, Curve, Line, Profile, on_axis
@@ -18,7 +18,6 @@ from klack.mesh.solid import face_names, read_step, solid_names
 
 __all__ = ["NotTurnedError", "profiles_of_shape", "profiles_of_step"]
 
-Points = NDArray[np.float64]
 
 _SAME = 1e-5  # of volume, surface or area of the cut; OpenCASCADE integrates to 1e-6 or better
 _TURN = 37.3  # [deg] of the second half plane: no divisor of a usual pattern of holes
@@ -85,7 +84,7 @@ def _z_axis() -> Any:
     return Axis((0, 0, 0), Z)
 
 
-def _cut(solid: Any, low: Points, high: Points) -> Any:
+def _cut(solid: Any, low: Floats, high: Floats) -> Any:
     """Faces that the half plane shares with a solid."""
     from netgen.occ import Axes, WorkPlane
 
@@ -125,13 +124,13 @@ def _rounded(point: Any) -> tuple[float, float]:
     return round(point.x, _DIGITS) + 0.0, round(point.z, _DIGITS) + 0.0
 
 
-def _metres(point: Points) -> tuple[float, float]:
+def _metres(point: Floats) -> tuple[float, float]:
     # 15 digits: 0.3 mm must be the same number here as 0.0003 m elsewhere
     r, z = (float(f"{x / MM:.15g}") for x in point)
     return r, z
 
 
-def _centre(a: Points, b: Points, c: Points) -> Points:
+def _centre(a: Floats, b: Floats, c: Floats) -> Floats:
     """Centre of the circle through three points."""
     rows = 2.0 * np.array([b - a, c - a])
     right = np.array([b @ b - a @ a, c @ c - a @ a])

@@ -3,9 +3,8 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from klack.arrays import Matrix, Vector
+from klack.arrays import Flags, Matrix, Vector
 from klack.errors import InputError
 
 __all__ = ["spread_inside"]
@@ -18,7 +17,7 @@ def spread_inside(
     nodes: Matrix,
     count: int,
     draw: int,
-    within: Callable[[Matrix], NDArray[np.bool_]],
+    within: Callable[[Matrix], Flags],
     distance: Callable[[Matrix], Vector],
 ) -> Matrix:
     """Random points (count, d) inside, at 0.3 of the largest depth or below.

@@ -29,13 +29,12 @@ from itertools import pairwise
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from klack.acoustics.boundary.outline import Outline, not_closed, revolved_outline
 from klack.acoustics.boundary.revolved import Meridian
 from klack.acoustics.boundary.solid_outline import solid_outline
 from klack.acoustics.boundary.solution import BoundaryMesh, Radiation, radiation
-from klack.arrays import Cube, Matrix, Vector
+from klack.arrays import Complexes, Cube, Flags, Floats, Matrix, Vector
 from klack.bodies.reduction.structure import Structure
 from klack.errors import ConvergenceError
 from klack.machine.cache.entry import Entry
@@ -44,7 +43,6 @@ from klack.machine.cache.result_cache import ResultCache
 
 __all__ = ["ANGLES", "TOP", "SurfaceRadiation", "surface_radiation"]
 
-Complexes = NDArray[np.complex128]
 
 TOP = 20e3
 """Highest frequency [Hz] that is solved for, if the elements hold that far."""
@@ -88,7 +86,7 @@ class SurfaceRadiation:
     names: tuple[str, ...]
     frequency: Vector
     scale: Matrix
-    correlation: NDArray[np.float64]
+    correlation: Floats
     holds_up_to: float
     residual: float
     covered: float
@@ -205,14 +203,14 @@ def surface_radiation(
     return tuple(found)
 
 
-def _kept(correlation: NDArray[np.float64], mine: Sequence[int]) -> NDArray[np.float64]:
+def _kept(correlation: Floats, mine: Sequence[int]) -> Floats:
     """Own groups, and the sum of all others."""
     others = np.setdiff1d(np.arange(correlation.shape[1]), mine)
     rest = correlation[:, others].sum(axis=1, keepdims=True)
     return np.concatenate([correlation[:, list(mine)], rest], axis=1)
 
 
-def _solved(outline: Outline, sound_speed: float, top: float) -> dict[str, NDArray[np.float64]]:
+def _solved(outline: Outline, sound_speed: float, top: float) -> dict[str, Floats]:
     """Frequencies, and scales and correlations of each structure."""
     mesh = outline.mesh
     radius = float(np.sqrt(mesh.areas.sum() / (4.0 * pi)))
@@ -276,7 +274,7 @@ def _far_below(
     return [(f * monopole + (f / lowest) ** 2 * rest) * np.exp(f * delay) for f in frequency]
 
 
-def _by_group(p: Matrix, v: Matrix, weights: Vector, groups: Sequence[NDArray[np.bool_]]) -> Cube:
+def _by_group(p: Matrix, v: Matrix, weights: Vector, groups: Sequence[Flags]) -> Cube:
     r"""Symmetric part of :math:`\int_g p_i v_j\, \mathrm dS` (g, b, b)."""
     found = np.array([p[own].T @ (weights[own, None] * v[own]) for own in groups])
     return np.asarray((found + found.transpose(0, 2, 1)) / 2.0)
@@ -286,7 +284,7 @@ def _below(
     first: Cube,
     v: Matrix,
     weights: Vector,
-    groups: Sequence[NDArray[np.bool_]],
+    groups: Sequence[Flags],
     frequency: Vector,
     lowest: float,
     sound_speed: float,

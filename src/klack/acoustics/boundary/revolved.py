@@ -19,16 +19,14 @@ from functools import cached_property
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from klack.acoustics.boundary.interior import spread_inside
-from klack.arrays import Matrix, Vector
+from klack.arrays import Complexes, Flags, Matrix, Vector
 from klack.errors import InputError
 from klack.machine.compiling.jit import inner, njit
 
 __all__ = ["Meridian"]
 
-Complexes = NDArray[np.complex128]
 
 _AROUND = np.polynomial.legendre.leggauss(8)
 _ALONG = np.polynomial.legendre.leggauss(5)
@@ -163,7 +161,7 @@ def _volume(nodes: Matrix) -> float:
     return float(pi / 3.0 * ((z1 - z0) * (r0**2 + r0 * r1 + r1**2)).sum())
 
 
-def _within(loop: Matrix, points: Matrix) -> NDArray[np.bool_]:
+def _within(loop: Matrix, points: Matrix) -> Flags:
     (xa, ya), (xb, yb) = loop.T, np.roll(loop, -1, axis=0).T
     x, y = points[:, :1], points[:, 1:]
     rises = np.where(yb == ya, 1.0, yb - ya)

@@ -16,14 +16,12 @@ from typing import Protocol
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-from klack.arrays import Floats, Matrix, Vector
+from klack.arrays import Complexes, Floats, Matrix, Vector
 from klack.errors import ConvergenceError
 
 __all__ = ["LARGEST_RESIDUAL", "BoundaryMesh", "Radiation", "radiation"]
 
-Complexes = NDArray[np.complex128]
 Motions = Floats | Complexes
 
 LARGEST_RESIDUAL = 0.02

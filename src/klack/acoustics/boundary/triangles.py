@@ -15,17 +15,15 @@ from functools import cached_property
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from klack.acoustics.boundary.interior import spread_inside
-from klack.arrays import Ints, Matrix, Vector
+from klack.arrays import Complexes, Flags, Floats, Ints, Matrix, Vector
 from klack.errors import InputError
 from klack.machine.compiling.jit import njit
 from klack.machine.cores import available_cores
 
 __all__ = ["Triangles"]
 
-Complexes = NDArray[np.complex128]
 
 _THREE = np.array([[4.0, 1.0, 1.0], [1.0, 4.0, 1.0], [1.0, 1.0, 4.0]]) / 6.0
 _SMALL = 1e-9  # of a size
@@ -64,7 +62,7 @@ class Triangles:
         )
 
     @cached_property
-    def _abc(self) -> NDArray[np.float64]:
+    def _abc(self) -> Floats:
         return np.ascontiguousarray(np.asarray(self.points, dtype=float)[self.corners])
 
     @cached_property
@@ -122,7 +120,7 @@ class Triangles:
         """Points (count, 3) in the inside, well off the surface, drawn anew for every ``draw``."""
         return spread_inside(self.points, count, draw, self._within, self._distance)
 
-    def _within(self, points: Matrix) -> NDArray[np.bool_]:
+    def _within(self, points: Matrix) -> Flags:
         """By the solid angle of all triangles (van Oosterom & Strackee 1983)."""
         a, b, c = (corner - points[:, None] for corner in np.moveaxis(self._abc, 1, 0))
         la, lb, lc = (np.linalg.norm(way, axis=2) for way in (a, b, c))
@@ -168,7 +166,7 @@ _POINTS = (_points_of(0), _points_of(2), _points_of(3))
 @njit(nogil=True, error_model="numpy")
 def _rows(
     points: Matrix,
-    abc: NDArray[np.float64],
+    abc: Floats,
     centres: Matrix,
     normals: Matrix,
     areas: Vector,

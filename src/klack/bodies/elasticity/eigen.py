@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from klack.arrays import Floats, Ints
 from klack.bodies.elasticity.body import VibratingBody
 from klack.bodies.elasticity.factorization import Backend
 from klack.bodies.elasticity.statics import Flexibility
@@ -24,8 +24,6 @@ from klack.machine.memory import require_memory
 
 __all__ = ["Modes", "block_lanczos", "eigenmodes", "mode_memory", "rigid_frequencies"]
 
-
-Array = NDArray[np.float64]
 
 _TOLERANCE = 1e-8
 _ROUGH = 1e-2
@@ -38,15 +36,15 @@ class _Subspace:
     """Mass-orthonormal basis V and the projection T = V^T M A V."""
 
     M: csr_array
-    V: Array
-    T: Array
+    V: Floats
+    T: Floats
     size: int = 0
 
     @property
-    def basis(self) -> Array:
+    def basis(self) -> Floats:
         return self.V[:, : self.size]
 
-    def append(self, block: Array) -> None:
+    def append(self, block: Floats) -> None:
         needed = self.size + block.shape[1]
         if needed > self.V.shape[1]:
             columns = max(needed, self.V.shape[1] * 3 // 2)
@@ -62,7 +60,7 @@ class _Subspace:
         self.V[:, self.size : needed] = block
         self.size = needed
 
-    def orthonormalised(self, W: Array) -> tuple[Array, Array, Array, Array]:
+    def orthonormalised(self, W: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """W = V C + Q B with Q mass-orthonormal and orthogonal to V; Q, M Q, C, B.
 
         Q may have fewer columns.
@@ -80,15 +78,15 @@ class _Subspace:
 
 
 def block_lanczos(
-    operator: Callable[[Array], Array],
+    operator: Callable[[Floats], Floats],
     M: csr_array,
-    start: Array,
-    enough: Callable[[Array], bool],
+    start: Floats,
+    enough: Callable[[Floats], bool],
     largest_subspace: int,
     *,
     exact: int | None = None,
     expected: int = 0,
-) -> tuple[Array, Array]:
+) -> tuple[Floats, Floats]:
     """Largest eigenvalues and vectors of an operator A that is symmetric in M.
 
     Full reorthogonalisation, no restart (Grimes, Lewis & Simon 1994). A block of 8 vectors costs
@@ -150,7 +148,7 @@ def block_lanczos(
             )
 
 
-def _bordered(T: Array, C: Array) -> Array:
+def _bordered(T: Floats, C: Floats) -> Floats:
     size, b = C.shape
     grown = np.zeros((size, size))
     grown[: size - b, : size - b] = T
@@ -160,7 +158,7 @@ def _bordered(T: Array, C: Array) -> Array:
     return grown
 
 
-def _orthonormal(W: Array, MW: Array, scale: float) -> tuple[Array, Array, Array]:
+def _orthonormal(W: Floats, MW: Floats, scale: float) -> tuple[Floats, Floats, Floats]:
     """W = Q B with Q^T M Q = 1, and M Q; directions below round-off of ``scale`` are dropped."""
     if W.shape[1] == 0:
         return W, MW, np.zeros((0, 0))
@@ -194,16 +192,16 @@ class Modes:
         These and further ones that are not converged, for an estimate.
     """
 
-    omega: NDArray[np.float64]
-    shapes: NDArray[np.float64]
+    omega: Floats
+    shapes: Floats
     richer: "Modes | None" = None
 
     @property
-    def frequency(self) -> NDArray[np.float64]:
+    def frequency(self) -> Floats:
         """Eigenfrequencies [Hz]."""
         return self.omega / (2.0 * np.pi)
 
-    def kept(self, numbers: NDArray[np.int64]) -> "Modes":
+    def kept(self, numbers: Ints) -> "Modes":
         """Some of them, by ascending numbers; the lowest ones are not copied."""
         if np.array_equal(numbers, np.arange(len(numbers))):
             return Modes(self.omega[: len(numbers)], self.shapes[:, : len(numbers)])
@@ -282,7 +280,7 @@ def _require_memory(body: VibratingBody, count: int) -> None:
 
 def _lowest(
     body: VibratingBody,
-    shapes: NDArray[np.float64],
+    shapes: Floats,
     count: int | None,
     max_frequency: float | None,
 ) -> Modes:
@@ -293,7 +291,7 @@ def _lowest(
     return Modes(modes.omega[:keep], np.asfortranarray(modes.shapes[:, :keep]))
 
 
-def rigid_frequencies(body: VibratingBody) -> NDArray[np.float64]:
+def rigid_frequencies(body: VibratingBody) -> Floats:
     """Frequencies of the rigid modes [Hz]: zero but for round-off.
 
     Rejects one that is neither below 0.1 Hz nor within the round-off of R^T K R (some Hz for a
@@ -341,7 +339,7 @@ def _check_request(body: VibratingBody, count: int | None, max_frequency: float 
     )
 
 
-def _dense(body: VibratingBody) -> NDArray[np.float64]:
+def _dense(body: VibratingBody) -> Floats:
     """For small bodies."""
     free = body.free
     K = body.K[free][:, free].toarray()
@@ -354,10 +352,10 @@ def _dense(body: VibratingBody) -> NDArray[np.float64]:
 
 def _iterated(
     flexibility: Flexibility, count: int | None, max_frequency: float | None, total: int | None
-) -> NDArray[np.float64]:
+) -> Floats:
     body = flexibility.body
 
-    def enough(values: NDArray[np.float64]) -> bool:
+    def enough(values: Floats) -> bool:
         if total is not None and len(values) >= total:
             return True
         if max_frequency is None or not len(values):
@@ -379,7 +377,7 @@ def _iterated(
     return shapes
 
 
-def _rayleigh_ritz(body: VibratingBody, shapes: NDArray[np.float64]) -> Modes:
+def _rayleigh_ritz(body: VibratingBody, shapes: Floats) -> Modes:
     """Remove rigid motion from the shapes; take frequencies from K and M themselves."""
     R = body.rigid_modes
     shapes = shapes - R @ (R.T @ (body.M @ shapes))

@@ -24,9 +24,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array, eye_array, kron
 
+from klack.arrays import Floats, Ints
 from klack.bodies.elasticity.assembly import assemble_order
 from klack.bodies.elasticity.body import checked_nodes, require_support
 from klack.bodies.elasticity.layer import Layer, LayerStiffness, layer_stiffness, with_layers
@@ -60,7 +60,7 @@ class FourierBody:
     order: int
     K: csr_array
     M: csr_array
-    fixed: NDArray[np.int64]
+    fixed: Ints
     layers: tuple[LayerStiffness, ...] = ()
 
     @property
@@ -74,12 +74,12 @@ class FourierBody:
         return 3 * self.mesh.node_count
 
     @cached_property
-    def free(self) -> NDArray[np.int64]:
+    def free(self) -> Ints:
         """Sorted degrees of freedom that are not fixed."""
         return np.setdiff1d(np.arange(self.dof_count), self.fixed, assume_unique=True)
 
     @cached_property
-    def nodal_mass(self) -> NDArray[np.float64]:
+    def nodal_mass(self) -> Floats:
         """Mass of each node, full circle, shape (n_nodes,) [kg]."""
         full_circle = 2.0 if self.order > 0 else 1.0
         return np.asarray(full_circle * self.M[2::3, 2::3].sum(axis=1))
@@ -95,7 +95,7 @@ class FourierBody:
         return float(self.nodal_mass @ self.mesh.points[:, 1] / self.mass)
 
     @cached_property
-    def rigid_motions(self) -> NDArray[np.float64]:
+    def rigid_motions(self) -> Floats:
         """Motions without strain, supports left out, shape (n_dof, 2 | 0).
 
         A shift by 1, and a rotation, about the centre of mass in order 1, that moves the farthest
@@ -115,7 +115,7 @@ class FourierBody:
         return motion.reshape(self.dof_count, -1)
 
     @cached_property
-    def rigid_modes(self) -> NDArray[np.float64]:
+    def rigid_modes(self) -> Floats:
         """Rigid modes, shape (n_dof, 2 | 0) [1/sqrt(kg)], orthonormal in the mass."""
         R = self.rigid_motions
         if not R.shape[1] or np.any(R[self.fixed]):
@@ -123,11 +123,11 @@ class FourierBody:
         return orthonormal_in_mass(R, self.M)
 
     @cached_property
-    def isostatic_support(self) -> NDArray[np.int64]:
+    def isostatic_support(self) -> Ints:
         """As of :class:`~klack.bodies.elasticity.body.ElasticBody`."""
         return np.sort(held_best(self.rigid_modes, self.free))
 
-    def amplitudes(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
+    def amplitudes(self, u: Floats) -> Floats:
         """Amplitudes U, V, W at the nodes, shape (n_nodes, 3) or (n_nodes, 3, m).
 
         Parameters
@@ -198,8 +198,6 @@ def fourier_body(
         require_support(name, body.rigid_motions[body.fixed])
     return body
 
-
-Floats = NDArray[np.float64]
 
 _TO_MERIDIAN = np.array([[1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])  # U = a + b, W
 

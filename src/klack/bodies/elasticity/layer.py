@@ -25,16 +25,15 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from klack.arrays import Flags, Floats, Ints
 from klack.bodies.elasticity.loads import face_points, over_faces
 from klack.errors import InputError
 from klack.mesh.mesh import FacePair, Mesh
 
 __all__ = ["Layer", "LayerStiffness", "layer_damping", "layer_stiffness", "with_layers"]
 
-Floats = NDArray[np.float64]
 
 _SOFTEST, _STIFFEST = 1e-10, 1e6  # diagonal of K: of a layer over that of the solids beside it
 
@@ -72,7 +71,7 @@ class Layer:
             np.interp(at, of, loss),
         )
 
-    def covers(self, frequency: Floats) -> NDArray[np.bool_]:
+    def covers(self, frequency: Floats) -> Flags:
         """Whether the table has these frequencies; a single row has all."""
         f = self.table[:, 0]
         return (len(f) == 1) | ((frequency >= f[0]) & (frequency <= f[-1]))
@@ -202,7 +201,7 @@ def layer_damping(layers: tuple[LayerStiffness, ...], omega: Floats, shapes: Flo
 
 def _jumps(
     mesh: Mesh, pair: FacePair, order: int | None, which: slice
-) -> Iterator[tuple[NDArray[np.int64], Floats, Floats]]:
+) -> Iterator[tuple[Ints, Floats, Floats]]:
     """Nodes of both sides, what of their displacements jumps in some directions, and weights.
 
     Directions: the normal, then those across it.

@@ -8,9 +8,9 @@ On a body of revolution dA = 2 pi r ds: the full circle.
 from collections.abc import Callable, Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
+from klack.arrays import Floats, Ints
 from klack.bodies.elasticity.quadrature import quadrature
 from klack.bodies.elasticity.shape_functions import shape_functions
 from klack.mesh.mesh import FaceBlock, Mesh, Surface
@@ -18,12 +18,10 @@ from klack.mesh.mesh import FaceBlock, Mesh, Surface
 __all__ = ["NearLoads", "face_dashpots", "face_points", "order_load", "over_faces", "traction_load"]
 
 
-Floats = NDArray[np.float64]
-
-Traction = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
+Traction = Callable[[Floats, Floats], Floats]
 
 
-def traction_load(mesh: Mesh, surface: Surface, traction: Traction) -> NDArray[np.float64]:
+def traction_load(mesh: Mesh, surface: Surface, traction: Traction) -> Floats:
     """Nodal forces of a traction, shape (n_dof,) [N].
 
     Parameters
@@ -40,7 +38,7 @@ def traction_load(mesh: Mesh, surface: Surface, traction: Traction) -> NDArray[n
     return load.ravel()
 
 
-def order_load(mesh: Mesh, surface: Surface, traction: Traction, order: int) -> NDArray[np.float64]:
+def order_load(mesh: Mesh, surface: Surface, traction: Traction, order: int) -> Floats:
     r"""Forces (3 n_nodes,) [N] of a traction in one Fourier order around a body of revolution.
 
     The traction :math:`t_r \cos n\theta,\; t_\theta \sin n\theta,\; t_z \cos n\theta` does the
@@ -89,7 +87,7 @@ def face_dashpots(mesh: Mesh, surface: Surface, resistance: float) -> csr_array:
 
 
 def over_faces(
-    parts: Iterable[tuple[NDArray[np.int64], Floats, Floats]], node_count: int, per_node: int
+    parts: Iterable[tuple[Ints, Floats, Floats]], node_count: int, per_node: int
 ) -> csr_array:
     r"""Matrix of integrals over faces, shape (per_node node_count,) twice.
 
@@ -113,7 +111,7 @@ def over_faces(
     return csr_array(coo_array((np.concatenate(values), entries), shape=shape))
 
 
-def face_points(mesh: Mesh, block: FaceBlock) -> tuple[NDArray[np.float64], ...]:
+def face_points(mesh: Mesh, block: FaceBlock) -> tuple[Floats, ...]:
     """Shape functions (q, n), points (faces, q, d), weights (faces, q) and outward normals."""
     xi, w = quadrature(block.family, "mass")
     N, dN = shape_functions(block.family, xi)

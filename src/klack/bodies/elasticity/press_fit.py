@@ -20,11 +20,11 @@ from itertools import combinations
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import spsolve
 from scipy.spatial import cKDTree
 
+from klack.arrays import Flags, Floats, Ints
 from klack.bodies.elasticity.assembly import assemble
 from klack.bodies.elasticity.factorization import factorize
 from klack.bodies.elasticity.loads import face_points, over_faces
@@ -48,8 +48,6 @@ __all__ = [
 ]
 
 J = TypeVar("J", bound=Joint | FlatJoint)
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 _SHARP = 200.0 / 360.0  # of the full angle round a corner; arcs in elements stay below
 _LEVEL = 1e-6  # of the normal of a face across the axis
@@ -77,7 +75,7 @@ class JointPressure:
 
     height: Floats
     pressure: Floats
-    away: NDArray[np.bool_]
+    away: Flags
     area: float
     force: float
 
@@ -451,7 +449,7 @@ def _solid_angles(points: Floats, block: ElementBlock) -> Floats:
     return result
 
 
-def far_from(corners: Floats, points: Floats, radius: float) -> NDArray[np.bool_]:
+def far_from(corners: Floats, points: Floats, radius: float) -> Flags:
     """Which points are farther from all corners than the radius; all where none is."""
     if not len(corners):
         return np.ones(len(points), dtype=bool)

@@ -14,15 +14,13 @@ along the ring has the sine of an angle where others have the cosine.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array, eye_array, kron, vstack
 
+from klack.arrays import Flags, Floats, Ints
 from klack.bodies.elasticity.fourier_body import rows_around
 
 __all__ = ["RingPoints", "RingRows", "RingSections", "resolved_orders", "share_of_order"]
 
-
-Floats = NDArray[np.float64]
 
 _AROUND = np.array([[-1.0, 1.0, 0.0]])  # V = b - a
 _CHUNK = 256
@@ -68,7 +66,7 @@ class RingRows:
         return int(self.along.shape[0] + self.around.shape[0])
 
     @property
-    def is_sine(self) -> NDArray[np.bool_]:
+    def is_sine(self) -> Flags:
         """Which rows read along the ring, shape (count,)."""
         return np.arange(self.count) >= self.along.shape[0]
 
@@ -97,10 +95,10 @@ class RingPoints:
         Of :class:`RingRows`.
     """
 
-    row: NDArray[np.int64]
-    turn: NDArray[np.int64]
+    row: Ints
+    turn: Ints
     count: int
-    is_sine: NDArray[np.bool_]
+    is_sine: Flags
 
     @property
     def angle(self) -> Floats:
@@ -146,7 +144,7 @@ class RingPoints:
         return C
 
 
-def _by_difference(spectrum: Floats, is_sine: NDArray[np.bool_], count: int) -> Floats:
+def _by_difference(spectrum: Floats, is_sine: Flags, count: int) -> Floats:
     """Sum over the orders for each difference of angles, shape (N, rows, rows)."""
     phase = np.ones((len(is_sine),) * 2, dtype=complex)
     phase[np.ix_(is_sine, ~is_sine)] = -1j  # a row along the ring moves with the sine
@@ -222,8 +220,8 @@ class RingSections:
 
 def _placed(
     parts: list[tuple[int, Floats]],
-    row: NDArray[np.int64],
-    node: NDArray[np.int64],
+    row: Ints,
+    node: Ints,
     k: int,
     nodes: int,
 ) -> csr_array:

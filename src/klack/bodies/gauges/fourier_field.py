@@ -1,16 +1,15 @@
 """Displacement of a body of revolution in one Fourier order, at points of space."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from klack.arrays import Floats
 from klack.bodies.elasticity.fourier_body import FourierBody, displacement_rows
 from klack.bodies.elasticity.shape_functions import shape_functions
 from klack.bodies.gauges.located_point import locate
 
 __all__ = ["field_rows"]
 
-Floats = NDArray[np.float64]
 
 _SAME = 1e-12  # of the size of the body: places of the half section that are one
 

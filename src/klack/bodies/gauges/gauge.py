@@ -5,13 +5,12 @@ from math import inf
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Floats
 from klack.signals.low_pass import LowPass
 
 __all__ = ["GAUGE_UNITS", "Gauge", "GaugeKind", "GaugeRecord"]
 
-Floats = NDArray[np.float64]
 
 GaugeKind = Literal["displacement", "velocity", "strain", "stress"]
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from klack.arrays import Floats, Ints
 from klack.bodies.elasticity.shape_functions import reference_nodes, shape_functions
 from klack.errors import refuse_if
 from klack.mesh.mesh import ElementBlock, Mesh
@@ -22,7 +22,6 @@ from klack.units import format_si
 
 __all__ = ["LocatedPoint", "locate"]
 
-Floats = NDArray[np.float64]
 
 _SNAP = 0.05
 """Share of the element size that a flat facet may lie below the curved face."""
@@ -54,7 +53,7 @@ class LocatedPoint:
     place: Floats
 
     @property
-    def nodes(self) -> NDArray[np.int64]:
+    def nodes(self) -> Ints:
         """Nodes of the element."""
         return np.asarray(self.block.connectivity[self.element])
 
@@ -99,7 +98,7 @@ def _text(point: Floats, pose: Pose | None) -> str:
     return "(" + ", ".join(f"{round(1e3 * x, 6) + 0.0:g}" for x in point) + ") mm"
 
 
-def _candidates(mesh: Mesh, block: ElementBlock, point: Floats) -> NDArray[np.int64]:
+def _candidates(mesh: Mesh, block: ElementBlock, point: Floats) -> Ints:
     """Elements whose box is not farther than the nearest node of the block."""
     x = mesh.points[block.connectivity]
     slack = 0.1 * np.ptp(x, axis=1)  # curved sides leave the box of the nodes

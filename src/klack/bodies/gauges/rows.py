@@ -18,8 +18,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Floats
 from klack.bodies.elasticity.shape_functions import shape_functions
 from klack.bodies.gauges.located_point import LocatedPoint, locate
 from klack.errors import InputError, refuse_if, require_nonnegative
@@ -29,7 +29,6 @@ from klack.mesh.rigid import Pose
 
 __all__ = ["AROUND", "Line", "displacement_row", "strain_row", "stress_row"]
 
-Floats = NDArray[np.float64]
 
 AROUND = "around"
 """Direction around the axis of a body of revolution."""

@@ -13,15 +13,14 @@ import re
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Floats
 from klack.bodies.model_files.named_arrays import NamedArrays, read_named_arrays
 from klack.bodies.model_files.uff import FileModalData, read_uff_modes
 from klack.errors import InputError, refuse_if
 
 __all__ = ["read_modal_data"]
 
-Floats = NDArray[np.float64]
 
 _LARGEST = 256 << 20  # bytes
 _UFF = (".uff", ".unv", ".ufb")

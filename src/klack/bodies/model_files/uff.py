@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Complexes, Floats
 from klack.errors import InputError, refuse_if
 
 __all__ = ["FileModalData", "read_uff_modes"]
@@ -107,8 +107,8 @@ class Receptance:
 
     response: str
     reference: str
-    frequency: NDArray[np.float64]
-    values: NDArray[np.complex128]
+    frequency: Floats
+    values: Complexes
 
 
 def read_response(path: Path, lines: list[str], first: int, end: int) -> Receptance | None:
@@ -156,8 +156,6 @@ def _place(path: Path, line: int, text: str) -> tuple[str, int]:
         raise uff_refusal(path, line, f"direction {direction}", "1 to 6 or -1 to -6")
     return f"{node} {DIRECTIONS[abs(direction) - 1]}", 1 if direction > 0 else -1
 
-
-Floats = NDArray[np.float64]
 
 _LARGEST = 256 << 20  # bytes
 _NORMAL_MODE, _COMPLEX_MODE = 2, 3

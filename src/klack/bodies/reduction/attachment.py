@@ -31,9 +31,9 @@ from functools import partial
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from klack.arrays import Floats
 from klack.bodies.elasticity.body import ElasticBody
 from klack.bodies.elasticity.eigen import Modes
 from klack.bodies.elasticity.statics import Flexibility
@@ -50,7 +50,6 @@ __all__ = [
     "shifted_attachment",
 ]
 
-Floats = NDArray[np.float64]
 
 _DEPENDENT = 1e-8  # a vector that keeps less than this share of its M-norm is round-off
 _PARALLEL = 1e-4  # sine of the angle to the modes of other shifts; half of the digits are left
@@ -59,12 +58,12 @@ _RIGID_SHARE = 1e-5  # of the M-norm left without rigid motion; a third of the d
 _ROUNDS = 4  # of the inverse iteration
 
 
-def default_shift(omega: NDArray[np.float64]) -> float:
+def default_shift(omega: Floats) -> float:
     """Shift ``-omega_1^2`` [(rad/s)^2] for elastic frequencies (m,) [rad/s]."""
     return -(float(omega[0]) ** 2)
 
 
-def residual_attachment(body: ElasticBody, kept: Modes, deflections: NDArray[np.float64]) -> Modes:
+def residual_attachment(body: ElasticBody, kept: Modes, deflections: Floats) -> Modes:
     """Residual attachment modes in modal form, at most one per port.
 
     A pattern that the retained modes carry in full adds none.
@@ -231,5 +230,5 @@ def _parallel(body: ElasticBody, shifts: Sequence[float], i: int, sine: float) -
     )
 
 
-def _norms(M: csr_array, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+def _norms(M: csr_array, vectors: Floats) -> Floats:
     return np.sqrt(np.einsum("ij,ij->j", vectors, M @ vectors))

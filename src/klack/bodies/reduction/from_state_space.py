@@ -18,8 +18,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from klack.arrays import Complexes, Flags, Floats
 from klack.bodies.reduction.given_modes import (
     RIGID_FREQUENCY,
     TOLERANCE,
@@ -33,8 +33,6 @@ from klack.input.unit_systems import UnitSystem
 
 __all__ = ["body_of_state_space", "modes_of_state_space", "state_space_in_si"]
 
-Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 _NULL = 1e-10  # singular values below this share of the largest are zero
 _NOISE = 1e-5  # of the largest G: smaller ones are not judged
@@ -47,8 +45,8 @@ _ROUND_OFF = 1e-11  # of the fastest pole
 class _Poles:
     """Poles with their residues at the ports, shape (n, n_ports, n_ports)."""
 
-    poles: Complex
-    residues: Complex
+    poles: Complexes
+    residues: Complexes
 
 
 def state_space_in_si(model: StateSpace, units: UnitSystem) -> StateSpace:
@@ -191,7 +189,7 @@ def _poles(A: Floats, B: Floats, C: Floats) -> _Poles:
     return _Poles(poles=poles.astype(complex), residues=residues)
 
 
-def _check_stable(where: str, poles: Complex) -> None:
+def _check_stable(where: str, poles: Complexes) -> None:
     if not poles.size:
         return
     size = np.abs(poles)
@@ -209,11 +207,11 @@ def _check_stable(where: str, poles: Complex) -> None:
     )
 
 
-_Pair = tuple[float, float, Complex, int]
+_Pair = tuple[float, float, Complexes, int]
 """omega, damping, G, number of modes."""
 
 
-def _oscillating(found: _Poles, wanted: NDArray[np.bool_]) -> list[_Pair]:
+def _oscillating(found: _Poles, wanted: Flags) -> list[_Pair]:
     """Pairs of complex poles; coinciding ones (bending in two planes) stay together."""
     upper = np.flatnonzero(wanted & (found.poles.imag > 0))
     upper = upper[np.argsort(np.abs(found.poles[upper]))]
@@ -234,7 +232,7 @@ def _oscillating(found: _Poles, wanted: NDArray[np.bool_]) -> list[_Pair]:
     return pairs
 
 
-def _overdamped(where: str, found: _Poles, wanted: NDArray[np.bool_]) -> list[_Pair]:
+def _overdamped(where: str, found: _Poles, wanted: Flags) -> list[_Pair]:
     """Pairs of real poles with opposite residues, those visible at a port."""
     real = np.flatnonzero(wanted & (found.poles.imag == 0))
     sizes = np.array([float(np.max(np.abs(r))) for r in found.residues]) * np.abs(found.poles)
@@ -260,7 +258,7 @@ def _overdamped(where: str, found: _Poles, wanted: NDArray[np.bool_]) -> list[_P
     return pairs
 
 
-def _check_gram(where: str, ports: Sequence[str], G: Complex, largest: float) -> None:
+def _check_gram(where: str, ports: Sequence[str], G: Complexes, largest: float) -> None:
     """Reject a ``G`` that is not real, symmetric and positive, as far as it matters."""
     own = float(np.max(np.abs(G)))
     limit = TOLERANCE * own + _NOISE * largest

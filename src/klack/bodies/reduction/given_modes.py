@@ -9,14 +9,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Floats
 from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.errors import InputError, refuse_if
 
 __all__ = ["RIGID_FREQUENCY", "TOLERANCE", "ModesAtPorts", "body_of_modes", "shapes_of_gram"]
 
-Floats = NDArray[np.float64]
 
 TOLERANCE = 1e-3
 """Accepted deviation from reciprocity and from one common axial motion [-]."""

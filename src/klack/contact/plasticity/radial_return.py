@@ -26,9 +26,8 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from klack.arrays import Floats
+from klack.arrays import Floats, Ints
 from klack.materials.hardening import Hardening
 
 __all__ = ["PlasticState", "Returned", "radial_return", "von_mises_of_strain"]
@@ -74,7 +73,7 @@ class Returned:
 
     state: PlasticState
     taken: Floats
-    yielding: NDArray[np.int64]
+    yielding: Ints
     work: Floats
 
 

@@ -4,10 +4,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from klack.arrays import Floats
+from klack.arrays import Flags, Floats
 from klack.bodies.elasticity.body import ElasticBody
 from klack.bodies.elasticity.factorization import factorize
 from klack.bodies.elasticity.statics import Flexibility
@@ -47,7 +46,7 @@ class LoadedBody:
                 found += [solid, *astuple(material.hardening)]
         return tuple(found)
 
-    def elements_near(self, place: Floats, radius: float) -> NDArray[np.bool_]:
+    def elements_near(self, place: Floats, radius: float) -> Flags:
         """Elements that may yield within a radius of a place [m], shape (n_elements,)."""
         near = []
         for block in self.body.mesh.blocks:

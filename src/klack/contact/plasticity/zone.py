@@ -29,10 +29,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array
 
-from klack.arrays import Floats, Ints
+from klack.arrays import Flags, Floats, Ints
 from klack.bodies.elasticity.body import ElasticBody
 from klack.bodies.elasticity.factorization import factorize
 from klack.bodies.elasticity.quadrature import quadrature
@@ -100,7 +99,7 @@ class StrainPoints:
 
 
 def strain_points(
-    mesh: Mesh, materials: Mapping[str, Material], chosen: NDArray[np.bool_], name: str
+    mesh: Mesh, materials: Mapping[str, Material], chosen: Flags, name: str
 ) -> list[StrainPoints]:
     """Points of the chosen elements of a meridian mesh, block by block.
 
@@ -189,7 +188,7 @@ class PlasticZone:
 
 
 def plastic_zone(
-    body: ElasticBody, materials: Mapping[str, Material], chosen: NDArray[np.bool_]
+    body: ElasticBody, materials: Mapping[str, Material], chosen: Flags
 ) -> PlasticZone:
     """Condense a body (meridian plane) onto the elements that may yield, which must harden."""
     points = strain_points(body.mesh, materials, chosen, body.name)

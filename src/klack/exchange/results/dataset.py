@@ -19,6 +19,7 @@ from klack.analyses.stroke_shots.record import (
     VariantShots,
 )
 from klack.analyses.study.record import StudyColumn, StudyRecord
+from klack.arrays import Floats
 from klack.errors import InputError, optional_package, refuse_if
 from klack.exchange.results.study_table import about_study, result_table
 from klack.exchange.results.table import ResultChannel, ResultRun, ResultScalar, identifiers
@@ -38,9 +39,6 @@ class Variable(NamedTuple):
 def about_measure(measure: Measure[Any]) -> dict[str, str]:
     """Attributes of the values of a measure."""
     return {"units": measure.unit, "long_name": measure.name, "comment": measure.definition}
-
-
-Floats = NDArray[np.float64]
 
 
 def noise_variables(design: NoiseDesign) -> tuple[dict[str, Variable], dict[str, Variable]]:

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from klack.analyses.stroke.film_frames import recorded_impacts
 from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
+from klack.arrays import Floats
 from klack.assembling.modes import shape_marks
 from klack.assembling.spatial import modes_in_network
 from klack.assembling.valve import build_valve_bodies, valve_parts
@@ -49,8 +49,8 @@ class BodyShapes:
     """
 
     body: ElasticBody
-    shapes: NDArray[np.float64]
-    omega: NDArray[np.float64]
+    shapes: Floats
+    omega: Floats
     above: Mapping[str, float]
     is_upper: Mapping[str, bool]
 
@@ -90,7 +90,7 @@ def write_ring(
     path: Path,
     radius: float,
     height: float,
-    fields: Mapping[str, NDArray[np.float64]],
+    fields: Mapping[str, Floats],
     time: float,
 ) -> None:
     """Write lines round the axis z, one per value in each field.
@@ -112,8 +112,6 @@ def write_ring(
     single = {name: values.astype("f4") for name, values in fields.items()}
     write_grid(path, grid_piece(points, ends.ravel(), np.full(count, 2), types, single), {}, time)
 
-
-Floats = NDArray[np.float64]
 
 _SAME = 1e-6  # of the largest mark of a body: its shapes are those of the result
 

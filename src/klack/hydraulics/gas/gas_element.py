@@ -5,8 +5,8 @@ from functools import partial
 from math import inf
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Vector
 from klack.errors import ConvergenceError
 from klack.hydraulics.gas.gas import Gas
 from klack.hydraulics.gas.gas_step import (
@@ -28,7 +28,6 @@ from klack.units import percent_text
 
 __all__ = ["GasNetwork", "close_gas"]
 
-Vector = NDArray[np.float64]
 
 _FIRST_STEP, _LONGER = 1e-7, 8.0  # of pseudo-time to steady flow [s]
 _LONG, _LONGEST = 1e3, 1e12  # from here on it may be found; it must be here

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Flags, Floats, Ints
 from klack.errors import AccuracyWarning, InputError, refuse_if, require_positive
 from klack.mesh.families import FAMILIES
 from klack.mesh.files.mesh_model import FileMaterial, MeshModel
@@ -30,13 +30,11 @@ __all__ = [
 ]
 
 
-Ints = NDArray[np.int64]
-
 _CHUNK = 50_000
 _FARTHEST = 1e4  # [m] of a node from the origin
 
 
-def require_near(path: Path, points: NDArray[np.float64], numbers: Ints) -> None:
+def require_near(path: Path, points: Floats, numbers: Ints) -> None:
     """Reject a node so distant that its unit or its columns must be wrong."""
     far = np.abs(points).max(axis=1) > _FARTHEST
     if far.any():
@@ -153,7 +151,7 @@ class FileMesh:
     """
 
     numbers: Ints
-    points: NDArray[np.float64]
+    points: Floats
     solids: tuple[FileElements, ...]
     faces: tuple[FileElements, ...] = ()
     node_sets: Mapping[str, Ints] = field(default_factory=dict)
@@ -310,7 +308,7 @@ class _NodeNumbers:
         rows, found = self._find(np.asarray(numbers, dtype=np.int64))
         return np.unique(rows[found])
 
-    def _find(self, numbers: Ints) -> tuple[Ints, NDArray[np.bool_]]:
+    def _find(self, numbers: Ints) -> tuple[Ints, Flags]:
         if not len(self.sorted):
             return np.zeros(numbers.shape, dtype=np.int64), np.zeros(numbers.shape, dtype=bool)
         first = int(self.sorted[0])
@@ -354,7 +352,7 @@ _MIRRORED = {
 _TETRAHEDRA = {"tet4": (0, 2, 1, 3), "tet10": (0, 2, 1, 3, 6, 5, 4, 7, 9, 8)}
 
 
-def _all_mirrored(points: NDArray[np.float64], blocks: Sequence[ElementBlock]) -> bool:
+def _all_mirrored(points: Floats, blocks: Sequence[ElementBlock]) -> bool:
     """Whether there are tetrahedra alone, all of negative volume."""
     if not all(block.family in _TETRAHEDRA for block in blocks):
         return False
@@ -365,7 +363,7 @@ def _all_mirrored(points: NDArray[np.float64], blocks: Sequence[ElementBlock]) -
     return True
 
 
-def _turned(points: NDArray[np.float64], block: ElementBlock) -> ElementBlock:
+def _turned(points: Floats, block: ElementBlock) -> ElementBlock:
     """Turn elements whose sense differs between programs: plane ones and wedges.
 
     A plane mesh has the sense of its drawing; VTK numbers a wedge from its other side.

@@ -4,14 +4,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Flags, Ints
 from klack.errors import InputError
 from klack.mesh.mesh import ElementBlock, FaceBlock, FaceTable, Surface
 
 __all__ = ["ALSO_OTHERS", "LOOSE", "MarkedFaces", "loose_faces", "named_faces"]
 
-Ints = NDArray[np.int64]
 
 ALSO_OTHERS = (
     "add 'elements: solids-only' next to the file in the case to leave them out, or remove "
@@ -103,9 +102,7 @@ def loose_faces(blocks: tuple[ElementBlock, ...], marks: tuple[MarkedFaces, ...]
     )
 
 
-def _with_faces_on(
-    blocks: tuple[ElementBlock, ...], near: NDArray[np.bool_]
-) -> tuple[ElementBlock, ...]:
+def _with_faces_on(blocks: tuple[ElementBlock, ...], near: Flags) -> tuple[ElementBlock, ...]:
     """Elements that may have a face among the nodes of interest."""
     parts = []
     for block in blocks:
@@ -128,7 +125,7 @@ def _covered(table: FaceTable, name: str, nodes: Ints, count: int) -> Surface:
     return Surface(name, kept)
 
 
-def _refuse_shells(where: str, mark: MarkedFaces, lost: NDArray[np.bool_]) -> None:
+def _refuse_shells(where: str, mark: MarkedFaces, lost: Flags) -> None:
     raise InputError(
         f"{where}: element {mark.numbers[lost][0]} ('{mark.name}')",
         got=f"{lost.sum()} surface elements that are not faces of a solid element",

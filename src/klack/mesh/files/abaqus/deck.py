@@ -6,8 +6,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Flags, Floats, Ints
 from klack.errors import AccuracyWarning, InputError, refuse_if
 from klack.mesh.families import FAMILIES
 from klack.mesh.files.abaqus.keywords import DataLine, Keyword, read_keywords
@@ -22,8 +22,6 @@ __all__ = ["Deck", "read_deck"]
 LARGEST_NODES = 100_000_000
 """Most nodes of all instances together."""
 
-Points = NDArray[np.float64]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placement:
@@ -37,16 +35,16 @@ class Placement:
         Of the axis, after the shift.
     """
 
-    shift: Points
-    turn: Points
-    about: Points
+    shift: Floats
+    turn: Floats
+    about: Floats
 
     @property
     def along_axis(self) -> bool:
         """True if a body of revolution (r = x, z = y) stays one."""
         return not self.shift[[0, 2]].any() and np.array_equal(self.turn, np.eye(3))
 
-    def of(self, points: Points) -> Points:
+    def of(self, points: Floats) -> Floats:
         """Points (n, 3) of the part, where the instance has them."""
         if not self.shift.any() and np.array_equal(self.turn, np.eye(3)):
             return points
@@ -132,8 +130,6 @@ def _require_revolution(part: Scope, placement: Placement, place: str) -> None:
     )
 
 
-Integers = NDArray[np.int64]
-
 _MARKER_SIDES = {"", "SPOS", "SNEG", "S1", "S2"}  # of surface elements: each is one face
 
 
@@ -201,7 +197,7 @@ def _selections(scope: Scope, lines: Sequence[DataLine]) -> list[FaceSelection]:
     return found
 
 
-def _wrong_sides(scope: Scope, label: str, rows: Integers) -> NDArray[np.bool_]:
+def _wrong_sides(scope: Scope, label: str, rows: Ints) -> Flags:
     """True for elements without such a face."""
     side = int(label[1:]) if label[:1] == "S" and is_integer(label[1:]) else 0
     wrong = [
@@ -213,7 +209,7 @@ def _wrong_sides(scope: Scope, label: str, rows: Integers) -> NDArray[np.bool_]:
     return np.array(wrong, dtype=bool)[scope.group_of(rows)]
 
 
-def _side(scope: Scope, line: DataLine, label: str, rows: Integers) -> int:
+def _side(scope: Scope, line: DataLine, label: str, rows: Ints) -> int:
     wrong = _wrong_sides(scope, label, rows)
     if wrong.any():
         group = scope.groups[int(scope.group_of(rows[wrong][:1])[0])]

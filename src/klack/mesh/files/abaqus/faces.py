@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.arrays import Flags, Ints
 from klack.errors import InputError
 from klack.mesh.families import FAMILIES
 from klack.mesh.files.abaqus.elements import ElementGroup
@@ -19,8 +20,6 @@ from klack.mesh.mesh import ElementBlock, FaceBlock, FaceTable, Surface
 
 __all__ = ["FaceFinder", "RowBlock", "left_out"]
 
-Integers = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 _SIDES = 8
 
@@ -30,9 +29,9 @@ class RowBlock:
     """Elements of one family and solid, with rows in the file."""
 
     elements: ElementBlock
-    rows: Integers
+    rows: Ints
 
-    def near(self, nodes: Mask) -> "RowBlock":
+    def near(self, nodes: Flags) -> "RowBlock":
         """Elements that can have a face with all corners among ``nodes``."""
         family = self.elements.topology
         corners = self.elements.connectivity[:, : family.corners]
@@ -49,10 +48,10 @@ class _Faces:
     """Table of the faces of some elements, with their codes."""
 
     table: FaceTable
-    codes: Integers
+    codes: Ints
 
     @classmethod
-    def near(cls, blocks: Sequence[RowBlock], nodes: Mask) -> "_Faces":
+    def near(cls, blocks: Sequence[RowBlock], nodes: Flags) -> "_Faces":
         """Faces with corners among ``nodes``, and some more."""
         kept = [block.near(nodes) for block in blocks]
         table = FaceTable.of([block.elements for block in kept])
@@ -67,8 +66,8 @@ class _Marking:
     """Surface elements, codes of their faces (-1: none), and which are inside."""
 
     group: ElementGroup
-    codes: Integers
-    inner: Mask
+    codes: Ints
+    inner: Flags
 
 
 def _markings(blocks: Sequence[RowBlock], scope: Scope) -> Iterator[_Marking]:
@@ -140,12 +139,12 @@ class FaceFinder:
             rows = marking.group.rows
             self._marker[rows], self._inner[rows] = marking.codes, marking.inner
 
-    def surfaces_and_sets(self) -> tuple[dict[str, Surface], dict[str, Integers]]:
+    def surfaces_and_sets(self) -> tuple[dict[str, Surface], dict[str, Ints]]:
         """All named surfaces and node sets, nodes as rows of the scope."""
         scope, single = self._scope, len(self._scope.instances) == 1
         nsets, elsets, by_node = scope.nodes.sets, scope.elements.sets, scope.node_surfaces
         sets = {name: nsets.members(key) for name, key in nsets.names.public(single=single)}
-        codes: dict[str, Integers] = {}
+        codes: dict[str, Ints] = {}
         for name, key in elsets.names.public(single=single) if self._marked else ():
             members = elsets.members(key)
             members = members[self._marker[members] >= 0]
@@ -164,7 +163,7 @@ class FaceFinder:
         surfaces = {name: self._surface(name, faces) for name, faces in codes.items() if len(faces)}
         return surfaces, sets
 
-    def _selected(self, selections: Sequence[FaceSelection]) -> Integers:
+    def _selected(self, selections: Sequence[FaceSelection]) -> Ints:
         """Codes of all faces that a *SURFACE names."""
         found = [np.empty(0, dtype=np.int64)]
         whole = [np.empty(0, dtype=np.int64)]
@@ -186,12 +185,12 @@ class FaceFinder:
             found.append(codes[chosen[codes // _SIDES]])
         return np.concatenate(found)
 
-    def _mask(self, nodes: Integers) -> Mask:
+    def _mask(self, nodes: Ints) -> Flags:
         mask = np.zeros(self._scope.nodes.count, dtype=bool)
         mask[nodes] = True
         return mask
 
-    def _corners(self, chosen: Mask) -> Mask:
+    def _corners(self, chosen: Flags) -> Flags:
         """Nodes that are corners of the chosen elements."""
         mask = np.zeros(self._scope.nodes.count, dtype=bool)
         for block in self._blocks:
@@ -199,7 +198,7 @@ class FaceFinder:
             mask[corners[chosen[block.rows]]] = True
         return mask
 
-    def _exposed(self, nodes: Mask) -> Integers:
+    def _exposed(self, nodes: Flags) -> Ints:
         """Codes of outer faces with all corners among ``nodes``."""
         keys, codes = [], []
         for block in self._blocks:
@@ -224,12 +223,12 @@ class FaceFinder:
         alone[:-1] &= ~same
         return np.concatenate(codes)[order[alone]]
 
-    def _surface(self, name: str, codes: Integers) -> Surface:
+    def _surface(self, name: str, codes: Ints) -> Surface:
         """Surface in the order and sense of its elements."""
         codes = distinct(codes)
         elements, sides = np.divmod(codes, _SIDES)
         owner = self._block[elements]
-        parts: dict[str, list[Integers]] = {}
+        parts: dict[str, list[Ints]] = {}
         for number in np.flatnonzero(np.bincount(owner)).tolist():
             block = self._blocks[number].elements
             here = owner == number
@@ -241,7 +240,7 @@ class FaceFinder:
         return Surface(name, tuple(FaceBlock(f, np.concatenate(p)) for f, p in parts.items()))
 
 
-def _packed(corners: Integers) -> tuple[NDArray[np.uint64], NDArray[np.uint64]]:
+def _packed(corners: Ints) -> tuple[NDArray[np.uint64], NDArray[np.uint64]]:
     """Corner nodes of faces, ascending, in two numbers of 32 bits per corner."""
     ordered = np.sort(corners, axis=1).astype(np.uint64) + np.uint64(1)
     half = np.uint64(32)

@@ -12,6 +12,7 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.arrays import Ints
 from klack.errors import InputError
 from klack.input.plain_numbers import plain_numbers
 from klack.mesh.files.abaqus.keywords import DataLine, Keyword
@@ -33,8 +34,6 @@ _DIGITS = 18  # of a number that fits 64 bits
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([EeDd][+-]?\d+)?", re.ASCII)
 _TO_BLANKS = bytes.maketrans(b",\n\tDd", b"   EE")
 _SIGNS: dict[type, bytes] = {int: b"0123456789,\n", float: b"0123456789+-.eEdD,\n"}
-
-Integers = NDArray[np.int64]
 
 
 def number(line: DataLine, text: str) -> float:
@@ -92,7 +91,7 @@ def _wrong_length(line: DataLine, came: int, what: str) -> NoReturn:
     raise InputError(line.place, got=f"{came} numbers", expected=what, hint=CUT_OFF)
 
 
-def node_records(keyword: Keyword) -> tuple[Integers, NDArray[np.float64]]:
+def node_records(keyword: Keyword) -> tuple[Ints, NDArray[np.float64]]:
     """Numbers and coordinates (n, 3) of *NODE; a missing third one is zero."""
     parts = []
     for piece in keyword.pieces():
@@ -106,7 +105,7 @@ def node_records(keyword: Keyword) -> tuple[Integers, NDArray[np.float64]]:
     return np.concatenate(labels), np.concatenate(x)
 
 
-def _node_table(piece: bytes) -> tuple[Integers, NDArray[np.float64]] | None:
+def _node_table(piece: bytes) -> tuple[Ints, NDArray[np.float64]] | None:
     found = _block(piece, float)
     if found is None:
         return None
@@ -124,7 +123,7 @@ def _node_table(piece: bytes) -> tuple[Integers, NDArray[np.float64]] | None:
     return labels.astype(np.int64), x
 
 
-def _nodes_by_line(keyword: Keyword) -> tuple[Integers, NDArray[np.float64]]:
+def _nodes_by_line(keyword: Keyword) -> tuple[Ints, NDArray[np.float64]]:
     labels, x = array("q"), array("d")
     for line in keyword.lines():
         fields = list(line.fields)
@@ -140,9 +139,9 @@ def _nodes_by_line(keyword: Keyword) -> tuple[Integers, NDArray[np.float64]]:
     return np.array(labels, dtype=np.int64), np.array(x).reshape(-1, 3)
 
 
-def integer_records(keyword: Keyword, width: int, what: str) -> Integers:
+def integer_records(keyword: Keyword, width: int, what: str) -> Ints:
     """Records of ``width`` whole numbers, shape (n, width), over one or more lines."""
-    parts: list[Integers] = []
+    parts: list[Ints] = []
     rest = b""
     for piece in keyword.pieces():
         found = _block(rest + piece, int)
@@ -167,14 +166,14 @@ def _after_lines(text: bytes, lines: int) -> bytes:
     return text[int(breaks[lines - 1]) + 1 if lines else 0 :] + b"\n"
 
 
-def _records_by_line(keyword: Keyword, width: int, what: str) -> Integers:
+def _records_by_line(keyword: Keyword, width: int, what: str) -> Ints:
     values = array("q")
     for line, fields in records(keyword, (width, width), what):
         values.extend(integer(line, text) for text in fields)
     return np.array(values, dtype=np.int64).reshape(-1, width)
 
 
-def integer_list(keyword: Keyword) -> Integers | None:
+def integer_list(keyword: Keyword) -> Ints | None:
     """All numbers of the data lines, or None if not whole and above zero."""
     parts = []
     for piece in keyword.pieces():
@@ -185,7 +184,7 @@ def integer_list(keyword: Keyword) -> Integers | None:
     return np.concatenate(parts) if parts else np.empty(0, dtype=np.int64)
 
 
-def _block(piece: bytes, kind: type) -> tuple[NDArray, Integers, bytes] | None:
+def _block(piece: bytes, kind: type) -> tuple[NDArray, Ints, bytes] | None:
     """Numbers of whole lines, their count up to the end of each, and tidy text.
 
     None if a field is no plain number.

@@ -3,8 +3,8 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Floats, Ints
 from klack.errors import InputError, refuse_if
 from klack.mesh.files.abaqus.elements import ElementGroup, place_of_element, read_elements
 from klack.mesh.files.abaqus.keywords import DataLine, Keyword
@@ -28,10 +28,10 @@ class NodeSystem:
         Unit vectors in rows.
     """
 
-    origin: NDArray[np.float64]
-    axes: NDArray[np.float64]
+    origin: Floats
+    axes: Floats
 
-    def of(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def of(self, points: Floats) -> Floats:
         """Global coordinates of points, shape (n, 3)."""
         return self.origin + points @ self.axes
 
@@ -80,9 +80,6 @@ def _unfit_if(wrong: object, keyword: Keyword, got: str) -> None:
     )
 
 
-Integers = NDArray[np.int64]
-
-
 @dataclass
 class Entities:
     """Nodes or elements of a scope: numbers, count, and sets."""
@@ -114,7 +111,7 @@ class FaceSelection:
         From 1; 0 for exposed faces, and for surface elements.
     """
 
-    elements: Integers
+    elements: Ints
     side: int
 
 
@@ -145,8 +142,8 @@ class Scope:
 
     nodes: Entities = field(default_factory=lambda: Entities.of("node"))
     elements: Entities = field(default_factory=lambda: Entities.of("element"))
-    labels: list[Integers] = field(default_factory=list)
-    points: list[NDArray[np.float64]] = field(default_factory=list)
+    labels: list[Ints] = field(default_factory=list)
+    points: list[Floats] = field(default_factory=list)
     groups: list[ElementGroup] = field(default_factory=list)
     listed: list[str] = field(default_factory=list)  # keys of *ELSET keywords
     sections: list[Section] = field(default_factory=list)
@@ -189,7 +186,7 @@ class Scope:
             case "SURFACE" | "SOLID SECTION":
                 self.waiting.append(keyword)
 
-    def named(self, line: DataLine, text: str, kind: str) -> Integers:
+    def named(self, line: DataLine, text: str, kind: str) -> Ints:
         """Rows that a data line names: a set, a number, instance.number."""
         own = self._entities(kind)
         if own.sets.names.find(text) is not None:
@@ -215,7 +212,7 @@ class Scope:
         )
         return row + first
 
-    def group_of(self, rows: Integers) -> Integers:
+    def group_of(self, rows: Ints) -> Ints:
         """Index of the element group of every element."""
         return np.searchsorted([group.first for group in self.groups], rows, side="right") - 1
 
@@ -312,7 +309,7 @@ class Scope:
             )
         return instance.scope, instance.first_node, instance.first_element
 
-    def nodes_of(self, elements: Integers) -> Integers:
+    def nodes_of(self, elements: Ints) -> Ints:
         """Rows of the nodes of these elements."""
         owner = self.group_of(elements)
         used = np.zeros(self.nodes.count, dtype=bool)

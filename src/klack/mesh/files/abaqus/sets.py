@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Ints
 from klack.errors import InputError, refuse_if
 from klack.input.problem import one_of
 from klack.mesh.files.abaqus.keywords import DataLine, Keyword
@@ -96,17 +96,14 @@ class Names(Generic[T]):
                 yield short, key
 
 
-Integers = NDArray[np.int64]
-
-
 @dataclass(frozen=True, slots=True)
 class _Run:
     """Ascending numbers with their rows."""
 
-    labels: Integers
-    rows: Integers
+    labels: Ints
+    rows: Ints
 
-    def find(self, wanted: Integers) -> Integers:
+    def find(self, wanted: Ints) -> Ints:
         """Rows, -1 where there is none."""
         first, last = self.labels[0], self.labels[-1]
         if last - first + 1 == len(self.labels):
@@ -115,7 +112,7 @@ class _Run:
         at = np.minimum(np.searchsorted(self.labels, wanted), len(self.labels) - 1)
         return np.where(self.labels[at] == wanted, self.rows[at], -1)
 
-    def within(self, first: int, last: int, step: int) -> Integers:
+    def within(self, first: int, last: int, step: int) -> Ints:
         """Rows of the numbers first, first + step, ... up to last."""
         low, high = np.searchsorted(self.labels, [first, last + 1])
         if (last - first) // step + 1 < high - low:
@@ -124,14 +121,14 @@ class _Run:
         return self.rows[low:high][(self.labels[low:high] - first) % step == 0]
 
 
-def _sorted_run(labels: Integers, rows: Integers) -> _Run:
+def _sorted_run(labels: Ints, rows: Ints) -> _Run:
     if (labels[1:] > labels[:-1]).all():
         return _Run(labels, rows)
     order = np.argsort(labels, kind="stable")
     return _Run(labels[order], rows[order])
 
 
-def distinct(values: Integers) -> Integers:
+def distinct(values: Ints) -> Ints:
     """Ascending, each once; sorted, which beats hashing where numbers are nearly sorted."""
     if (values[1:] > values[:-1]).all():
         return values
@@ -156,19 +153,19 @@ class Numbering:
         """Independent copy of the numbering."""
         return Numbering(tuple(self._runs))
 
-    def find(self, labels: Integers) -> Integers:
+    def find(self, labels: Ints) -> Ints:
         """Rows of these numbers, -1 for the unknown."""
         rows = np.full(np.shape(labels), -1, dtype=np.int64)
         for run in self._runs:
             rows = np.maximum(rows, run.find(labels))
         return rows
 
-    def within(self, first: int, last: int, step: int) -> Integers:
+    def within(self, first: int, last: int, step: int) -> Ints:
         """Rows of the known numbers among first, first + step, ... last."""
         found = [run.within(first, last, step) for run in self._runs]
         return np.concatenate(found) if found else np.empty(0, dtype=np.int64)
 
-    def repeated(self, labels: Integers) -> int | None:
+    def repeated(self, labels: Ints) -> int | None:
         """Smallest number already known, or twice in ``labels``."""
         ordered = labels if (labels[1:] > labels[:-1]).all() else np.sort(labels)
         twice = ordered[1:][ordered[1:] == ordered[:-1]]
@@ -176,7 +173,7 @@ class Numbering:
         found = np.concatenate([twice, known])
         return int(found.min()) if len(found) else None
 
-    def add(self, labels: Integers, first_row: int) -> None:
+    def add(self, labels: Ints, first_row: int) -> None:
         """Take new numbers, rows from ``first_row``."""
         if not len(labels):
             return
@@ -205,25 +202,25 @@ class NamedSets:
     Members are rows; ``size`` counts those added so far.
     """
 
-    names: Names[Integers]
+    names: Names[Ints]
     size: int = 0
 
     def copy(self) -> "NamedSets":
         """Independent copy of the sets."""
         return NamedSets(self.names.copy(), self.size)
 
-    def members(self, key: str) -> Integers:
+    def members(self, key: str) -> Ints:
         """Rows of all members, ascending."""
         parts = self.names.parts(key)
         if parts:
             parts[:] = [distinct(parts[0] if len(parts) == 1 else np.concatenate(parts))]
         return parts[0] if parts else np.empty(0, dtype=np.int64)
 
-    def resolve(self, place: str, name: str) -> Integers:
+    def resolve(self, place: str, name: str) -> Ints:
         """Members of a set that must be there."""
         return self.members(self.names.require(place, name))
 
-    def add(self, place: str, name: str, rows: Integers) -> None:
+    def add(self, place: str, name: str, rows: Ints) -> None:
         """Add members to a set, perhaps new."""
         self._count(place, len(rows))
         key = self.names.add(name, rows)
@@ -247,8 +244,8 @@ class NamedSets:
 
 
 def read_members(
-    keyword: Keyword, numbering: Numbering, resolve: Callable[[DataLine, str], Integers]
-) -> Integers:
+    keyword: Keyword, numbering: Numbering, resolve: Callable[[DataLine, str], Ints]
+) -> Ints:
     """Rows of what *NSET or *ELSET lists: numbers, names of sets, or GENERATE ranges.
 
     ``resolve`` gives the rows of a text that is no known number.
@@ -274,8 +271,8 @@ def read_members(
 
 
 def _mixed_members(
-    keyword: Keyword, numbering: Numbering, resolve: Callable[[DataLine, str], Integers]
-) -> Iterator[Integers]:
+    keyword: Keyword, numbering: Numbering, resolve: Callable[[DataLine, str], Ints]
+) -> Iterator[Ints]:
     """Rows of numbers, and of names, each once."""
     labels, names = array("q"), set()
     for line in keyword.lines():
@@ -296,9 +293,9 @@ def _mixed_members(
                 yield resolve(line, text)
 
 
-def _collected(parts: Iterable[Integers]) -> Integers:
+def _collected(parts: Iterable[Ints]) -> Ints:
     """All parts in one, without piling up many or repeated ones."""
-    found: list[Integers] = []
+    found: list[Ints] = []
     size, limit = 0, _FEW
     for part in parts:
         found.append(part)

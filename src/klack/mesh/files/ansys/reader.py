@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.arrays import Ints
 from klack.errors import InputError
 from klack.mesh.families import FAMILIES
 from klack.mesh.files.ansys.blocks import Archive, ElementTable, read_archive
@@ -25,9 +26,6 @@ from klack.mesh.files.plausible import SAY_UNIT
 from klack.mesh.files.text_columns import TextLines, within
 
 __all__ = ["read_ansys_archive"]
-
-
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,16 +7,13 @@ from pathlib import Path
 from typing import NoReturn, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Floats, Ints
 from klack.errors import InputError, refuse_if
 from klack.input.plain_numbers import plain_numbers
 from klack.mesh.files.plausible import read_bytes
 
 __all__ = ["NODE_COUNTS", "GmshContent", "GmshElements", "read_content"]
-
-
-Ints = NDArray[np.int64]
 
 
 class Stream(Protocol):
@@ -28,7 +25,7 @@ class Stream(Protocol):
     def sizes(self, count: int) -> Ints:
         """Numbers that binary form holds as sizes."""
 
-    def real(self, count: int) -> NDArray[np.float64]:
+    def real(self, count: int) -> Floats:
         """Finite real numbers."""
 
 
@@ -53,7 +50,7 @@ class TextStream:
         if self.left:
             refuse(self._place, f"{self.left} numbers more than its counts", "as many as it counts")
 
-    def real(self, count: int) -> NDArray[np.float64]:
+    def real(self, count: int) -> Floats:
         """Give the next finite numbers."""
         if not 0 <= count <= self.left:
             refuse(self._place, f"{self.left} numbers more", f"{count}, according to its counts")
@@ -103,7 +100,7 @@ class BinaryStream:
             refuse(self._place, f"the number {values.max()}", "numbers of nodes and elements")
         return values.astype(np.int64)
 
-    def real(self, count: int) -> NDArray[np.float64]:
+    def real(self, count: int) -> Floats:
         """Give the next finite numbers."""
         values = self.take(self._real, count).astype(np.float64)
         if not np.isfinite(values).all():
@@ -111,7 +108,7 @@ class BinaryStream:
         return values
 
 
-def whole_of(place: str, values: NDArray[np.float64]) -> Ints:
+def whole_of(place: str, values: Floats) -> Ints:
     """Reals as whole numbers; rejects fractions."""
     if (np.abs(values) > 2**53).any() or (values != np.rint(values)).any():
         refuse(place, "a fractional or very large number", "whole numbers")
@@ -163,7 +160,7 @@ class GmshContent:
     """Content of the sections."""
 
     node_parts: list[Ints] = field(default_factory=list)
-    point_parts: list[NDArray[np.float64]] = field(default_factory=list)
+    point_parts: list[Floats] = field(default_factory=list)
     elements: list[GmshElements] = field(default_factory=list)
     names: dict[tuple[int, int], str] = field(default_factory=dict)  # by dimension and number
     groups: dict[tuple[int, int], tuple[int, ...]] = field(default_factory=dict)  # by entity
@@ -175,7 +172,7 @@ class GmshContent:
         return np.concatenate([np.empty(0, dtype=np.int64), *self.node_parts])
 
     @cached_property
-    def points(self) -> NDArray[np.float64]:
+    def points(self) -> Floats:
         """Coordinates, shape (n, 3)."""
         return np.concatenate([np.empty((0, 3)), *self.point_parts])
 
@@ -311,7 +308,7 @@ class _Reader:
             self._old_binary_elements(place, stream, int(count_text))
         return stream.at
 
-    def _take_nodes(self, place: str, numbers: Ints, points: NDArray[np.float64]) -> None:
+    def _take_nodes(self, place: str, numbers: Ints, points: Floats) -> None:
         if not np.isfinite(points).all():
             refuse(place, "a value that is not a finite number", "coordinates")
         self._content.node_parts.append(numbers)

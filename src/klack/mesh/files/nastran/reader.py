@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.arrays import Ints
 from klack.errors import InputError, refuse_if
 from klack.mesh.families import FAMILIES
 from klack.mesh.files.file_mesh import FileElements, FileMesh, mesh_model
@@ -26,7 +27,6 @@ from klack.mesh.files.text_columns import integers, reals
 
 __all__ = ["read_nastran"]
 
-Ints = NDArray[np.int64]
 
 # Linear and quadratic family, and the quadratic order: nodes of the card for those of klack.
 _SOLIDS = {

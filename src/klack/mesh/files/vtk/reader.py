@@ -12,8 +12,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Flags, Ints
 from klack.errors import InputError, refuse_if
 from klack.mesh.families import FAMILIES
 from klack.mesh.files.file_mesh import FileElements, FileMesh, mesh_model
@@ -24,7 +24,6 @@ from klack.mesh.files.vtk.grid import VtkGrid, read_legacy, read_xml, refuse
 
 __all__ = ["read_vtk"]
 
-Ints = NDArray[np.int64]
 
 # Family and node order: points of the cell for the nodes of klack.
 _CELLS = {
@@ -232,15 +231,13 @@ def _by_value(
             yield _named(part, name, values[part.numbers - 1] == value)
 
 
-def _flagged(
-    parts: list[FileElements], flags: Mapping[str, NDArray[np.bool_]]
-) -> Iterator[FileElements]:
+def _flagged(parts: list[FileElements], flags: Mapping[str, Flags]) -> Iterator[FileElements]:
     for name, flag in flags.items():
         for part in parts:
             yield _named(part, name, flag[part.numbers - 1])
 
 
-def _named(part: FileElements, name: str, here: NDArray[np.bool_]) -> FileElements:
+def _named(part: FileElements, name: str, here: Flags) -> FileElements:
     return FileElements(
         family=part.family, name=name, numbers=part.numbers[here], nodes=part.nodes[here]
     )
