@@ -1,6 +1,5 @@
 r"""Annular gap of a guide: leakage and drag."""
 
-from collections.abc import Mapping
 from math import pi, sqrt
 from typing import Any, ClassVar
 
@@ -74,7 +73,7 @@ class Annulus(Component):
     """
 
     type: ClassVar[str] = "annulus"
-    ports: ClassVar[Mapping[str, Port]] = {
+    ports: ClassVar = {
         "a": FLOW,
         "b": FLOW,
         "needle": ELEMENT,

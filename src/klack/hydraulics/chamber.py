@@ -1,6 +1,5 @@
 """Chamber: a volume of fluid with one pressure."""
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 from pydantic import Field
@@ -10,7 +9,7 @@ from klack.hydraulics.fluid_table import fluid_table
 from klack.hydraulics.network_fluid import network_fluid
 from klack.hydraulics.wall_compliance import Wall
 from klack.network.component import Component
-from klack.network.port import COMPLIANCE, Port
+from klack.network.port import COMPLIANCE
 from klack.network.rows import AMBIENT, Book, Rows
 from klack.units import Pressure, Volume
 
@@ -39,7 +38,7 @@ class Chamber(Component):
     """
 
     type: ClassVar[str] = "chamber"
-    ports: ClassVar[Mapping[str, Port]] = {"fluid": COMPLIANCE}
+    ports: ClassVar = {"fluid": COMPLIANCE}
 
     volume: Volume = Field(gt=0, description="With all faces at their start positions.")
     pressure: Pressure | None = Field(

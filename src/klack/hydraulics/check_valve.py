@@ -1,6 +1,5 @@
 r"""Check valve: opens in one direction against a spring, without mass."""
 
-from collections.abc import Mapping
 from math import pi
 from typing import Any, ClassVar, Self
 
@@ -9,7 +8,7 @@ from pydantic import Field, model_validator
 from klack.hydraulics.network_fluid import fixed_viscosity
 from klack.hydraulics.opening import OpeningComponent, opening_flow, ramp
 from klack.input.problem import refuse_key_if
-from klack.network.port import FLOW, Port
+from klack.network.port import FLOW
 from klack.network.rows import Channel, Rows
 from klack.network.step_function import step_function
 from klack.units import Area, Length, Pressure
@@ -54,7 +53,7 @@ class CheckValve(OpeningComponent):
     """
 
     type: ClassVar[str] = "check-valve"
-    ports: ClassVar[Mapping[str, Port]] = {"a": FLOW, "b": FLOW}
+    ports: ClassVar = {"a": FLOW, "b": FLOW}
 
     cracking_pressure: Pressure = Field(
         ge=0, examples=["0.3 bar"], description="Difference a - b at which it begins to open."

@@ -1,6 +1,5 @@
 r"""Conical seat with two ends and a needle with an edge: the narrowest section moves."""
 
-from collections.abc import Mapping
 from math import degrees, pi, sqrt
 from typing import Any, ClassVar, Literal, Self
 
@@ -111,7 +110,7 @@ class ConicalSeat(OpeningComponent):
     """
 
     type: ClassVar[str] = "conical-seat"
-    ports: ClassVar[Mapping[str, Port]] = {
+    ports: ClassVar = {
         "a": FLOW,
         "b": FLOW,
         "needle": ELEMENT,

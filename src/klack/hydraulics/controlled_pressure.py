@@ -1,13 +1,12 @@
 """Pressure that a controller sets."""
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 from pydantic import Field
 
 from klack.control.controlled import Controlled
 from klack.hydraulics.network_fluid import network_fluid
-from klack.network.port import PRESSURE, Port
+from klack.network.port import PRESSURE
 from klack.network.rows import Rows
 from klack.units import Pressure
 
@@ -26,7 +25,7 @@ class ControlledPressure(Controlled):
 
     type: ClassVar[str] = "controlled-pressure"
     output_unit: ClassVar[str] = "Pa"
-    ports: ClassVar[Mapping[str, Port]] = {"fluid": PRESSURE}
+    ports: ClassVar = {"fluid": PRESSURE}
 
     start: Pressure = Field(
         gt=0, description="Absolute pressure at the start, before the controller acts."

@@ -1,6 +1,5 @@
 """Flow source: a flow that the rest of the valve cannot change."""
 
-from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -78,7 +77,7 @@ class FlowSource(SourceOverTime):
 
     type: ClassVar[str] = "flow-source"
     quantity: ClassVar[str] = "flow"
-    ports: ClassVar[Mapping[str, Port]] = {
+    ports: ClassVar = {
         "a": Port("hydraulic", Role.FLOW, optional=True),
         "b": FLOW,
     }

@@ -1,6 +1,5 @@
 r"""Inertance: a column of fluid that has to be accelerated."""
 
-from collections.abc import Mapping
 from math import pi
 from typing import Any, ClassVar, Literal, Self
 
@@ -10,7 +9,7 @@ from klack.hydraulics.fluid_table import fluid_at
 from klack.hydraulics.network_fluid import ambient_viscosity, energy_table, viscosity_law
 from klack.hydraulics.pressure_viscosity import mean_viscosity_ratio
 from klack.network.component import Component
-from klack.network.port import FLOW, Port
+from klack.network.port import FLOW
 from klack.network.rows import Book, Channel, Liquid, Rows
 from klack.network.step_function import carray, step_function
 from klack.units import Area, Length
@@ -61,7 +60,7 @@ class Inertance(Component):
     """
 
     type: ClassVar[str] = "inertance"
-    ports: ClassVar[Mapping[str, Port]] = {"a": FLOW, "b": FLOW}
+    ports: ClassVar = {"a": FLOW, "b": FLOW}
 
     length: Length = Field(gt=0, description="Of the channel.")
     diameter: Length | None = Field(default=None, gt=0, description="Of the channel.")

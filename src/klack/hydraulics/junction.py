@@ -1,13 +1,12 @@
 """Junction of lines: a node without volume."""
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 from pydantic import Field
 
 from klack.hydraulics.network_fluid import network_fluid
 from klack.network.component import Component
-from klack.network.port import COMPLIANCE, Port
+from klack.network.port import COMPLIANCE
 from klack.network.rows import Rows
 from klack.units import Pressure
 
@@ -37,7 +36,7 @@ class Junction(Component):
     """
 
     type: ClassVar[str] = "junction"
-    ports: ClassVar[Mapping[str, Port]] = {"fluid": COMPLIANCE}
+    ports: ClassVar = {"fluid": COMPLIANCE}
 
     pressure: Pressure | None = Field(
         default=None,

@@ -1,6 +1,5 @@
 """Land face: the ring of a narrow gap, over which the pressure falls."""
 
-from collections.abc import Mapping
 from math import expm1, log1p, pi
 from typing import ClassVar, Literal, Self
 
@@ -9,7 +8,7 @@ from pydantic import Field, model_validator
 from klack.hydraulics.network_fluid import network_fluid
 from klack.input.problem import refuse_key_if
 from klack.network.component import Component
-from klack.network.port import ELEMENT, FLOW, Port
+from klack.network.port import ELEMENT, FLOW
 from klack.network.rows import Rows
 from klack.units import Length
 
@@ -65,7 +64,7 @@ class LandFace(Component):
     """
 
     type: ClassVar[str] = "land-face"
-    ports: ClassVar[Mapping[str, Port]] = {"inside": FLOW, "outside": FLOW, "body": ELEMENT}
+    ports: ClassVar = {"inside": FLOW, "outside": FLOW, "body": ELEMENT}
 
     direction: Literal["opening", "closing"] = Field(
         description="Direction of the pressure force: opening is +z."

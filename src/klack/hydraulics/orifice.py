@@ -1,6 +1,5 @@
 r"""Orifice: turbulent and laminar flow through a short restriction, and its cavitation limit."""
 
-from collections.abc import Mapping
 from math import exp, pi, sqrt
 from typing import Any, ClassVar, Self
 
@@ -13,7 +12,7 @@ from klack.input.section import Count
 from klack.machine.compiling.constant import with_slope_of
 from klack.machine.compiling.jit import njit
 from klack.network.component import Component
-from klack.network.port import FLOW, Port
+from klack.network.port import FLOW
 from klack.network.rows import Liquid, Rows
 from klack.network.step_function import step_function
 from klack.units import Area, Length, Ratio
@@ -178,7 +177,7 @@ class Orifice(Component):
     """
 
     type: ClassVar[str] = "orifice"
-    ports: ClassVar[Mapping[str, Port]] = {"a": FLOW, "b": FLOW}
+    ports: ClassVar = {"a": FLOW, "b": FLOW}
 
     diameter: Length | None = Field(default=None, gt=0, description="Of the circular hole.")
     area: Area | None = Field(default=None, gt=0, description="Instead of the diameter.")

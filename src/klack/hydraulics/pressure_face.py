@@ -1,11 +1,10 @@
 """Pressure face: where a pressure pushes a body, and the body moves fluid."""
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 from klack.hydraulics.face import FaceComponent
 from klack.hydraulics.network_fluid import network_fluid
-from klack.network.port import ELEMENT, FLOW, Port
+from klack.network.port import ELEMENT, FLOW
 from klack.network.rows import Rows
 
 __all__ = ["PressureFace"]
@@ -26,7 +25,7 @@ class PressureFace(FaceComponent):
     """
 
     type: ClassVar[str] = "pressure-face"
-    ports: ClassVar[Mapping[str, Port]] = {"fluid": FLOW, "body": ELEMENT}
+    ports: ClassVar = {"fluid": FLOW, "body": ELEMENT}
 
     def add_rows(self, rows: Rows) -> None:
         """Add one moving wall."""

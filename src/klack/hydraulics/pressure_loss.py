@@ -1,6 +1,5 @@
 r"""Pressure loss of a bend, a branch of a junction, or a change of cross-section."""
 
-from collections.abc import Mapping
 from math import pi, sqrt
 from typing import Any, ClassVar, Self
 
@@ -9,7 +8,7 @@ from pydantic import Field, model_validator
 from klack.hydraulics.network_fluid import fixed_viscosity
 from klack.hydraulics.seat import gap_flow
 from klack.network.component import Component
-from klack.network.port import FLOW, Port
+from klack.network.port import FLOW
 from klack.network.rows import Rows
 from klack.network.step_function import step_function
 from klack.units import Area, Length, Ratio
@@ -50,7 +49,7 @@ class PressureLoss(Component):
     """
 
     type: ClassVar[str] = "pressure-loss"
-    ports: ClassVar[Mapping[str, Port]] = {"a": FLOW, "b": FLOW}
+    ports: ClassVar = {"a": FLOW, "b": FLOW}
 
     diameter: Length | None = Field(default=None, gt=0, description="Of the bore.")
     area: Area | None = Field(default=None, gt=0, description="Instead of the diameter.")

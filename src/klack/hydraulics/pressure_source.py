@@ -1,11 +1,10 @@
 """Pressure source: a pressure that the rest of the valve cannot change."""
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 from klack.hydraulics.network_fluid import network_fluid
 from klack.hydraulics.pressure_history import PressureHistory, PressureStep, PressureTable
-from klack.network.port import PRESSURE, Port
+from klack.network.port import PRESSURE
 from klack.network.rows import Rows
 
 __all__ = ["PressureSource", "PressureStep", "PressureTable"]
@@ -19,7 +18,7 @@ class PressureSource(PressureHistory):
     """
 
     type: ClassVar[str] = "pressure-source"
-    ports: ClassVar[Mapping[str, Port]] = {"fluid": PRESSURE}
+    ports: ClassVar = {"fluid": PRESSURE}
 
     def add_rows(self, rows: Rows) -> None:
         """Prescribe the pressure of the node."""

@@ -1,6 +1,5 @@
 r"""Pulsating flow source: a mean flow and its harmonics."""
 
-from collections.abc import Mapping
 from math import pi, sin
 from typing import Any, ClassVar
 
@@ -66,7 +65,7 @@ class PulsatingFlow(Component):
     """
 
     type: ClassVar[str] = "pulsating-flow"
-    ports: ClassVar[Mapping[str, Port]] = {
+    ports: ClassVar = {
         "a": Port("hydraulic", Role.FLOW, optional=True),
         "b": FLOW,
     }

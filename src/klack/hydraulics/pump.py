@@ -1,6 +1,5 @@
 r"""Pump of pistons: displacement with its kinematic ripple, and leakage."""
 
-from collections.abc import Mapping
 from math import pi, sin
 from typing import Any, ClassVar, Self
 
@@ -111,7 +110,7 @@ class Pump(Component):
     """
 
     type: ClassVar[str] = "pump"
-    ports: ClassVar[Mapping[str, Port]] = {
+    ports: ClassVar = {
         "a": Port("hydraulic", Role.FLOW, optional=True),
         "b": FLOW,
     }

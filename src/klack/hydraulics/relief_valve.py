@@ -1,6 +1,5 @@
 """Relief valve by its characteristic."""
 
-from collections.abc import Mapping
 from math import exp, pi, sqrt
 from typing import Any, ClassVar, Self
 
@@ -10,7 +9,7 @@ from klack.hydraulics.network_fluid import fixed_viscosity
 from klack.hydraulics.opening import OpeningComponent, opening_flow
 from klack.input.problem import CaseProblem, refuse_key_if
 from klack.machine.compiling.jit import njit
-from klack.network.port import FLOW, Port
+from klack.network.port import FLOW
 from klack.network.ranges import value_text
 from klack.network.rows import Channel, Rows
 from klack.network.step_function import step_function
@@ -100,7 +99,7 @@ class ReliefValve(OpeningComponent):
     """
 
     type: ClassVar[str] = "relief-valve"
-    ports: ClassVar[Mapping[str, Port]] = {"a": FLOW, "b": FLOW}
+    ports: ClassVar = {"a": FLOW, "b": FLOW}
 
     set_pressure: Pressure = Field(
         gt=0, examples=["100 bar"], description="Difference a - b at which it begins to open."

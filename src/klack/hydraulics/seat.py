@@ -1,6 +1,5 @@
 r"""Seat: the restriction that a needle opens and closes."""
 
-from collections.abc import Mapping
 from math import acos, cos, inf, pi, sin, sqrt
 from typing import Any, ClassVar, Self
 
@@ -211,7 +210,7 @@ class Seat(Component):
     """
 
     type: ClassVar[str] = "seat"
-    ports: ClassVar[Mapping[str, Port]] = {
+    ports: ClassVar = {
         "a": FLOW,
         "b": FLOW,
         "needle": ELEMENT,

@@ -1,6 +1,5 @@
 r"""Metering edge of a spool: the restriction between its land and the sleeve."""
 
-from collections.abc import Mapping
 from math import hypot, inf, pi, radians, sqrt
 from typing import Any, ClassVar, Literal, Self
 
@@ -139,7 +138,7 @@ class SpoolEdge(OpeningComponent):
     """
 
     type: ClassVar[str] = "spool-edge"
-    ports: ClassVar[Mapping[str, Port]] = {
+    ports: ClassVar = {
         "a": FLOW,
         "b": FLOW,
         "spool": ELEMENT,

@@ -1,6 +1,5 @@
 """A boost capacitor that several drivers draw from and recharge."""
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 from pydantic import Field
@@ -8,7 +7,7 @@ from pydantic import Field
 from klack.magnetics.output_stage import Capacitor
 from klack.magnetics.shared_capacitors import shared_capacitors
 from klack.network.component import Component
-from klack.network.port import FEEDS, Port
+from klack.network.port import FEEDS
 from klack.network.rows import Rows
 from klack.units import Capacitance, Current, Power, Ratio, Voltage
 
@@ -30,7 +29,7 @@ class BoostCapacitor(Component):
     """
 
     type: ClassVar[str] = "boost-capacitor"
-    ports: ClassVar[Mapping[str, Port]] = {"outlet": FEEDS}
+    ports: ClassVar = {"outlet": FEEDS}
 
     capacitance: Capacitance = Field(gt=0, description="Of the capacitor.")
     voltage: Voltage = Field(gt=0, description="Voltage to which the converter recharges it.")

@@ -1,6 +1,5 @@
 """A solenoid known by a table of its linkage (and force) over current and gap."""
 
-from collections.abc import Mapping
 from typing import ClassVar, Literal, Self
 
 import numpy as np
@@ -44,7 +43,7 @@ class ForceMapSolenoid(Component):
     """
 
     type: ClassVar[str] = "force-map-solenoid"
-    ports: ClassVar[Mapping[str, Port]] = {
+    ports: ClassVar = {
         "armature": ELEMENT,
         "base": Port("mechanical", ELEMENT.role, optional=True),
         "terminals": COIL,

@@ -1,6 +1,5 @@
 """The solenoid of a valve: coil, pole gaps, iron, leakage, eddy currents."""
 
-from collections.abc import Mapping
 from functools import lru_cache
 from itertools import pairwise
 from math import cos, inf, sin
@@ -77,7 +76,7 @@ class Solenoid(Component):
     """
 
     type: ClassVar[str] = "solenoid"
-    ports: ClassVar[Mapping[str, Port]] = {
+    ports: ClassVar = {
         "armature": ELEMENT,
         "base": Port("mechanical", ELEMENT.role, optional=True),
         "terminals": COIL,

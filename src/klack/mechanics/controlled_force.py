@@ -1,10 +1,9 @@
 """Force that a controller sets."""
 
-from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from klack.control.controlled import Controlled
-from klack.network.port import ELEMENT, Port
+from klack.network.port import ELEMENT
 from klack.network.rows import Book, Rows
 from klack.network.step_function import step_function
 
@@ -30,7 +29,7 @@ class ControlledForce(Controlled):
 
     type: ClassVar[str] = "controlled-force"
     output_unit: ClassVar[str] = "N"
-    ports: ClassVar[Mapping[str, Port]] = {"end": ELEMENT}
+    ports: ClassVar = {"end": ELEMENT}
 
     def add_rows(self, rows: Rows) -> None:
         """Add one element and its controller."""

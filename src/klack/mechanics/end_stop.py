@@ -1,6 +1,5 @@
 """End stop of a needle: contact, squeeze film, and the compliance behind them."""
 
-from collections.abc import Mapping
 from typing import ClassVar, Self
 
 from pydantic import Field, PrivateAttr, model_validator
@@ -13,7 +12,7 @@ from klack.hydraulics.film import FilmShape, SphereFilm
 from klack.input.problem import CaseProblem, refuse_key_if
 from klack.mechanics.stop_law import ConsistentStopLaw, LinearStopLaw, StopLaw
 from klack.network.component import Component
-from klack.network.port import ELEMENT, Port
+from klack.network.port import ELEMENT
 from klack.network.rows import Rows
 from klack.units import Compliance, Length, Ratio, format_si
 
@@ -44,7 +43,7 @@ class EndStop(Component):
     """
 
     type: ClassVar[str] = "end-stop"
-    ports: ClassVar[Mapping[str, Port]] = {"upper": ELEMENT, "lower": ELEMENT}
+    ports: ClassVar = {"upper": ELEMENT, "lower": ELEMENT}
 
     gap: Length = Field(
         ge=0, description="Gap between the parts at the start: the lift to the stop."

@@ -1,6 +1,5 @@
 """Forces from outside: constant, or given over time."""
 
-from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -8,7 +7,7 @@ from pydantic import Field, model_validator
 
 from klack.input.problem import refuse_key_if
 from klack.network.component import Component
-from klack.network.port import ELEMENT, Port
+from klack.network.port import ELEMENT
 from klack.network.rows import Book, Rows
 from klack.network.step_function import step_function
 from klack.units import Force, Time
@@ -31,7 +30,7 @@ class ConstantForce(Component):
     """
 
     type: ClassVar[str] = "constant-force"
-    ports: ClassVar[Mapping[str, Port]] = {"end": ELEMENT}
+    ports: ClassVar = {"end": ELEMENT}
 
     force: Force = Field(description="Force along +z (opening).")
 
@@ -91,7 +90,7 @@ class ForceOverTime(Component):
     """
 
     type: ClassVar[str] = "force-over-time"
-    ports: ClassVar[Mapping[str, Port]] = {"end": ELEMENT}
+    ports: ClassVar = {"end": ELEMENT}
 
     time: tuple[Time, ...] = Field(min_length=2, description="Points in time, increasing.")
     force: tuple[Force, ...] = Field(min_length=2, description="Force along +z at each of them.")

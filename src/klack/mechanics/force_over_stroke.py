@@ -1,6 +1,5 @@
 """Force given over displacement: a nonlinear spring."""
 
-from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -80,7 +79,7 @@ class ForceOverStroke(Component):
     """
 
     type: ClassVar[str] = "force-over-stroke"
-    ports: ClassVar[Mapping[str, Port]] = {
+    ports: ClassVar = {
         "end": ELEMENT,
         "base": Port("mechanical", ELEMENT.role, optional=True),
     }

@@ -1,7 +1,6 @@
 """Friction of a needle in its guide."""
 
 import warnings
-from collections.abc import Mapping
 from typing import ClassVar
 
 from pydantic import Field, model_validator
@@ -42,7 +41,7 @@ class GuideFriction(Component):
     """
 
     type: ClassVar[str] = "guide-friction"
-    ports: ClassVar[Mapping[str, Port]] = {
+    ports: ClassVar = {
         "body": ELEMENT,
         "guide": Port("mechanical", ELEMENT.role, optional=True),
     }

@@ -1,6 +1,5 @@
 """Weight."""
 
-from collections.abc import Mapping
 from math import cos
 from typing import Any, ClassVar
 
@@ -8,7 +7,7 @@ from pydantic import Field
 
 from klack.errors import refuse_if
 from klack.network.component import Component
-from klack.network.port import ELEMENT, Port
+from klack.network.port import ELEMENT
 from klack.network.rows import Book, Rows
 from klack.network.step_function import step_function
 from klack.units import Acceleration, Angle
@@ -38,7 +37,7 @@ class Gravity(Component):
     """
 
     type: ClassVar[str] = "gravity"
-    ports: ClassVar[Mapping[str, Port]] = {"body": ELEMENT}
+    ports: ClassVar = {"body": ELEMENT}
 
     acceleration: Acceleration = Field(
         default=STANDARD_GRAVITY, gt=0, description="Acceleration of free fall g."

@@ -1,6 +1,5 @@
 """Friction with presliding: elastic bristles between two faces (LuGre)."""
 
-from collections.abc import Mapping
 from math import exp, pi, sin
 from typing import Any, ClassVar, Self
 
@@ -123,7 +122,7 @@ class LuGreFriction(Component):
     """
 
     type: ClassVar[str] = "lugre-friction"
-    ports: ClassVar[Mapping[str, Port]] = {
+    ports: ClassVar = {
         "body": ELEMENT,
         "guide": Port("mechanical", ELEMENT.role, optional=True),
     }

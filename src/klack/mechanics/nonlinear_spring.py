@@ -1,6 +1,5 @@
 """Massless nonlinear spring."""
 
-from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any, ClassVar, Self
 
@@ -178,7 +177,7 @@ class NonlinearSpring(Component):
     """
 
     type: ClassVar[str] = "nonlinear-spring"
-    ports: ClassVar[Mapping[str, Port]] = {
+    ports: ClassVar = {
         "end": ELEMENT,
         "base": Port("mechanical", ELEMENT.role, optional=True),
     }

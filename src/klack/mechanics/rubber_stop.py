@@ -1,6 +1,5 @@
 """Rubber buffer: nonlinear spring with Maxwell elements, touched across a gap."""
 
-from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -133,7 +132,7 @@ class RubberStop(Component):
     """
 
     type: ClassVar[str] = "rubber-stop"
-    ports: ClassVar[Mapping[str, Port]] = {
+    ports: ClassVar = {
         "upper": ELEMENT,
         "lower": Port("mechanical", ELEMENT.role, optional=True),
     }

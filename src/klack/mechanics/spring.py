@@ -1,6 +1,5 @@
 """Massless spring, the return spring of a valve."""
 
-from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from pydantic import Field
@@ -47,7 +46,7 @@ class Spring(Component):
     """
 
     type: ClassVar[str] = "spring"
-    ports: ClassVar[Mapping[str, Port]] = {
+    ports: ClassVar = {
         "end": ELEMENT,
         "base": Port("mechanical", ELEMENT.role, optional=True),
     }

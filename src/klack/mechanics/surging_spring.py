@@ -1,6 +1,5 @@
 """Coil spring with mass: waves run through its coils."""
 
-from collections.abc import Mapping
 from math import cos, expm1, pi, sin, sqrt
 from typing import Annotated, Any, ClassVar
 
@@ -92,7 +91,7 @@ class SurgingSpring(Component):
     """
 
     type: ClassVar[str] = "surging-spring"
-    ports: ClassVar[Mapping[str, Port]] = {
+    ports: ClassVar = {
         "end": ELEMENT,
         "base": Port("mechanical", ELEMENT.role, optional=True),
     }

@@ -1,11 +1,10 @@
 """Thermal conductance: heat in proportion to a temperature difference."""
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 from pydantic import Field
 
-from klack.network.port import HEAT, Port
+from klack.network.port import HEAT
 from klack.thermal.heat_rows import HeatRows, ThermalComponent
 from klack.units import ThermalConductance
 
@@ -25,7 +24,7 @@ class Conductance(ThermalComponent):
     """
 
     type: ClassVar[str] = "thermal-conductance"
-    ports: ClassVar[Mapping[str, Port]] = {"a": HEAT, "b": HEAT}
+    ports: ClassVar = {"a": HEAT, "b": HEAT}
 
     conductance: ThermalConductance = Field(
         gt=0, description="G, heat flow per temperature difference."

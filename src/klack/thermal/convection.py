@@ -1,6 +1,5 @@
 """Convection from a surface."""
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 from pydantic import Field
@@ -25,7 +24,7 @@ class Convection(ThermalComponent):
     """
 
     type: ClassVar[str] = "convection"
-    ports: ClassVar[Mapping[str, Port]] = {
+    ports: ClassVar = {
         "surface": HEAT,
         "surroundings": Port("thermal", Role.HEAT, optional=True),
     }

@@ -1,11 +1,10 @@
 """Fixed temperature: a part that no heat can change."""
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 from pydantic import Field
 
-from klack.network.port import TEMPERATURE, Port
+from klack.network.port import TEMPERATURE
 from klack.thermal.heat_rows import HeatRows, ThermalComponent
 from klack.units import Temperature
 
@@ -21,7 +20,7 @@ class FixedTemperature(ThermalComponent):
     """
 
     type: ClassVar[str] = "fixed-temperature"
-    ports: ClassVar[Mapping[str, Port]] = {"node": TEMPERATURE}
+    ports: ClassVar = {"node": TEMPERATURE}
 
     temperature: Temperature = Field(gt=0, description="T_0.")
 

@@ -1,11 +1,10 @@
 """Heat capacity: a part of one temperature."""
 
-from collections.abc import Mapping
 from typing import ClassVar, Self
 
 from pydantic import Field, model_validator
 
-from klack.network.port import HEAT_STORE, Port
+from klack.network.port import HEAT_STORE
 from klack.thermal.heat_rows import HeatRows, ThermalComponent
 from klack.units import HeatCapacity as Capacity
 from klack.units import Mass, SpecificHeat, Temperature
@@ -26,7 +25,7 @@ class HeatCapacity(ThermalComponent):
     """
 
     type: ClassVar[str] = "heat-capacity"
-    ports: ClassVar[Mapping[str, Port]] = {"node": HEAT_STORE}
+    ports: ClassVar = {"node": HEAT_STORE}
 
     capacity: Capacity | None = Field(
         default=None, ge=0, description="C; 0 for a node that stores no heat."

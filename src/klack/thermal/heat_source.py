@@ -1,13 +1,12 @@
 """Heat source: a given heat flow, constant or over time."""
 
-from collections.abc import Mapping
 from typing import ClassVar, Self
 
 from pydantic import Field, model_validator
 
 from klack.input.problem import refuse_key_if
 from klack.input.section import Section
-from klack.network.port import HEAT, Port
+from klack.network.port import HEAT
 from klack.thermal.heat_rows import HeatRows, HeatSupply, ThermalComponent
 from klack.units import Power, Time
 
@@ -44,7 +43,7 @@ class HeatSource(ThermalComponent):
     """
 
     type: ClassVar[str] = "heat-source"
-    ports: ClassVar[Mapping[str, Port]] = {"node": HEAT}
+    ports: ClassVar = {"node": HEAT}
 
     power: Power | None = Field(default=None, description="Constant.")
     table: HeatTable | None = Field(default=None, description="Instead of the power.")

@@ -1,6 +1,5 @@
 """Radiation from a surface."""
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 from pydantic import Field
@@ -27,7 +26,7 @@ class Radiation(ThermalComponent):
     """
 
     type: ClassVar[str] = "heat-radiation"
-    ports: ClassVar[Mapping[str, Port]] = {
+    ports: ClassVar = {
         "surface": HEAT,
         "surroundings": Port("thermal", Role.HEAT, optional=True),
     }

@@ -1,6 +1,5 @@
 """Gas chamber: a volume of gas with one pressure and one temperature."""
 
-from collections.abc import Mapping
 from typing import ClassVar, Self
 
 from pydantic import Field, model_validator
@@ -10,7 +9,7 @@ from klack.hydraulics.gas.gas_step import ISOTHERMAL
 from klack.hydraulics.gas.network_gas import network_gas
 from klack.network.component import Component
 from klack.network.gas_rows import GasChamberRow
-from klack.network.port import GAS_VOLUME, Port
+from klack.network.port import GAS_VOLUME
 from klack.network.rows import Rows
 from klack.units import Pressure, Temperature, ThermalConductance, Volume
 
@@ -39,7 +38,7 @@ class GasChamber(Component):
     """
 
     type: ClassVar[str] = "gas-chamber"
-    ports: ClassVar[Mapping[str, Port]] = {"gas": GAS_VOLUME}
+    ports: ClassVar = {"gas": GAS_VOLUME}
 
     volume: Volume = Field(gt=0, description="With all faces at their start positions.")
     pressure: Pressure | None = Field(

@@ -1,12 +1,11 @@
 """Gas face: where the pressure of a gas pushes a body, and the body moves gas."""
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 from klack.hydraulics.face import FaceComponent
 from klack.hydraulics.gas.network_gas import network_gas
 from klack.network.gas_rows import GasWallRow
-from klack.network.port import ELEMENT, GAS_FLOW, Port
+from klack.network.port import ELEMENT, GAS_FLOW
 from klack.network.rows import Rows
 
 __all__ = ["GasFace"]
@@ -25,7 +24,7 @@ class GasFace(FaceComponent):
     """
 
     type: ClassVar[str] = "gas-face"
-    ports: ClassVar[Mapping[str, Port]] = {"gas": GAS_FLOW, "body": ELEMENT}
+    ports: ClassVar = {"gas": GAS_FLOW, "body": ELEMENT}
 
     def add_rows(self, rows: Rows) -> None:
         """Add one moving wall."""

@@ -1,6 +1,5 @@
 """Gas gap: laminar leakage of gas along a guide."""
 
-from collections.abc import Mapping
 from math import pi
 from typing import ClassVar
 
@@ -9,7 +8,7 @@ from pydantic import Field
 from klack.hydraulics.gas.flow_law import GAP
 from klack.hydraulics.gas.network_gas import add_restriction, network_gas
 from klack.network.component import Component
-from klack.network.port import GAS_FLOW, Port
+from klack.network.port import GAS_FLOW
 from klack.network.rows import LimitRow, Rows
 from klack.units import Length, Ratio
 
@@ -33,7 +32,7 @@ class GasGap(Component):
     """
 
     type: ClassVar[str] = "gas-gap"
-    ports: ClassVar[Mapping[str, Port]] = {"a": GAS_FLOW, "b": GAS_FLOW}
+    ports: ClassVar = {"a": GAS_FLOW, "b": GAS_FLOW}
 
     diameter: Length = Field(gt=0, description="Of the guide.")
     length: Length = Field(gt=0, description="Of the gap, along the axis.")

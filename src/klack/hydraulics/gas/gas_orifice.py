@@ -1,6 +1,5 @@
 """Pneumatic orifice after ISO 6358."""
 
-from collections.abc import Mapping
 from math import pi
 from typing import ClassVar, Self
 
@@ -12,7 +11,7 @@ from klack.hydraulics.gas.restriction import (
     factor_of_area,
     factor_of_conductance,
 )
-from klack.network.port import GAS_FLOW, Port
+from klack.network.port import GAS_FLOW
 from klack.network.rows import Rows
 from klack.units import Area, Length, Ratio, SonicConductance
 
@@ -41,7 +40,7 @@ class GasOrifice(RestrictionComponent):
     """
 
     type: ClassVar[str] = "gas-orifice"
-    ports: ClassVar[Mapping[str, Port]] = {"a": GAS_FLOW, "b": GAS_FLOW}
+    ports: ClassVar = {"a": GAS_FLOW, "b": GAS_FLOW}
 
     conductance: SonicConductance | None = Field(
         default=None, ge=0, description="Sonic conductance C, measured with air."

@@ -1,6 +1,5 @@
 """Gas source: a pressure of gas that the rest of the valve cannot change."""
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 from pydantic import Field
@@ -8,7 +7,7 @@ from pydantic import Field
 from klack.hydraulics.gas.network_gas import network_gas
 from klack.hydraulics.pressure_history import PressureHistory
 from klack.network.gas_rows import GasSourceRow
-from klack.network.port import GAS_PRESSURE, Port
+from klack.network.port import GAS_PRESSURE
 from klack.network.rows import Rows
 from klack.units import Temperature
 
@@ -24,7 +23,7 @@ class GasSource(PressureHistory):
     """
 
     type: ClassVar[str] = "gas-source"
-    ports: ClassVar[Mapping[str, Port]] = {"gas": GAS_PRESSURE}
+    ports: ClassVar = {"gas": GAS_PRESSURE}
 
     temperature: Temperature | None = Field(
         default=None, gt=0, description="Of the gas that leaves it; default of the surroundings."

@@ -1,6 +1,5 @@
 """Gas valve: an opening for gas that a lift rules."""
 
-from collections.abc import Mapping
 from math import cos, pi, sin
 from typing import ClassVar, Self
 
@@ -45,7 +44,7 @@ class GasValve(RestrictionComponent):
     """
 
     type: ClassVar[str] = "gas-valve"
-    ports: ClassVar[Mapping[str, Port]] = {
+    ports: ClassVar = {
         "a": GAS_FLOW,
         "b": GAS_FLOW,
         "needle": ELEMENT,
