@@ -10,7 +10,7 @@ import zarr
 
 from klack.acoustics.force_response import modal_response, port_forces
 from klack.acoustics.injected import injected_density
-from klack.acoustics.mobility import drive_point_mobility
+from klack.acoustics.mobility import transfer_mobility
 from klack.acoustics.mount import Mount, mounted
 from klack.acoustics.surface_bands import face_band_velocity
 from klack.analyses.impact.analysis import IMPACT
@@ -163,7 +163,7 @@ def unlike(series: TimeSeries) -> TimeSeries:
         (lambda s, f: modal_response(s, {"top": f}), r"port 'top': got a name.*one of: tip, skin"),
         (lambda s, f: modal_response(s, {"tip": f, "skin": unlike(f)}), r"'skin': got .* 4e-08 s"),
         (lambda s, f: modal_response(s, {"tip": f}, sample=3e-8), r"sample: got 3e-08 s"),
-        (lambda s, f: drive_point_mobility(s, "tip", np.array([-1.0])), r"lowest -1 Hz"),
+        (lambda s, f: transfer_mobility(s, "tip", "tip", np.array([-1.0])), r"lowest -1 Hz"),
         (lambda s, f: injected_density(rod_structure(), {"tip": f}), r"12 modes without damping"),
         (
             lambda s, f: mounted(s, Mount(stiffness=1e6, mass=1e-6)),

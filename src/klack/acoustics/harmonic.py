@@ -41,7 +41,8 @@ class HarmonicResponse:
         loaded port, velocity of the support.
     support_velocity (k,) [m/(N s)]
     support_force (k,) [-]
-        Axial; of a rigid hold the blocked force.
+        Axial; of a rigid hold the blocked force, which goes to 1 towards 0 Hz. Above the kept modes
+        it means nothing.
     """
 
     frequency: NDArray[np.float64]

@@ -15,22 +15,7 @@ from klack.acoustics.mount import Mount
 from klack.acoustics.plate import Plate
 from klack.bodies.reduction.structure import Structure
 
-__all__ = ["drive_point_mobility", "support_force_transfer", "transfer_mobility"]
-
-
-def drive_point_mobility(
-    structure: Structure,
-    port: str,
-    frequency: NDArray[np.float64],
-    *,
-    mount: Mount | None = None,
-    plate: Plate | None = None,
-    residual: bool = True,
-) -> NDArray[np.complex128]:
-    """Velocity of a port per force on it [m/(N s)], as :func:`transfer_mobility`."""
-    return transfer_mobility(
-        structure, port, port, frequency, mount=mount, plate=plate, residual=residual
-    )
+__all__ = ["transfer_mobility"]
 
 
 def transfer_mobility(
@@ -61,20 +46,3 @@ def transfer_mobility(
         omega = 2.0 * np.pi * answer.frequency
         velocity = velocity + 1j * omega * structure.residual_compliance[i, j]
     return velocity
-
-
-def support_force_transfer(
-    structure: Structure,
-    port: str,
-    frequency: NDArray[np.float64],
-    *,
-    mount: Mount | None = None,
-    plate: Plate | None = None,
-) -> NDArray[np.complex128]:
-    """Axial force on the support per force at a port [-], shape (k,).
-
-    Of a rigid hold the blocked force, which goes to 1 towards 0 Hz. Above the kept modes it means
-    nothing.
-    """
-    answer = harmonic_response(structure, frequency, port, mount=mount, plate=plate)
-    return answer.support_force

@@ -122,8 +122,7 @@ class Meridian:
     def inside(self, count: int, draw: int) -> Matrix:
         """Points (count, 2) in the inside, well off the surface, drawn anew for every ``draw``."""
         loop = np.vstack([self.nodes, self.nodes[::-1] * (-1.0, 1.0)])
-        found = spread_inside(self.nodes, count, draw, lambda at: _within(loop, at), self._distance)
-        return found
+        return spread_inside(self.nodes, count, draw, lambda at: _within(loop, at), self._distance)
 
     def far_field(self, wave_number: float, angles: Vector) -> tuple[Complexes, Complexes]:
         """Far pressure (a, n) for unit pressure and velocity [m], times ``exp(-ikr)/r``.

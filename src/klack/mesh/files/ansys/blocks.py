@@ -210,8 +210,7 @@ class _Block:
         if end >= len(self._lines):
             self._cut_off(end, "the end of the file", "the end mark -1 of the block")
         filled = np.flatnonzero(text != b"")
-        rows = rows[: filled[-1] + 1] if len(filled) else rows[:0]
-        return rows
+        return rows[: filled[-1] + 1] if len(filled) else rows[:0]
 
     def _cut_off(self, row: int, got: str, expected: str) -> None:
         raise InputError(
