@@ -834,6 +834,7 @@ class TestOptimum:
             ("{most: today - 1 %}", "{}", "no bound"),
             ("population: 20", "population: 5", "8 or more"),
             ("most: today - 1 %", "most: 1 N", "No point meets all bounds"),
+            ("from: 10 N, to: 14 N", "from: 60 N, to: 70 N", "No point has a value of every"),
         ],
     )
     def test_what_cannot_be(self, tmp_path, capsys, old, new, words):

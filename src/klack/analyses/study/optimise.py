@@ -132,7 +132,7 @@ def run_optimisation(
                 optimum=optimum,
                 sounds=sounds,
                 warnings=(
-                    *(() if optimum.feasible else (_NOT_FEASIBLE,)),
+                    *_without_best(optimum),
                     *_lucky_draws(asked, source),
                     *dry_warnings(asked, space),
                     *warnings,
@@ -158,10 +158,17 @@ def run_optimisation(
     return record(sounds, (*ended, *notes))
 
 
-_NOT_FEASIBLE = (
-    "No point meets all bounds; the points shown miss them least. Try: wider ranges, or other "
-    "bounds."
-)
+def _without_best(optimum: Optimum) -> tuple[str, ...]:
+    if optimum.front.size == 0:
+        return ("No point has a value of every objective, so none is best. Try: wider ranges.",)
+    if optimum.feasible:
+        return ()
+    return (
+        "No point meets all bounds; the points shown miss them least. Try: wider ranges, or other "
+        "bounds.",
+    )
+
+
 _DRAWS = ("shots.seed", "shots.count")
 """Keys of the draws of shots, not of the valve."""
 
