@@ -15,6 +15,7 @@ from klack.case import find_case, read_case
 from klack.cli.main import main
 
 VALVE = find_case("demo-valve-axisymmetric")
+SEAT_INSERT = Path(__file__).parents[2] / "docs" / "how-to" / "seat_insert.yaml"
 
 
 @pytest.fixture(scope="module")
@@ -191,3 +192,25 @@ def test_the_pair_of_a_valve_says_what_it_leaves_out(tmp_path, capsys):
     assert {"spring", "guide", "coil", "driver", "feed", "sac", "nozzle"} <= set(left_out)
     assert not {"needle", "housing", "pole", "seat", "opening"} & set(left_out)
     assert "to be added by you" not in other
+
+
+@pytest.mark.slow
+def test_a_force_on_a_moving_body_without_an_input_is_named(tmp_path, capsys):
+    """The sleeve clamps an insert: the pair has inputs of the needle only."""
+    case = tmp_path / "case.yaml"
+    text = SEAT_INSERT.read_text(encoding="utf-8")
+    for old, new in (
+        ("    - [housing.ledge, foot.lower]\n", "    - [housing.ledge, foot.lower, stop.upper]\n"),
+        ("    - [ground, stop.upper]\n", ""),
+        (", restitution: 0.2}", "}"),
+    ):
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    case.write_text(text, encoding="utf-8")
+
+    words = ["export", str(case), "--to", "csv", "--part", "pair", "--out", str(tmp_path / "x")]
+    assert main(words) == 0
+
+    told = capsys.readouterr().err
+    assert "no input for 'insert', on which 'sleeve' acts" in told
+    assert told.count("no input") == 1

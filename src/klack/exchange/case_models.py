@@ -1,7 +1,7 @@
 """Models of a case for other programs: reduced bodies, and the pair with its contacts."""
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
@@ -23,6 +23,7 @@ from klack.exchange.modal_model import ModalModel, Provenance, body_model, choos
 from klack.machine.progress import Progress, silent
 from klack.mechanics.flexible_body import FlexibleBody
 from klack.mesh.mesh import Mesh
+from klack.network.network import Network
 from klack.network.rows import FilmRow
 from klack.simulation.system import ContactPair, ReducedSystem
 
@@ -221,17 +222,36 @@ def _of_valve(case: ValveCase, progress: Progress, threads: int | None, alone: b
         duration=case.run.duration,
         provenance=provenance,
     )
-    return CaseModels(
-        bodies=bodies,
-        pair=pair,
-        provenance=provenance,
-        step=step,
-        outside=tuple(
-            name
-            for name, part in parts.items()
-            if name not in names and not isinstance(part, FlexibleBody)
-        ),
+    outside = tuple(
+        name
+        for name, part in parts.items()
+        if name not in names and not isinstance(part, FlexibleBody)
     )
+    loose = {
+        name
+        for name, part in parts.items()
+        if isinstance(part, FlexibleBody)
+        and name != needle
+        and any(body.name == part.body and body.rigid_count for body in used)
+    }
+    _tell_without_input(valve.network, loose, outside)
+    return CaseModels(bodies=bodies, pair=pair, provenance=provenance, step=step, outside=outside)
+
+
+def _tell_without_input(network: Network, loose: Collection[str], outside: Sequence[str]) -> None:
+    """Note forces on moving bodies for which the pair has no input: it has those of the needle."""
+    for node in network.nodes:
+        at = {joint.component for joint in node.joints}
+        for body in sorted(at.intersection(loose)):
+            if forces := [f"'{name}'" for name in outside if name in at]:
+                acting = f"{' and '.join(forces)} act{'s' * (len(forces) == 1)}"
+                warnings.warn(
+                    f"the exported valve has no input for '{body}', on which {acting}: without "
+                    f"that force '{body}' is loose in it. Try: klack stroke, or one glued body "
+                    "instead of two.",
+                    AccuracyWarning,
+                    stacklevel=4,
+                )
 
 
 def _body_of(case: ValveCase, name: str, part: object) -> str:
