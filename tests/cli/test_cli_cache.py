@@ -156,7 +156,7 @@ def test_what_comes_after_it_compiles_nothing(warm, tmp_path):
         *(["stroke", str(case), "--duration", "0.1 ms", *kept] for case in STROKES),
         ["impact", "two-rods", "--level", "reduced,interface", *kept],
         ["linearise", str(valve), *kept],
-        ["sensitivities", str(valve), "--parameter", parameter, "--quiet"],
+        ["sensitivities", str(valve), "--parameter", parameter, *kept],
         ["warm", "--quiet", "--json", str(again)],
     ]
     program = [sys.executable, "-c", COUNT, json.dumps(commands)]

@@ -4,6 +4,7 @@ Truth: single impacts of the changed cases, bit for bit, as ``klack impact`` com
 """
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,13 @@ import pytest
 
 import klack
 from klack.analyses.noise.measures import DESIGN_MEASURES
+from klack.analyses.sensitivities.analysis import SENSITIVITIES
+from klack.analyses.sensitivities.record import (
+    ImpactSlope,
+    MeasureSlopes,
+    SensitivityRecord,
+    SlopeParameter,
+)
 from klack.analyses.study import impacts
 from klack.analyses.study.asked_points import groups_of
 from klack.analyses.study.evaluation import asked_of
@@ -403,6 +411,64 @@ class TestDerivatives:
         assert record.variant == "reduced"
         assert all(item.deviation < 0.01 for item in record.measures)
 
+    def test_comes_back_from_disk_and_has_a_report(self, tmp_path):
+        """Truth: the record; the order of elasticities, -2 and +0.5 of the peak."""
+        peak = MeasureSlopes(
+            name="peak_force",
+            title="peak force",
+            unit="N",
+            value=100.0,
+            slopes=(50.0, -2e9, None),
+            predicted=1.5,
+            secant=None,
+            scale=2.0,
+            resolution=0.0,
+        )
+        record = SensitivityRecord(
+            title="a ball",
+            description="",
+            version="0",
+            versions={},
+            created="2026-01-31T12:00:00+00:00",
+            wall_time=1.0,
+            stage_times={},
+            case="ball",
+            case_text="klack: 1",
+            variant="dry",
+            parameters=(
+                SlopeParameter(name=SPEED, unit="m/s", value=1.0),
+                SlopeParameter(name="contact.gap", unit="m", value=1e-7),
+                SlopeParameter(name=YOUNG, unit="Pa", value=2e11),
+            ),
+            measures=(peak, replace(peak, name="time", value=None, slopes=(None, None, None))),
+            impacts=(
+                ImpactSlope(
+                    stop="seat",
+                    number=1,
+                    time=1e-3,
+                    growth=2e-4,
+                    deviation=None,
+                    is_doubtful=False,
+                ),
+            ),
+            share=0.0,
+            runs_time=1.0,
+            run_time=0.0,
+            warnings=("a doubt",),
+        )
+        found = klack.load_result(SENSITIVITIES.save(record, tmp_path))
+
+        assert vars(found.record) == vars(record)
+        page = found.analysis.content(found.record)
+        assert [row[0] for row in page.numbers.rows] == ["peak_force", "time"]
+        assert page.numbers.rows[0][2:] == ("contact.gap", "\N{MINUS SIGN}2.0000")
+        assert page.numbers.rows[1][1:] == ("no value", "–", "–")
+        (bars,) = page.sections[0].charts
+        assert bars.rows == ("contact.gap", SPEED)
+        assert [part.values for part in bars.parts] == [(0.0, 0.5), (2.0, 0.0)]
+        assert "not checked" in page.answer
+        assert page.warnings == ("a doubt",)
+
     @pytest.mark.slow
     def test_value_is_that_of_the_impact(self, ball):
         record = klack.sensitivities(ball, parameters=[SPEED], check=False)
@@ -426,13 +492,22 @@ class TestDerivatives:
 
     @pytest.mark.slow
     def test_command(self, ball, tmp_path, capsys):
-        file = tmp_path / "ball.yaml"
+        """Truth of the stored result: its JSON is that of the command."""
+        file, out = tmp_path / "ball.yaml", tmp_path / "out"
         file.write_text(CASE)
         numbers = tmp_path / "numbers.json"
         command = ["sensitivities", str(file), "--parameter", SPEED, "--json", str(numbers)]
+        command += ["--out", str(out)]
         assert main(command) == 0
         assert "by differences of impacts" in " ".join(capsys.readouterr().out.split())
-        assert json.loads(numbers.read_text())["method"] == "differences"
+        told = json.loads(numbers.read_text())
+        assert told["method"] == "differences"
+        assert sorted(path.name for path in out.iterdir()) == [
+            "report.html",
+            "report.pdf",
+            "result.zarr",
+        ]
+        assert klack.load_result(out).json == told
         for more, words in (
             (["--variant", "dry"], "only strokes have variants"),
             (["--parameter", "contact.gap"], "a value of zero"),

@@ -181,8 +181,9 @@ class TestNumbers:
 
 class TestCommand:
     def test_writes_tables_and_numbers(self, tmp_path, capsys):
-        file = tmp_path / "numbers.json"
-        assert main(["sensitivities", str(SMALL), "--study", str(STUDY), "--json", str(file)]) == 0
+        file, out = tmp_path / "numbers.json", tmp_path / "out"
+        command = ["sensitivities", str(SMALL), "--study", str(STUDY), "--json", str(file)]
+        assert main([*command, "--out", str(out)]) == 0
         told = capsys.readouterr().out
         assert "elasticity" in told
         assert "Impacts, and the sensitivity of their times" in told
@@ -193,6 +194,8 @@ class TestCommand:
             slope["derivative"] * 12.0 / numbers["measures"]["opening_time"]["value"]
         )
         assert numbers["derivatives_cpu_time_s"] > 0.0
+        assert klack.load_result(out).json == numbers
+        assert main(["report", str(out)]) == 0
 
     @pytest.mark.parametrize(
         ("parameter", "words"),
@@ -246,7 +249,8 @@ class TestCommand:
             "    network.components.opening.law.stiffness: {from: 0.9 N/nm, to: 1.1 N/nm}\n"
             "  measures: [opening_time, impacts]\n"
         )
-        code = main(["sensitivities", str(SMALL), "--study", str(study), "--no-check"])
+        command = ["sensitivities", str(SMALL), "--study", str(study), "--no-check", "--no-report"]
+        code = main([*command, "--out", str(tmp_path / "out")])
 
         told = capsys.readouterr().out
         assert code == 0

@@ -72,7 +72,8 @@ ANALYSES: tuple[Entry, ...] = (
     ),
     Entry(
         "sensitivities.analysis:SENSITIVITIES",
-        example="klack sensitivities demo-stroke --parameter network.components.spring.preload",
+        "klack sensitivities",
+        "klack sensitivities demo-stroke --parameter network.components.spring.preload",
     ),
     Entry(
         "magnet.analysis:MAGNET",

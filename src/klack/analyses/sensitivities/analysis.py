@@ -1,17 +1,32 @@
-"""Derivatives for scripts and terminals; nothing is stored."""
+"""Derivatives in words and numbers, and on disk."""
 
 from collections.abc import Iterator, Mapping
 from operator import itemgetter
 from typing import Literal, NamedTuple
 
-from klack.analyses.analysis import Analysis
+from klack.analyses.analysis import StoredAnalysis
 from klack.analyses.json_parts import CASE, JsonForm, Key, Real, by_name, schema_key
 from klack.analyses.sensitivities.record import MeasureSlopes, SensitivityRecord, SlopeParameter
+from klack.analyses.store import RecordFormat
 from klack.analyses.study.wording import shown_unit
 from klack.terminal.tables import TextTable
 from klack.units import format_si, is_level
 
-__all__ = ["SENSITIVITIES", "sensitivities_told"]
+__all__ = [
+    "CHECK_HEADS",
+    "IMPACT_HEADS",
+    "SENSITIVITIES",
+    "SLOPE_HEADS",
+    "check_rows",
+    "impact_rows",
+    "measure_title",
+    "sensitivities_told",
+    "slope_rows",
+]
+
+SLOPE_HEADS = ("parameter", "value", "change per +1 %", "elasticity", "derivative (SI)")
+CHECK_HEADS = ("measure", "by derivatives", "by the runs", "deviation")
+IMPACT_HEADS = ("impact", "time", "root of summed squares", "deviation")
 
 _PARAMETER = JsonForm(
     "SlopeParameterJson",
@@ -117,35 +132,15 @@ _RECORD = JsonForm(
 def sensitivities_told(record: SensitivityRecord) -> Iterator[TextTable | str]:
     """Derivatives of each measure, then the check and the impacts."""
     for item in record.measures:
-        value = "no value" if item.value is None else _quantity(item.value, item.unit)
         yield TextTable(
-            title=f"{item.name}: {value}",
-            columns=("parameter", "value", "change per +1 %", "elasticity", "derivative (SI)"),
-            rows=[
-                (
-                    parameter.name,
-                    _quantity(parameter.value, parameter.unit),
-                    _change(item, k, parameter),
-                    _plain(item.elasticity(k, parameter), "+.4f"),
-                    _plain(item.slopes[k], "+.6g"),
-                )
-                for k, parameter in enumerate(record.parameters)
-            ],
+            title=measure_title(item), columns=SLOPE_HEADS, rows=slope_rows(record, item)
         )
     if record.share:
         yield TextTable(
             title=f"Check: all parameters changed together by {record.share:.0%}, with + and - in "
             "turn, in two runs",
-            columns=("measure", "by derivatives", "by the runs", "deviation"),
-            rows=[
-                (
-                    item.name,
-                    "–" if item.predicted is None else _quantity(item.predicted, item.unit),
-                    "–" if item.secant is None else _quantity(item.secant, item.unit),
-                    "–" if item.deviation is None else f"{100.0 * item.deviation:.2g} %",
-                )
-                for item in record.measures
-            ],
+            columns=CHECK_HEADS,
+            rows=check_rows(record),
         )
     if record.by_differences:
         yield (
@@ -153,7 +148,11 @@ def sensitivities_told(record: SensitivityRecord) -> Iterator[TextTable | str]:
             "the contact of an impact is solved again for each speed and shape."
         )
     else:
-        yield _impact_table(record)
+        yield TextTable(
+            title="Impacts, and the sensitivity of their times",
+            columns=IMPACT_HEADS,
+            rows=impact_rows(record),
+        )
     if record.run_time > 0.0:
         yield (
             f"{len(record.parameters)} parameters took as long as "
@@ -161,20 +160,54 @@ def sensitivities_told(record: SensitivityRecord) -> Iterator[TextTable | str]:
         )
 
 
-def _impact_table(record: SensitivityRecord) -> TextTable:
-    return TextTable(
-        title="Impacts, and the sensitivity of their times",
-        columns=("impact", "time", "root of summed squares", "deviation"),
-        rows=[
-            (
-                f"{item.stop} {item.number}",
-                format_si(item.time, "s", 5),
-                format_si(item.growth, "s", 3),
-                "–" if item.deviation is None else f"{100.0 * item.deviation:.2g} %",
-            )
-            for item in record.impacts
-        ],
-    )
+def measure_title(item: MeasureSlopes) -> str:
+    """Name of a measure with its value."""
+    value = "no value" if item.value is None else _quantity(item.value, item.unit)
+    return f"{item.name}: {value}"
+
+
+def slope_rows(record: SensitivityRecord, item: MeasureSlopes) -> list[tuple[str, ...]]:
+    """Parameters of a measure, as :data:`SLOPE_HEADS`."""
+    return [
+        (
+            parameter.name,
+            _quantity(parameter.value, parameter.unit),
+            _change(item, k, parameter),
+            _plain(item.elasticity(k, parameter), "+.4f"),
+            _plain(item.slopes[k], "+.6g"),
+        )
+        for k, parameter in enumerate(record.parameters)
+    ]
+
+
+def check_rows(record: SensitivityRecord) -> list[tuple[str, ...]]:
+    """Changes of all measures, as :data:`CHECK_HEADS`."""
+    return [
+        (
+            item.name,
+            "–" if item.predicted is None else _quantity(item.predicted, item.unit),
+            "–" if item.secant is None else _quantity(item.secant, item.unit),
+            _share(item.deviation),
+        )
+        for item in record.measures
+    ]
+
+
+def impact_rows(record: SensitivityRecord) -> list[tuple[str, ...]]:
+    """Impacts, as :data:`IMPACT_HEADS`."""
+    return [
+        (
+            f"{item.stop} {item.number}",
+            format_si(item.time, "s", 5),
+            format_si(item.growth, "s", 3),
+            _share(item.deviation),
+        )
+        for item in record.impacts
+    ]
+
+
+def _share(value: float | None) -> str:
+    return "–" if value is None else f"{100.0 * value:.2g} %"
 
 
 def _quantity(value: float, unit: str) -> str:
@@ -195,5 +228,16 @@ def _change(item: MeasureSlopes, k: int, parameter: SlopeParameter) -> str:
     return _quantity(0.01 * abs(parameter.value) * slope, item.unit)
 
 
-SENSITIVITIES = Analysis(json=_RECORD.type, to_json=_RECORD.json, told=sensitivities_told)
-"""``klack sensitivities``."""
+SENSITIVITIES = StoredAnalysis(
+    form=RecordFormat(
+        name="klack sensitivities",
+        version=1,
+        kind=SensitivityRecord,
+        command="klack sensitivities CASE",
+        units={},
+    ),
+    page="sensitivities.content:sensitivities_content",
+    json=_RECORD.type,
+    to_json=_RECORD.json,
+    told=sensitivities_told,
+)

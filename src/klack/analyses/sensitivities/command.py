@@ -4,12 +4,13 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from klack.analyses.ending import Ending
 from klack.terminal.options import (
-    WANTED,
+    WANTED_RESULT,
     CaseArgument,
     Components,
     StudyPath,
-    Wanted,
+    WantedResult,
     imported,
     require_files,
 )
@@ -58,7 +59,7 @@ def sensitivities(
     level: _Level = None,
     check: _Check = True,
     component: Components = None,
-    wanted: Wanted = WANTED,
+    wanted: WantedResult = WANTED_RESULT,
 ) -> int:
     """Derivatives by parameters: of a stroke with exact tangents, of an impact with differences."""
     if study is not None:
@@ -77,6 +78,7 @@ def sensitivities(
         from klack.case.valve import ValveCase
         from klack.machine.compiling.ahead import compiling_ahead
 
+    ending = Ending.of(wanted, f"{checked.name}-sensitivities")
     # derivatives are compiled here, what the check of a stroke needs beside them
     ahead = ("loop",) if isinstance(checked, ValveCase) else ("levels",)
     with show_progress(wanted.quiet) as progress, compiling_ahead(ahead, wanted.threads):
@@ -90,7 +92,4 @@ def sensitivities(
             threads=wanted.threads,
             progress=progress,
         )
-    wanted.show(SENSITIVITIES.told(record))
-    wanted.note(record.warnings)
-    wanted.write(lambda: SENSITIVITIES.to_json(record))
-    return 0
+    return ending.end(SENSITIVITIES, record)
