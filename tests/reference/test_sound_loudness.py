@@ -5,8 +5,10 @@ Truth: IEC 61260-1:2014 (limits of class 1), IEC 61672-1:2013 (A-weighting), PyO
 Truth: ISO 532-1:2017 Annex B and DIN 45692:2009 as others coded them, and MoSQITo itself.
 """
 
+from dataclasses import replace
 from math import pi
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,6 +18,7 @@ from klack.acoustics.loudness import loudness_level, nonlinear_decay, time_varyi
 from klack.acoustics.signal_statistics import pressure_third_octaves, weighted, weighting
 from klack.acoustics.sound import click_pressure
 from klack.acoustics.third_octave import band_edges, band_energies, middle_frequencies
+from klack.analyses.noise.measures import DESIGN_MEASURES
 from klack.errors import InputError
 from klack.signals.sampled import Spectrum, TimeSeries
 
@@ -309,11 +312,25 @@ def test_below_the_threshold_is_zero_with_a_note():
     silent = time_varying_loudness(sound(np.zeros(RATE // 4)))
     faint = time_varying_loudness(sound(tone(1000.0, 4.0, 0.4)))
 
-    assert (silent.maximum, silent.sharpness, silent.level) == (0.0, 0.0, 3.0)
+    assert (silent.maximum, silent.level) == (0.0, 3.0)
+    assert np.isnan(silent.sharpness)
     assert "below the threshold" in silent.note
     assert 0.0 <= faint.maximum < 0.1
-    assert faint.sharpness == 0.0
+    assert np.isnan(faint.sharpness)
     assert faint.note
+
+
+@pytest.mark.parametrize("stored", [float("nan"), 0.0])
+def test_a_click_too_faint_for_a_sharpness_has_none_anywhere(stored):
+    """Truth: its note; 0 is what klack up to 0.2 has stored."""
+    faint = time_varying_loudness(sound(tone(1000.0, 4.0, 0.4)))
+    design = SimpleNamespace(sound=SimpleNamespace(loudness=replace(faint, sharpness=stored)))
+    (measure,) = (item for item in DESIGN_MEASURES if item.key == "sharpness")
+
+    assert "no sharpness" in faint.note
+    assert measure.json(design) is None
+    assert measure.cell(design) == measure.on_page(design) == "too faint"
+    assert measure.apart(design, design) == "–"
 
 
 def test_time_axis_and_percentile():

@@ -5,6 +5,7 @@ given. Method of the package MoSQITo.
 """
 
 from dataclasses import dataclass
+from math import nan
 
 import numpy as np
 import scipy
@@ -22,7 +23,7 @@ _SHORT, _LONG, _VARIABLE = 5e-3, 15e-3, 75e-3  # [s] of the decay in the ear
 _CORE_STEP, _FINE = 0.5e-3, 24  # [s], steps within each
 _BARK = 0.1  # [Bark] steps of the specific loudness
 _QUIET = 0.1  # [sone] below this sharpness is not defined in DIN 45692
-_SILENT = "below the threshold of hearing: 0 sone"
+_SILENT = "below the threshold of hearing: 0 sone, and no sharpness"
 _FAINT = "less than 0.1 sone at its loudest: no sharpness is given"
 
 
@@ -43,7 +44,7 @@ class Loudness:
     level [phon]
         Of the maximum.
     sharpness [acum]
-        DIN 45692, of the specific loudness over the whole sound; 0 where too faint.
+        DIN 45692, of the specific loudness over the whole sound; nan where too faint (``note``).
     note
         Empty, or a remark on the numbers.
     """
@@ -80,7 +81,7 @@ def time_varying_loudness(pressure: TimeSeries) -> Loudness:
         maximum=maximum,
         percentile_5=float(np.percentile(total, 95.0)),
         level=loudness_level(maximum),
-        sharpness=0.0 if note else _sharpness(specific.sum(axis=1)),
+        sharpness=nan if note else _sharpness(specific.sum(axis=1)),
         note=note,
     )
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from math import log10
+from math import log10, nan
 from typing import Any, cast
 
 from klack.acoustics.signal_statistics import PRESSURE_REFERENCE, SoundStatistics
@@ -51,6 +51,10 @@ def strongest(design: NoiseDesign) -> StopForce:
 
 def _heard(read: Callable[[ClickSound], Value]) -> Callable[[NoiseDesign], Value]:
     return lambda design: None if design.sound is None else read(design.sound)
+
+
+def _too_faint(design: NoiseDesign) -> str:
+    return "too faint" if design.sound is not None and design.sound.loudness.note else ""
 
 
 _LEVEL = Measure[Any](key="level", definition="", unit="dB", form="fixed", digits=1, page=True)
@@ -331,11 +335,13 @@ DESIGN_MEASURES: tuple[Measure[NoiseDesign], ...] = described_in(
         key="sharpness",
         symbol="S",
         unit="acum",
-        definition="Sharpness of one click, DIN 45692; 0 where the click is too faint for it.",
+        definition="Sharpness of one click, DIN 45692; missing below 0.1 sone, where the click is too "
+        "faint for it.",
         source=_SOUND,
-        read=_heard(lambda sound: sound.loudness.sharpness),
+        read=_heard(lambda sound: sound.loudness.sharpness or nan),  # 0 up to klack 0.2
         digits=3,
         column=Column("acum", 1.0, ".3g"),
+        why=_too_faint,
         deviation="factor",
         page=True,
     ),
