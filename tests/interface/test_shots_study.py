@@ -211,7 +211,7 @@ def dropped(**given) -> DroppedShots:
             }
         )
 
-    found = DroppedShots(draws=(), outcomes=(), alone=None)
+    found = DroppedShots(checked=None, draws=(), outcomes=(), alone=None)
     centric = {key: [values[0]] for key, values in given.items()}
     vars(found).update(shots=made(given), centric=made(centric))
     return found

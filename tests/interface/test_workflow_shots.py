@@ -4,6 +4,7 @@ import warnings
 from dataclasses import fields, replace
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,11 +12,17 @@ from energy_ledger import allowed
 from same_shots import ROUND_OFF, columns_of, same
 
 from klack.analyses.impact.interface_level import build_guide, build_interface
-from klack.analyses.shots import one_shot
+from klack.analyses.shots import checked_step, one_shot
 from klack.analyses.shots.analysis import (
     DISTRIBUTION_COLUMNS,
     SHOTS,
     distribution_rows,
+)
+from klack.analyses.shots.checked_step import (
+    PROMISED,
+    CheckedStep,
+    in_checked_steps,
+    step_doubt,
 )
 from klack.analyses.shots.draw import centric_draw, draw_shot
 from klack.analyses.shots.model import build_shots
@@ -80,6 +87,68 @@ def study(tmp_path_factory):
     SHOT_LOG.remove(folder)
     assert not (folder / SHOT_LOG.file).exists()
     return done
+
+
+def test_a_step_that_is_too_long_is_halved_until_shots_do_not_depend_on_it(model, draws):
+    """Truth: steps of 12.5 ns, to what is promised; in 250 ns the peak is 0.14 % off."""
+    pair = (centric_draw(CASE), draws[0])
+    with allowed("simulate_interface", 1e-2):  # the guide in 500 ns
+        found = in_checked_steps(replace(model.setup, step=250e-9), pair, silent)
+
+    assert found.halvings >= 1
+    assert found.setup.step == pytest.approx(250e-9 / 2**found.halvings, abs=0.0)
+    assert found.doubt == ""
+    for outcome, draw in zip(found.outcomes, pair, strict=True):
+        truth = run_shot(replace(model.setup, step=12.5e-9), draw).numbers
+        for key, promised in PROMISED.items():
+            assert outcome.numbers[key] == pytest.approx(truth[key], rel=promised, abs=0.0)
+
+
+def test_a_step_that_is_short_enough_stays_and_its_shots_are_used(model, draws, centred, alone):
+    """Twice as long: a change below half of the promise."""
+    found = in_checked_steps(model.setup, (centric_draw(CASE), draws[0]), silent)
+
+    assert found.setup is model.setup
+    assert 0.0 < found.change < 0.5
+    same(columns_of(found.outcomes), columns_of([centred, alone[0]]))
+
+
+def test_shots_that_depend_on_any_step_are_told(model, draws, monkeypatch):
+    """Peaks of first order never converge here; times alone that do not fall end it at once."""
+
+    def run(setup, draw, worn=None, *, by):
+        way = setup.step / model.setup.step
+        numbers = {"peak_force": 100.0, "contact_time": 1e-5, "restitution": 0.9}
+        return SimpleNamespace(numbers=numbers | by(way))
+
+    def checked(by):
+        monkeypatch.setattr(checked_step, "run_shot", partial(run, by=by))
+        return in_checked_steps(model.setup, draws[:2], silent)
+
+    found = checked(lambda way: {"peak_force": 100.0 + way})
+    assert found.halvings == 4
+    assert found.change == pytest.approx(0.0625 / 100.0625 / 1e-3)
+    assert found.doubt.startswith(
+        "with a time step of 6.25 ns instead of 3.125 ns shot 0 changes by +0.0625 % of its peak "
+        "force, +0 % of its contact time and +0 in restitution; shot 1 changes"
+    )
+    found = checked(lambda way: {"restitution": 0.9 + 0.01 * (np.log2(way) % 2)})
+    assert found.halvings == 1
+    assert "and -0.01 in restitution. A step" in found.doubt.replace("; shot 1", ". A step")
+    found = checked(lambda way: {"restitution": np.nan if way > 1.0 else 0.9})
+    assert (found.halvings, found.doubt) == (1, "")
+
+    one = found.outcomes[0]
+    assert "shot 2 cannot be compared" in step_doubt(model.setup, draws[2], one, None)
+
+
+def test_without_a_gap_shots_arrive_at_the_stated_speed():
+    """Truth: the case.  From 20 steps above, 1 N made it 0.8 % faster, and the peak as well."""
+    case = CASE.model_copy(update={"contact": CASE.contact.model_copy(update={"gap": None})})
+    setup = build_shots(case, silent, threads=1).setup
+    found = run_shot(setup, centric_draw(case)).numbers
+
+    assert found["approach_speed"] == pytest.approx(case.motion.speed, rel=1e-5)
 
 
 def test_a_centred_rebound_is_a_throw(model, centred):
@@ -321,8 +390,12 @@ def test_doubts_of_a_shot_stay_with_it_in_the_log(model, draws, alone, tmp_path,
     with shot_log(tmp_path, "mark") as again:
         assert [again.done[index].doubts for index in (0, 1)] == [("it is off by 2e-3",)] * 2
         outcomes = (*(again.done[index] for index in (0, 1)), alone[2])
-    dropped = DroppedShots(draws=(), outcomes=outcomes, alone=alone[3])
-    assert shot_doubts(CASE, dropped) == ("2 of 3 shots, first shot 0: it is off by 2e-3",)
+    checked = CheckedStep(setup=model.setup, outcomes=(), doubt="depends on the step")
+    dropped = DroppedShots(checked=checked, draws=(), outcomes=outcomes, alone=alone[3])
+    assert shot_doubts(CASE, dropped) == (
+        "depends on the step",
+        "2 of 3 shots, first shot 0: it is off by 2e-3",
+    )
 
 
 def test_no_shot_begins_inside_the_wall(model):

@@ -62,7 +62,9 @@ class Shots(Section):
         default=4, description="Number of impacts after which a shot ends."
     )
     duration: Time = Field(default=5e-3, gt=0, description="Longest time of a shot.")
-    step: Time = Field(default=40e-9, gt=0, description="Time step.")
+    step: Time = Field(
+        default=40e-9, gt=0, description="Time step; halved where shots depend on it."
+    )
     eccentricity: LengthDistribution | None = Field(
         default=None,
         description="Distance of the moving body from the axis; default: drawn from the guide.",

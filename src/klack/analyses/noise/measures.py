@@ -335,8 +335,7 @@ DESIGN_MEASURES: tuple[Measure[NoiseDesign], ...] = described_in(
         key="sharpness",
         symbol="S",
         unit="acum",
-        definition="Sharpness of one click, DIN 45692; missing below 0.1 sone, where the click is too "
-        "faint for it.",
+        definition="Sharpness of one click, DIN 45692; missing where it is too faint for one.",
         source=_SOUND,
         read=_heard(lambda sound: sound.loudness.sharpness or nan),  # 0 up to klack 0.2
         digits=3,

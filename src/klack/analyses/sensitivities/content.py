@@ -101,7 +101,9 @@ def _strongest(record: SensitivityRecord) -> Table:
         name, _, value = measure_title(item).partition(": ")
         elasticity = "–" if first[1] is None else f"{first[1]:+.4f}"
         rows.append((name, value, first[0], elasticity))
-    return Table(columns=("measure", "value", "strongest parameter", "elasticity"), rows=tuple(rows))
+    return Table(
+        columns=("measure", "value", "strongest parameter", "elasticity"), rows=tuple(rows)
+    )
 
 
 def _section(record: SensitivityRecord, item: MeasureSlopes) -> Section:

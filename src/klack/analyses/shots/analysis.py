@@ -51,6 +51,14 @@ _SHOTS = JsonForm(
     schema_key("klack-shots/1"),
     *CASE,
     Key("seed", int),
+    Key("step_s", float, "Time step of all shots.", "step"),
+    Key("halvings", int, "Number of times that the step of the case was halved."),
+    Key(
+        "step_change",
+        Real,
+        "Largest change of first impacts in steps twice as long, over 0.1 % of the peak force, "
+        "0.5 % of the contact time or 0.005 of restitution; null where these fail.",
+    ),
     Key("centric", _SHOT, "The centred shot.", lambda study: study.centric.row(0)),
     Key("shots", [_SHOT], of=lambda study: map(study.shots.row, range(study.shots.count))),
     Key("highest", int, "Index of the highest rebound."),

@@ -1,6 +1,7 @@
 """Content of a shots report."""
 
 from collections.abc import Callable
+from math import isfinite
 
 import numpy as np
 
@@ -38,7 +39,7 @@ from klack.analyses.shots.wording import (
     shots_answer,
 )
 from klack.report.page import Content, Section, Table
-from klack.report.wording import count, quantity, signed, signed_share
+from klack.report.wording import count, quantity, share, signed, signed_share
 
 __all__ = ["shots_content"]
 
@@ -161,9 +162,18 @@ def _drawn(study: ShotsStudy) -> Section:
         ),
         ("kept elastic modes", " + ".join(count(number) for number in study.modes)),
         ("contact points", count(study.points)),
-        ("time step", quantity(study.step, "s", 3)),
+        ("time step", _step(study)),
     )
     return drawn_section(study, facts, "shots", study.shot_time)
+
+
+def _step(study: ShotsStudy) -> str:
+    text = quantity(study.step, "s", 3)
+    if study.halvings:
+        text += f", shots.step divided by {2**study.halvings}"
+    if isfinite(study.step_change):
+        text += f"; twice as long, it changes shots by {share(study.step_change)} of the limit"
+    return text
 
 
 def _shots(study: ShotsStudy) -> Section:

@@ -28,7 +28,7 @@ from klack.transient.interface_model import InterfaceModel
 
 __all__ = ["ShotModel", "build_shots", "centred_case", "shot_bodies", "shot_model"]
 
-_FLIGHT_STEPS = 20  # before first touch, without a gap
+_FLIGHT_STEPS = 0.01  # before first touch, without a gap: a force closes it faster meanwhile
 _SPAN_OVER_CONTACT = 3.0
 _MORE = 1.6  # force per length of the most loaded sector over the mean
 

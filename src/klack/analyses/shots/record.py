@@ -326,6 +326,9 @@ class ShotsStudy(CaseRecord):
     speed [m/s]
         At the start, ``start_height`` [m] above first touch.
     step [s]
+        Of all shots: that of the case, ``halvings`` times halved.
+    step_change
+        Of shots in steps twice as long, over what is promised; nan in results up to klack 0.2.
     distributions, guide, faces, layer
         In words, or empty: guide, friction of the faces, and asperities.
     surfaces
@@ -368,3 +371,5 @@ class ShotsStudy(CaseRecord):
     pressures: Mapping[str, PressureRecord]
     faces: str = ""
     layer: str = ""
+    halvings: int = 0
+    step_change: float = float("nan")

@@ -1,7 +1,7 @@
 """``klack shots``: many drops of one valve, and the centred one."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 from time import perf_counter
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from klack.analyses.impact.levels import pressure_record
 from klack.analyses.impact.record import PressureRecord
 from klack.analyses.record import case_fields, run_fields
+from klack.analyses.shots.checked_step import CheckedStep, in_checked_steps, step_doubt
 from klack.analyses.shots.draw import (
     ShotDraw,
     centric_draw,
@@ -62,6 +63,8 @@ Worn = NDArray[np.float64]
 
 _RULE_HOLDS = 0.01
 _LARGE_RESIDUAL = 1e-3
+_CHATTERS = 3
+"""Contacts of an impact from which its restitution may depend on any step."""
 
 
 @tells_place
@@ -90,7 +93,7 @@ def run_shots(
         model = build_shots(case, clock, threads=threads)
         resumed = sum(index in log.done for index in range(count))
         dropped = drop_shots(case, model, count, seed, workers, log, clock)
-        outcomes, shots = dropped.outcomes, dropped.shots
+        outcomes, shots, setup = dropped.outcomes, dropped.shots, dropped.checked.setup
         highest = highest_of(shots)
         if highest is None:
             raise ConvergenceError(
@@ -105,7 +108,7 @@ def run_shots(
             "lowest": (dropped.draws[lowest], dropped.worn_before(lowest)),
         }
         with trial():  # once more what has told its doubts
-            pressures = _pressures(model.setup, pictured)
+            pressures = _pressures(setup, pictured)
         clock("shots", 1.0)
     return ShotsStudy(
         **case_fields(case),
@@ -115,21 +118,23 @@ def run_shots(
         workers=workers,
         resumed=resumed,
         speed=case.motion.speed,
-        start_height=model.setup.start_height,
-        step=model.setup.step,
+        start_height=setup.start_height,
+        step=setup.step,
+        halvings=dropped.checked.halvings,
+        step_change=dropped.checked.change,
         distributions=_distributions(case),
         surfaces=f"{case.contact.moving} on {case.contact.stop}",
         guide=guide_in_words(case.guide),
         faces=_faces_in_words(case),
         layer="" if case.contact.roughness is None else case.contact.roughness.in_words,
-        mass=model.setup.model.mass,
+        mass=setup.model.mass,
         modes=model.modes,
-        points=model.setup.model.count,
+        points=setup.model.count,
         approach=max(outcome.approach for outcome in (*outcomes, dropped.alone)),
         shots=shots,
         centric=dropped.centric,
-        shot_traces=traces_of(model.setup, outcomes),
-        centric_traces=traces_of(model.setup, [dropped.alone]),
+        shot_traces=traces_of(setup, outcomes),
+        centric_traces=traces_of(setup, [dropped.alone]),
         highest=highest,
         rule=judge_rule(shots, dropped.centric, highest),
         pressures=pressures,
@@ -149,6 +154,7 @@ class DroppedShots:
     Faces that yield are for that one as the last of the others has left them.
     """
 
+    checked: CheckedStep
     draws: tuple[ShotDraw, ...]
     outcomes: tuple[ShotOutcome, ...]
     alone: ShotOutcome
@@ -180,16 +186,26 @@ def drop_shots(
 ) -> DroppedShots:
     """Draw shots, compute those missing in the log, and the centred one."""
     draws = [draw_shot(case, seed, index, model.touch_height) for index in range(count)]
+    centric = centric_draw(case)
+    checked = in_checked_steps(model.setup, (centric, draws[0]), progress)
+    setup, (alone, first) = checked.setup, checked.outcomes
     progress("shots", 0.0)
-    setup, centric = model.setup, centric_draw(case)
+    if 0 not in log.done:
+        log.add(0, first)
     if setup.model.limit is not None:
         outcomes = _one_after_another(setup, draws, log, progress)
         alone = run_shot(setup, centric, outcomes[-1].worn)
     else:
-        alone = run_shot(setup, centric)
         run_shots_on(workers, setup, draws, log, progress)
         outcomes = tuple(log.done[draw.index] for draw in draws)
-    return DroppedShots(draws=tuple(draws), outcomes=outcomes, alone=alone)
+    found = DroppedShots(checked=checked, draws=tuple(draws), outcomes=outcomes, alone=alone)
+    most = int(np.argmax(found.shots.sub_contacts))
+    if most == 0 or found.shots.sub_contacts[most] < _CHATTERS:
+        return found
+    doubt = step_doubt(setup, draws[most], outcomes[most], found.worn_before(most))
+    return replace(
+        found, checked=replace(checked, doubt="; ".join(filter(None, (checked.doubt, doubt))))
+    )
 
 
 def _one_after_another(
@@ -386,7 +402,8 @@ def _unfinished(shots: ShotColumns) -> tuple[str, ...]:
 
 def shot_doubts(case: Case, dropped: DroppedShots) -> tuple[str, ...]:
     """Doubts of single shots, like ones once; energy from nowhere, and joints that may open."""
-    notes = [f"The centred shot: {doubt}" for doubt in dropped.alone.doubts]
+    notes = [dropped.checked.doubt] if dropped.checked.doubt else []
+    notes += [f"The centred shot: {doubt}" for doubt in dropped.alone.doubts]
     notes += grouped_doubts(((item.index, item.doubts) for item in dropped.outcomes), "shots")
     residual = float(np.max(np.abs(dropped.shots.energy_residual)))
     if residual > _LARGE_RESIDUAL:

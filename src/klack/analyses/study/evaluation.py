@@ -365,8 +365,8 @@ def _to_have(measure: str) -> str:
     """What may give a measure a value."""
     if measure.startswith("noise."):
         return (
-            "bodies with named surfaces; levels at mounts need noise.mounts as well, and a sharpness "
-            "a click of 0.1 sone"
+            "bodies with named surfaces; levels at mounts need noise.mounts as well, a sharpness a "
+            "click of 0.1 sone"
         )
     return "a longer run.duration, if it occurs later"
 
