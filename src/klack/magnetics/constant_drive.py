@@ -136,8 +136,8 @@ def driven(network: Network, currents: Mapping[str, float]) -> Network:
             f"current of '{name}'",
             got=format_si(current, "A"),
             expected="0 A or more",
-            hint="without magnets the force does not depend on the sign; with magnets exchange their "
-            "polarity instead.",
+            hint="without magnets the force does not depend on the sign; with magnets exchange "
+            "their polarity instead.",
         )
     at = {(coil.component, coil.port): name for name, coil in coils.items()}
     changed: dict[str, Component] = {}
