@@ -52,7 +52,6 @@ __all__ = [
     "HeardReceiver",
     "MeasuredReceiver",
     "VirtualPoint",
-    "frequencies_within",
     "heard_receiver",
     "measured_receiver",
 ]
@@ -198,34 +197,6 @@ def heard_receiver(
         frequency=pressures.frequency,
         transfers=_transfers(pressures, _again(pressures, rows), ears),
     )
-
-
-def frequencies_within(frequency: Vector, receiver: MeasuredReceiver | HeardReceiver) -> Vector:
-    """Those frequencies [Hz] at which a receiver was measured; a doubt where some are left out.
-
-    Raises
-    ------
-    InputError
-        If there is none.
-    """
-    known = receiver.frequency
-    inside = frequency[(frequency >= known[0]) & (frequency <= known[-1])]
-    refuse_if(
-        inside.size == 0,
-        receiver.name,
-        got=f"responses from {known[0]:.4g} to {known[-1]:.4g} Hz",
-        expected=f"some of {frequency[0]:.4g} to {frequency[-1]:.4g} Hz",
-        hint="measure the receiver in the band of the source.",
-    )
-    if inside.size < frequency.size:
-        warnings.warn(
-            f"{receiver.name}: measured from {known[0]:.4g} to {known[-1]:.4g} Hz; the band of "
-            f"{frequency[0]:.4g} to {frequency[-1]:.4g} Hz is cut to that. Levels hold only for "
-            "the rest of the band.",
-            AccuracyWarning,
-            stacklevel=2,
-        )
-    return np.asarray(inside)
 
 
 def measured_receiver(
