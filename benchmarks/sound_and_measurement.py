@@ -50,6 +50,7 @@ class Row:
 def restitution_rows() -> list[Row]:
     """Deviation of the restitution of the first impact, over noise seeds."""
     from klack.measurement.channels import LiftSensor
+    from klack.measurement.impacts import fit_flights
     from klack.measurement.lift_sensor import sense
     from klack.measurement.set_measures import measure_strokes
 
@@ -62,7 +63,9 @@ def restitution_rows() -> list[Row]:
         for seed in (100, 101, 102):
             random = np.random.default_rng(seed)
             lifts = [shown + random.normal(0.0, 1e-6, time.size) for _ in range(16)]
-            read = measure_strokes(time, lifts, seat=0.0, opening=np.nan, sensor=sensor)
+            read = measure_strokes(
+                [fit_flights(time, x, seat=0.0, opening=np.nan, sensor=sensor) for x in lifts]
+            )
             hits = [stroke.first("seat") for stroke in read]
             deviations.append(
                 [np.nan if hit is None else hit.restitution - restitution for hit in hits]

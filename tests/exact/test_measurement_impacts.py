@@ -20,7 +20,7 @@ from klack.errors import InputError
 from klack.measurement.channels import LiftSensor
 from klack.measurement.differentiation import differentiator_gain, noise_floor, velocity_of
 from klack.measurement.flight import fit_flight
-from klack.measurement.impacts import measure_stroke
+from klack.measurement.impacts import fit_flights, measure_stroke, read_flights
 from klack.measurement.lift_sensor import sense, sensor_poles, sensor_polynomial
 from klack.measurement.pulse import fit_pulse, measure_pulse
 from klack.measurement.set_measures import expected_maximum, highest_rebound, measure_strokes
@@ -132,18 +132,58 @@ def test_a_dead_landing_has_restitution_zero():
     assert measures.impacts[0].rebound_speed == 0.0
 
 
+def fitted(records):
+    """Fits of records of one valve without an opening stop."""
+    return [fit_flights(t, x, sensor=SENSOR, opening=float("nan")) for t, x in records]
+
+
+def restitutions(strokes):
+    """First restitution of each stroke, with its error."""
+    firsts = [stroke.first("seat") for stroke in strokes]
+    return np.transpose([(hit.restitution, hit.restitution_se) for hit in firsts])
+
+
 @pytest.mark.slow
 def test_restitution_from_noisy_records_within_0_005():
-    """Mean over 24 records of 1 um noise behind 50 kHz; single ones within 4 of their errors."""
-    records = [record(DROP, noise=NOISE, seed=seed) for seed in range(24)]
-    lifts = [lift for _, lift in records]
-    read = measure_strokes(records[0][0], lifts, sensor=SENSOR, opening=float("nan"))
-    firsts = [stroke.first("seat") for stroke in read]
-    values, errors = np.transpose([(hit.restitution, hit.restitution_se) for hit in firsts])
+    """Mean over 24 records of 1 um noise behind 50 kHz; single ones within 4 of their errors.
+
+    Read alone they scatter more: 1.5 to 2.5 times in sets with another noise.
+    """
+    fits = fitted([record(DROP, noise=NOISE, seed=seed) for seed in range(24)])
+    values, errors = restitutions(measure_strokes(fits))
+    alone, _ = restitutions(map(read_flights, fits))
 
     assert np.mean(values) == pytest.approx(0.6, abs=0.005)
     assert np.median(np.abs(values - 0.6)) < 0.005
     assert np.all(np.abs(values - 0.6) < 4.0 * errors)
+    assert np.std(alone) > 1.2 * np.std(values)
+
+
+def test_a_stroke_that_flies_unlike_the_others_keeps_its_own_shape():
+    """Truth: one of five falls with half of the acceleration; pairs have no others to use."""
+    odd = BouncingDrop(speed=0.5, acceleration=625.0, restitution=(0.6,) * 3, contact=10e-6)
+    drops = [DROP] * 4 + [odd]
+    fits = fitted([record(drop, noise=0.3e-6, seed=seed) for seed, drop in enumerate(drops)])
+    read = measure_strokes(fits)
+
+    assert read[-1] == read_flights(fits[-1])
+    assert read[0] != read_flights(fits[0])
+    assert measure_strokes(fits[:2]) == [read_flights(fit) for fit in fits[:2]]
+
+
+def test_a_turn_at_the_end_of_its_samples_shows_no_friction():
+    """Behind a sensor the turn is seen later: here a fit saw all samples on one side, and failed.
+
+    The draw of noise in which the second bounce, of 13 um, is cut there.
+    """
+    drop = BouncingDrop(speed=0.5, acceleration=1250.0, restitution=(0.5,) * 3)
+    random = np.random.default_rng([1005, 3])
+    random.normal(size=48)
+    time, lift = record(drop, step=1e-6)
+    lift = lift + 3e-6 * random.normal(size=time.size)
+    first = measure_stroke(time, lift, sensor=SENSOR, opening=float("nan")).first("seat")
+
+    assert abs(first.restitution - 0.5) < 3.0 * first.restitution_se
 
 
 @pytest.mark.parametrize("seed", [2, 320, 361])
@@ -426,7 +466,7 @@ def test_a_level_that_the_drawing_gives_is_no_measured_travel():
     way, time = 60e-6, 1e-6 * np.arange(2000)
     lift = np.maximum(way * (1.0 - ((time - 0.6e-3) / 0.3e-3) ** 2), 0.0)
     lift += 0.1e-6 * np.random.default_rng(3).normal(size=time.size)
-    reading = _read(time, lift, SENSOR, way)
+    (reading,) = _read(time, lift[None], SENSOR, way)
 
     assert reading.by_drawing
     assert reading.measures.lift == pytest.approx(way)  # which impacts are read with

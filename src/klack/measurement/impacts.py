@@ -79,6 +79,11 @@ class FittedStroke:
     fits: list[_Ends | None]
     notes: tuple[str, ...]
 
+    @property
+    def levels(self) -> Mapping[Stop, float]:
+        """Lift at the stops that are known [m]."""
+        return self.record.levels
+
 
 def measure_stroke(
     time: NDArray[np.float64],
@@ -259,8 +264,8 @@ def _whole(record: _Record, stop: Stop, first: float, last: float) -> _Ends | No
     if plain.acceleration == 0.0:
         return _with_ends(record, stop, plain)
     top = plain.reference - float(plain.coefficients[1]) / plain.acceleration
-    times = window[0]
-    if not times[2] < top < times[-3]:  # all samples on one side tell no friction
+    times, lag = window[0], sum(record.sensor[1:2])
+    if not times[2] < top < times[-3] - lag:  # all samples shown on one side tell no friction
         return _with_ends(record, stop, plain)
     return _with_ends(record, stop, _fit(record, *window, 2, top))
 

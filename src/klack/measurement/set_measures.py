@@ -18,20 +18,24 @@ the measured shots, shrunk towards their mean by ``sigma / s``, ``sum_i x_(i) ((
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, fields
 from math import sqrt
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from klack.measurement.channels import LiftSensor
-from klack.measurement.impacts import fit_flights, read_flights
+from klack.measurement.impacts import FittedStroke, read_flights
 from klack.measurement.stroke_measures import FlightShape, Stop, StrokeMeasures
 
 __all__ = ["HighestRebound", "expected_maximum", "highest_rebound", "measure_strokes"]
 
 Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+_NUMBERS = tuple(field.name for field in fields(FlightShape))  # each with its error
+_FEWEST = 2  # others whose median is used
+_ALIKE = 3.0  # standard errors within which a stroke flies like the others
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,26 +96,17 @@ def highest_rebound(values: Vector, errors: Vector) -> HighestRebound:
     )
 
 
-def measure_strokes(
-    time: Vector,
-    lifts: Sequence[Vector],
-    *,
-    seat: float | None = None,
-    opening: float | None = None,
-    sensor: LiftSensor | None = None,
-) -> list[StrokeMeasures]:
-    """Read strokes of one valve, each with the shape of the flights from the others.
+def measure_strokes(fitted: Sequence[FittedStroke]) -> list[StrokeMeasures]:
+    """Read fitted strokes of one valve, each with the shape of the flights from the others.
 
-    Parameters
-    ----------
-    time, lifts, seat, opening, sensor
-        As of :func:`klack.measurement.impacts.measure_stroke`.
+    A stroke whose own shape differs from that of the others keeps its own.
     """
-    fitted = [fit_flights(time, lift, seat=seat, opening=opening, sensor=sensor) for lift in lifts]
     read = [read_flights(one) for one in fitted]
-    if len(read) > 2:
-        read = [read_flights(one, _others(read, k)) for k, one in enumerate(fitted)]
-    return read
+    shapes = _shapes_of_others(read)
+    return [
+        read_flights(one, others) if others else alone
+        for one, alone, others in zip(fitted, read, shapes, strict=True)
+    ]
 
 
 def expected_maximum(count: int) -> float:
@@ -132,29 +127,32 @@ def expected_maximum(count: int) -> float:
     return float(np.trapezoid(x * density, x))
 
 
-def _others(strokes: Sequence[StrokeMeasures], skip: int) -> dict[Stop, FlightShape]:
-    """Shape of the flights on each stop, from all strokes but one."""
-    out: dict[Stop, FlightShape] = {}
+def _shapes_of_others(strokes: Sequence[StrokeMeasures]) -> list[dict[Stop, FlightShape]]:
+    """Shape of the flights on each stop, for each stroke from all the others."""
+    out: list[dict[Stop, FlightShape]] = [{} for _ in strokes]
     stops: tuple[Stop, ...] = ("opening", "seat")
     for stop in stops:
-        shapes = [m.shapes[stop] for k, m in enumerate(strokes) if k != skip and stop in m.shapes]
-        if len(shapes) > 1:
-            out[stop] = replace(
-                shapes[0],
-                **_mean(shapes, "acceleration"),
-                **_mean(shapes, "stiffness"),
-                **_mean(shapes, "friction"),
-            )
+        having = [k for k, one in enumerate(strokes) if stop in one.shapes]
+        shapes = np.array([astuple(strokes[k].shapes[stop]) for k in having])
+        for i, k in enumerate(having if len(having) > _FEWEST else ()):
+            others = _common(np.delete(shapes, i, axis=0))
+            if _alike(strokes[k].shapes[stop], others):
+                out[k][stop] = others
     return out
 
 
-def _mean(shapes: Sequence[FlightShape], name: str) -> dict[str, float]:
-    """Median over the strokes; error: robust scatter of single strokes."""
-    values = np.array([getattr(shape, name) for shape in shapes])
-    own = np.array([getattr(shape, f"{name}_se") for shape in shapes])
-    middle = float(np.median(values))
-    spread = 1.4826 * float(np.median(np.abs(values - middle)))
-    noise = float(np.median(own))
-    beyond = sqrt(max(spread**2 - noise**2, 0.0))  # strokes that differ indeed
-    error = 1.2533 * max(spread, noise) / sqrt(len(shapes))
-    return {name: middle, f"{name}_se": sqrt(beyond**2 + error**2)}
+def _common(shapes: Matrix) -> FlightShape:
+    """Medians over strokes; errors: scatter of strokes that differ indeed, and of the median."""
+    values, own = shapes[:, ::2], np.median(shapes[:, 1::2], axis=0)
+    middle = np.median(values, axis=0)
+    spread = 1.4826 * np.median(np.abs(values - middle), axis=0)
+    beyond = np.sqrt(np.maximum(spread**2 - own**2, 0.0))
+    error = 1.2533 * np.maximum(spread, own) / np.sqrt(len(shapes))
+    numbers = np.stack([middle, np.hypot(beyond, error)], axis=1).ravel().tolist()
+    return FlightShape(**dict(zip(_NUMBERS, numbers, strict=True)))
+
+
+def _alike(own: FlightShape, others: FlightShape) -> bool:
+    """Whether a stroke flies like the others, within the errors of both."""
+    a, b = np.array(astuple(own)), np.array(astuple(others))
+    return bool(np.all(np.abs(a - b)[::2] <= _ALIKE * np.hypot(a, b)[1::2]))

@@ -6,7 +6,7 @@ import numpy as np
 
 from klack.measurement.channels import LiftSensor
 from klack.measurement.differentiation import velocity_of
-from klack.measurement.impacts import measure_stroke
+from klack.measurement.impacts import fit_flights, measure_stroke
 from klack.measurement.lift_sensor import sense
 from klack.measurement.set_measures import expected_maximum, measure_strokes
 from klack.verification.check import Check, ComparedCurve, check
@@ -140,7 +140,10 @@ def _flights() -> list[Check]:
 def _noisy() -> list[Check]:
     records = [_record(NOISE, seed) for seed in range(RECORDS)]
     lifts = [lift for _, lift in records]
-    read = measure_strokes(records[0][0], lifts, opening=float("nan"), sensor=SENSOR)
+    time = records[0][0]
+    read = measure_strokes(
+        [fit_flights(time, lift, opening=float("nan"), sensor=SENSOR) for lift in lifts]
+    )
     values = np.array([stroke.on("seat")[0].restitution for stroke in read])
     source = f"{RECORDS} exact drops with 1 um of noise behind 50 kHz, 500 kS/s"
     return [

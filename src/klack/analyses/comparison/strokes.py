@@ -30,10 +30,10 @@ from klack.machine.progress import Progress, silent
 from klack.machine.stages import StageClock, collected_warnings
 from klack.measurement.channels import LIFT_ALONE, LiftSensor, Trigger
 from klack.measurement.differentiation import velocity_of
-from klack.measurement.impacts import measure_stroke
+from klack.measurement.impacts import fit_flights
 from klack.measurement.lift_sensor import recorded_stroke, trigger_instant
 from klack.measurement.loading import load_stroke_set
-from klack.measurement.set_measures import highest_rebound
+from klack.measurement.set_measures import highest_rebound, measure_strokes
 from klack.measurement.stroke_measures import MeasuredImpact, Stop, StrokeMeasures, StrokeSet
 from klack.units import format_si
 
@@ -124,11 +124,8 @@ def _compare(
     sensor = section.sensor
     if section.zero == "start":
         sensor = sensor.model_copy(update={"offset": 0.0})
-    model = [
-        _read(time, row, sensor, study.lift)
-        for row in _as_noisy(computed, estimate.lift_noise, min(_REPLICAS, len(lift)))
-    ]
-    readings = [_read(time, row, sensor, study.lift) for row in lift]
+    noisy = _as_noisy(computed, estimate.lift_noise, min(_REPLICAS, len(lift)))
+    model, readings = (_read(time, rows, sensor, study.lift) for rows in (noisy, lift))
     notes = strokes.notes
     if any(reading.by_drawing for reading in (*model, *readings)):
         notes = (*notes, _BY_DRAWING)
@@ -203,17 +200,23 @@ class _Reading:
         return tuple(hits[real[0] : real[-1] + 1]) if real else ()
 
 
-def _read(time: Floats, lift: Floats, sensor: LiftSensor, way: float | None) -> _Reading:
-    measures = measure_stroke(time, lift, sensor=sensor)
-    seat, by_drawing = measures.seat_level, False
-    unread = isfinite(seat) and not isfinite(measures.opening_level)
-    highest = float(np.max(lift)) - sensor.offset
-    if unread and way is not None and highest > (1.0 - _REACHED) * way:
-        measures = measure_stroke(time, lift, sensor=sensor, seat=seat, opening=seat + way)
-        by_drawing = True
-    half = 0.5 * (float(np.min(lift)) + float(np.max(lift)))
-    moves = float(time[int(np.argmax(lift > half))])
-    return _Reading(measures=measures, moves=moves, by_drawing=by_drawing)
+def _read(time: Floats, lifts: Floats, sensor: LiftSensor, way: float | None) -> list[_Reading]:
+    """Readings of a set; the drawing gives the opening stop on which a needle never rests."""
+    fits, drawn = [], []
+    for lift in lifts:
+        fit = fit_flights(time, lift, sensor=sensor)
+        seat, highest = fit.levels.get("seat"), float(np.max(lift)) - sensor.offset
+        unread = seat is not None and "opening" not in fit.levels
+        drawn.append(unread and way is not None and highest > (1.0 - _REACHED) * way)
+        if drawn[-1]:
+            fit = fit_flights(time, lift, sensor=sensor, seat=seat, opening=seat + way)
+        fits.append(fit)
+    half = 0.5 * (np.min(lifts, axis=1) + np.max(lifts, axis=1))
+    moves = time[np.argmax(lifts > half[:, None], axis=1)]
+    return [
+        _Reading(measures=measures, moves=float(first), by_drawing=by_drawing)
+        for measures, first, by_drawing in zip(measure_strokes(fits), moves, drawn, strict=True)
+    ]
 
 
 def _as_noisy(lift: Floats, noise: float, count: int) -> Floats:
