@@ -228,7 +228,8 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
         "rest level of the needle on the stop; determined from the computed lift in the same "
         "way, with the same noise as the measured one (median of several readings). They differ "
         "from the numbers of the centre of mass in a table of klack stroke because of vibration "
-        "of the needle, squeeze films and the level of rest.",
+        "of the needle, squeeze films and the level of rest. In a set of three strokes or more the "
+        "shape of the flights (acceleration, spring, friction) also comes from the other strokes.",
     ),
     (
         "rebound height",
