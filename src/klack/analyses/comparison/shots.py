@@ -31,9 +31,8 @@ from klack.errors import InputError
 from klack.machine.progress import Progress, silent
 from klack.machine.stages import StageClock, collected_warnings
 from klack.measurement.channels import LIFT_ALONE
-from klack.measurement.impacts import fit_flights, measure_stroke
+from klack.measurement.impacts import measure_stroke
 from klack.measurement.loading import load_stroke_set
-from klack.measurement.set_measures import measure_strokes
 from klack.measurement.stroke_measures import MeasuredImpact, Rejection, StrokeSet
 
 __all__ = ["LIKELY", "compare_shots", "mean_of_highest"]
@@ -129,11 +128,10 @@ def _first_impacts(
     if section.zero == "start":
         sensor = sensor.model_copy(update={"offset": 0.0})
     seat = 0.0 if section.zero == "none" else None
-    fits = [
-        fit_flights(drops.time, lift, seat=seat, opening=float("nan"), sensor=sensor)
-        for lift in drops.matrix("lift")
-    ]
-    for drop, measures in zip(drops.strokes, measure_strokes(fits), strict=True):
+    for drop in drops.strokes:
+        measures = measure_stroke(
+            drops.time, drop.values["lift"], seat=seat, opening=float("nan"), sensor=sensor
+        )
         hit = measures.first("seat")
         if hit is not None and isfinite(hit.restitution) and isfinite(hit.rebound_height):
             names.append(drop.name)

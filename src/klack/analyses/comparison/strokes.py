@@ -51,8 +51,8 @@ _BY_DRAWING = (
     "The needle never rests on the opening stop in some strokes; there its level is the level "
     "of the seat plus the lift in the drawing."
 )
-_REPLICAS, _SEED = 5, 1
-"""Noisy copies of the computed lift."""
+_REPLICAS, _SEED = 16, 1
+"""Noisy copies of the computed lift: their median has a third of the reading error of one."""
 _FEWEST_SHOTS = 3
 _STOPS: tuple[Stop, ...] = ("opening", "seat")
 _AGAINST = -0.5  # correlation
@@ -124,7 +124,8 @@ def _compare(
     sensor = section.sensor
     if section.zero == "start":
         sensor = sensor.model_copy(update={"offset": 0.0})
-    noisy = _as_noisy(computed, estimate.lift_noise, min(_REPLICAS, len(lift)))
+    copies = _REPLICAS if len(lift) >= _FEWEST_SHOTS else len(lift)  # a set, or single strokes
+    noisy = _as_noisy(computed, estimate.lift_noise, copies)
     model, readings = (_read(time, rows, sensor, study.lift) for rows in (noisy, lift))
     notes = strokes.notes
     if any(reading.by_drawing for reading in (*model, *readings)):
