@@ -13,7 +13,7 @@ from klack.case.measurement import CaseMeasurement
 from klack.errors import InputError
 from klack.measurement.channels import Trigger
 from klack.measurement.cutting import Piece, common_axis, cut_strokes, onto_axis, trigger_level
-from klack.measurement.loading import find_outliers, load_stroke_set
+from klack.measurement.loading import _saturated, find_outliers, load_stroke_set
 from klack.measurement.stop_levels import SmoothLift, find_touches
 from klack.signals.sampled import TimeSeries
 
@@ -118,6 +118,23 @@ def test_a_spoilt_stroke_is_put_aside_with_its_reason(spoil, reason):
 
     assert list(found) == [4]
     assert found[4].startswith(reason)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (lambda x: np.minimum(x, 60e-6), "highest lift (median 60 um)"),
+        (lambda x: np.maximum(x, 10e-6), "lowest lift (median 10 um)"),
+        (lambda x: x, ""),
+        (lambda x: np.round(x, 6), ""),  # a coarse recorder repeats all values
+    ],
+)
+def test_a_set_at_the_end_of_its_range_is_doubted(spoil, said):
+    """Truth: the clipped value; without clipping, and without noise, no word."""
+    notes = [*_saturated(spoil(strokes()[1])), *_saturated(strokes(noise=0.0)[1])]
+
+    assert len(notes) == bool(said)
+    assert all(said in note for note in notes)
 
 
 def write(path, instants, duration):

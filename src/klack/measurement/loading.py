@@ -35,6 +35,7 @@ Matrix = NDArray[np.float64]
 _MOTION = 0.2
 _CLIPPED_SAMPLES = 10
 _CLIPPED_NOISE = 5.0
+_NOISY = 3  # runs of another value, over which the samples of a clipped one are
 _NOISE = 3.0
 _DISTANCE, _SPREAD = 4.0, 6.0
 _FEWEST = 6
@@ -87,6 +88,26 @@ def _clipped(row: Matrix, middle: Matrix, noise: float) -> str:
         if _longest_run(stays & missed) >= _CLIPPED_SAMPLES:
             return f"clipped: stays at its {word} value of {sign * limit * 1e6:.4g} um"
     return ""
+
+
+def _saturated(lifts: Sequence[NDArray[np.float64]]) -> Iterator[str]:
+    """Doubts where most strokes stay at one end of their range, while noise moves all else."""
+    for limit, word in ((np.max, "highest"), (np.min, "lowest")):
+        ends = []
+        for lift in lifts:
+            same, at_end = np.diff(lift) == 0.0, lift[1:] == limit(lift)
+            if (
+                _longest_run(same & at_end)
+                >= _CLIPPED_SAMPLES
+                > _NOISY * _longest_run(same & ~at_end)
+            ):
+                ends.append(float(limit(lift)))
+        if 2 * len(ends) > len(lifts):
+            yield (
+                f"{len(ends)} of {len(lifts)} strokes stay at their {word} lift (median "
+                f"{1e6 * np.median(ends):.4g} um) without any noise: the sensor or recorder may be "
+                "saturated there, and impacts beyond are missing. Try: a larger range."
+            )
 
 
 def _longest_run(mask: NDArray[np.bool_]) -> int:
@@ -243,6 +264,7 @@ def _aligned(
             Rejection(name=strokes[k].name, reason=reason) for k, reason in sorted(reasons.items())
         )
         strokes = [stroke for k, stroke in enumerate(strokes) if k not in reasons]
+        notes.extend(_saturated([stroke.values["lift"] for stroke in strokes]))
     if not strokes:
         raise InputError(
             source,
