@@ -92,21 +92,19 @@ def _clipped(row: Matrix, middle: Matrix, noise: float) -> str:
 
 def _saturated(lifts: Sequence[NDArray[np.float64]]) -> Iterator[str]:
     """Doubts where most strokes stay at one end of their range, while noise moves all else."""
-    for limit, word in ((np.max, "highest"), (np.min, "lowest")):
+    for sign, word in ((1.0, "highest"), (-1.0, "lowest")):
         ends = []
         for lift in lifts:
-            same, at_end = np.diff(lift) == 0.0, lift[1:] == limit(lift)
-            if (
-                _longest_run(same & at_end)
-                >= _CLIPPED_SAMPLES
-                > _NOISY * _longest_run(same & ~at_end)
-            ):
-                ends.append(float(limit(lift)))
+            end = sign * float(np.max(sign * lift))
+            same, at_end = np.diff(lift) == 0.0, lift[1:] == end
+            others = _longest_run(same & ~at_end)
+            if _longest_run(same & at_end) >= _CLIPPED_SAMPLES > _NOISY * others:
+                ends.append(end)
         if 2 * len(ends) > len(lifts):
             yield (
                 f"{len(ends)} of {len(lifts)} strokes stay at their {word} lift (median "
-                f"{1e6 * np.median(ends):.4g} um) without any noise: the sensor or recorder may be "
-                "saturated there, and impacts beyond are missing. Try: a larger range."
+                f"{1e6 * float(np.median(ends)):.4g} um) without any noise: the sensor or recorder "
+                "may be saturated there, and impacts beyond are missing. Try: a larger range."
             )
 
 

@@ -207,10 +207,15 @@ def _read(time: Floats, lifts: Floats, sensor: LiftSensor, way: float | None) ->
     for lift in lifts:
         fit = fit_flights(time, lift, sensor=sensor)
         seat, highest = fit.levels.get("seat"), float(np.max(lift)) - sensor.offset
-        unread = seat is not None and "opening" not in fit.levels
-        drawn.append(unread and way is not None and highest > (1.0 - _REACHED) * way)
-        if drawn[-1]:
+        drawn.append(False)
+        if (
+            seat is not None
+            and "opening" not in fit.levels
+            and way is not None
+            and highest > (1.0 - _REACHED) * way
+        ):
             fit = fit_flights(time, lift, sensor=sensor, seat=seat, opening=seat + way)
+            drawn[-1] = True
         fits.append(fit)
     half = 0.5 * (np.min(lifts, axis=1) + np.max(lifts, axis=1))
     moves = time[np.argmax(lifts > half[:, None], axis=1)]
