@@ -754,7 +754,8 @@ def noise_of(*results: Result, names: Sequence[str] = (), progress: Progress = s
     from klack.analyses.noise.run import run_noise
     from klack.analyses.noise.source import sources_of
 
-    sources = [source for result in results for source in sources_of(result.record)]
+    records = [getattr(result, "record", result) for result in results]
+    sources = [source for record in records for source in sources_of(record)]
     return Result(run_noise(sources, names=names, progress=progress), NOISE)
 
 

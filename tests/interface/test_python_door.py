@@ -271,6 +271,10 @@ class TestResults:
         with pytest.raises(InputError, match="2 different names"):
             klack.noise_of(rods, rods, names=["a"])
 
+    def test_a_case_is_no_result(self, rods: klack.Result):
+        with pytest.raises(InputError, match="the result of an impact or a stroke"):
+            klack.noise_of(rods, klack.load_case("two-rods"))  # type: ignore[arg-type]
+
     def test_nothing_to_compute_is_one_error(self):
         with pytest.raises(InputError, match="at least one impact or stroke"):
             klack.noise_of()

@@ -708,6 +708,12 @@ class TestRobustness:
         assert (least.missed, least.low) == (0, 0.0)
         assert least.at_most == pytest.approx(1.0 - 0.05 ** (1.0 / 64.0), rel=1e-9)
 
+    def test_bounds_that_exclude_each_other_are_one_error(self, tmp_path):
+        bounds = "  constraints: {opening.peak_force: {most: today, least: today + 1 %}}\n"
+        text = STUDY.replace("  design:", f"{bounds}  design:")
+        with pytest.raises(InputError, match=r"least: today \+ 1 % above most: today"):
+            klack.run_study(SMALL, write(tmp_path, text))
+
     def test_a_grid_is_no_sample(self, tmp_path):
         text = STUDY.replace("design: {points: 8}", "design: {kind: grid, levels: 2}")
         text = text.replace("  design:", "  constraints: {impacts: {most: 9}}\n  design:")

@@ -121,11 +121,19 @@ def bounds_of(
     """Bounds of a study, as for :func:`goals_of`."""
     bounds = []
     for name, limit in source.study.constraints.items():
+        ends = {}
         for key, written in (("most", limit.most), ("least", limit.least)):
             if written is not None:
                 where = source.where(("constraints", name, key))
-                value = _bound(where, written, measures[name].unit, today[name])
-                bounds.append(Bound(measure=name, value=value, is_most=key == "most"))
+                ends[key] = _bound(where, written, measures[name].unit, today[name])
+                bounds.append(Bound(measure=name, value=ends[key], is_most=key == "most"))
+        refuse_if(
+            ends.get("least", -np.inf) > ends.get("most", np.inf),
+            source.where(("constraints", name)),
+            got=f"least: {limit.least} above most: {limit.most}",
+            expected="a least value below the greatest",
+            hint="exchange them.",
+        )
     return tuple(bounds)
 
 
