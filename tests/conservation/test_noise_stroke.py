@@ -65,6 +65,38 @@ def design(source: NoiseSource) -> NoiseDesign:
     return run_noise([source]).reference
 
 
+def test_the_force_of_a_pivot_which_has_no_place_is_noted(case, design, tmp_path):
+    """A lever between two springs: only the sum of all forces tells what its pivot carries."""
+    rocker = (
+        "    rocker: {type: lever, effective_mass: 1 g, arms: {a: 10 mm, b: -8 mm}}\n"
+        "    link: {type: spring, stiffness: 100 N/mm, preload: 0 N}\n"
+        "    back: {type: spring, stiffness: 5 N/mm, preload: 1 N}\n"
+    )
+    text = find_case("demo-stroke").read_text("utf-8")
+    for old, new in (
+        ("    guide: {type", f"{rocker}    guide: {{type"),
+        (
+            ", guide.body]",
+            ", guide.body, link.end]\n    - [rocker.a, link.base]\n    - [rocker.b, back.end]",
+        ),
+        ("\nrun:\n", "\nrun:\n  lift: needle.tip\n"),
+    ):
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    (tmp_path / "case.yaml").write_text(text, "utf-8")
+    levered = load_valve_case(tmp_path / "case.yaml")
+    reactions = {**case.noise.reactions, "back": SurfaceName("housing", "inside")}
+    noise = case.noise.model_copy(update={"reactions": reactions})
+    levered = levered.model_copy(
+        update={"run": levered.run.model_copy(update={"duration": 5e-4}), "noise": noise}
+    )
+    (source,) = stroke_sources(run_stroke(levered, variants=("dry",)), case=levered)
+    assert source.held.unbalanced > 1e-4 * source.held.largest
+    words = "a reaction is missing"
+    assert [words in note for note in run_noise([source]).reference.notes].count(True) == 1
+    assert not any(words in note for note in design.notes)
+
+
 def test_every_impact_keeps_its_impulse(study, source):
     (force,) = [stop.force for stop in source.stops if stop.name == "opening"]
     events = study.reference.impacts("opening")

@@ -60,6 +60,7 @@ from klack.units import format_si
 __all__ = ["click_sound", "click_sounds", "noise_design", "run_noise"]
 
 _LOWEST, _HIGHEST, _POINTS = 20.0, 200e3, 600  # [Hz] of spectra that are drawn
+_UNBALANCED = 1e-4  # of the largest force; round-off leaves below 1e-9
 _HEARING = 20e3  # [Hz]
 _ENDS_ALIKE = 1e-3  # of the peak
 _DAMPED_BY_SOUND = 0.1  # 0.4 dB
@@ -503,6 +504,13 @@ def _design_notes(
         found.append(
             f"The force of '{source.run}' is that of rigid bodies: it contains no waves, and no "
             "limit of validity is known."
+        )
+    held = source.held
+    if held is not None and held.unbalanced > _UNBALANCED * held.largest:
+        found.append(
+            "The forces on the held bodies and the momentum of what moves differ by up to "
+            f"{format_si(held.unbalanced, 'N', 2)}: a reaction is missing, for example that of "
+            "the pivot of a lever, and so is its part in the forces at the mounts."
         )
     if sound is not None and sound.loudness.note:
         found.append(f"The click is {sound.loudness.note}.")
