@@ -112,7 +112,7 @@ class Soak:
         pages = (f"/sliders?path={self.case}", f"/case?path={self.case}", "/")
         for number in range(count):
             self.page.goto(self.base + pages[number % len(pages)])
-            ready = (".k-slider input", "textarea", ".k-row")[number % len(pages)]
+            ready = (".k-slider input", "#k-yaml", ".k-row")[number % len(pages)]
             self.page.wait_for_selector(ready)
 
     def memory(self) -> Memory:
