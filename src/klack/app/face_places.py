@@ -23,16 +23,15 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Floats
 from klack.mesh.profile import Curve, Profile, on_axis
 from klack.mesh.solid import face_names
 
-__all__ = ["profile_places", "solid_places"]
+__all__ = ["EVEN", "profile_places", "solid_places"]
 
-Floats = NDArray[np.float64]
-
-_EVEN = 1e-3  # of the size of the part, between two heights or distances
+EVEN = 1e-3
+"""Of the size of a part: heights and distances that differ less are one."""
 _SAME = 1e-4  # of normals, and of the size of a face; single precision is 1e-7
 _FAR = 1e-6  # of the distance of a face from the origin, by single precision
 _HALF = np.radians(170)  # a turn from here on goes half round, between corners of triangles
@@ -53,7 +52,7 @@ def profile_places(profiles: Mapping[str, Profile]) -> dict[str, str]:
 
 def _of_curve(curve: Curve, low: Floats, high: Floats) -> str:
     """Material is to the left of a curve."""
-    least = _EVEN * float(np.max(high - low))
+    least = EVEN * float(np.max(high - low))
     if curve.centre is not None:
         is_ball = abs(curve.centre[0]) < _SAME * curve.radius
         return _hollow("ball", curve.angle < 0.0) if is_ball else "curved"
@@ -106,7 +105,7 @@ def _of_points(p: Floats, n: Floats, every: Floats) -> str:
     if not len(p):
         return "curved"
     low, high = every.min(axis=0), every.max(axis=0)
-    least = _EVEN * float(np.max(high - low))
+    least = EVEN * float(np.max(high - low))
     near = _SAME * float(np.max(np.ptp(p, axis=0))) + _FAR * float(np.abs(p).max())
     if np.abs(n - n[0]).max() < _SAME:
         if np.ptp(p @ n[0]) > near:

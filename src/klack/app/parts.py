@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.app.answers import FaceFacts, PartFacts
-from klack.app.face_places import profile_places, solid_places
+from klack.app.face_places import EVEN, profile_places, solid_places
 from klack.case.geometry import Outline
 from klack.errors import InputError
 from klack.mesh.meridian import mesh_meridian
@@ -130,7 +130,6 @@ def _refused(body: str, row: int, got: str, expected: str) -> InputError:
 
 _FINER = (25, 50, 100)  # elements over the longest side, of a mesh for the picture alone
 _MOST_FACES = 400  # in a list
-_EVEN = 1e-3  # of the size of the part
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -316,7 +315,7 @@ def _profile_faces(profiles: Mapping[str, Profile]) -> tuple[FaceFacts, ...]:
 
 def _step_faces(content: StepContent, places: Mapping[str, str]) -> Iterator[FaceFacts]:
     """Faces of solids: area, centre across z if it is not on the axis, heights."""
-    least = _EVEN * max(float(np.max(face.high - face.low)) for face in content.faces)
+    least = EVEN * max(float(np.max(face.high - face.low)) for face in content.faces)
     for part in content.faces:
         count = "" if part.count == 1 else f"{part.count} faces, "
         x, y = 0.5 * (part.low + part.high)[:2]

@@ -103,7 +103,7 @@ class ImpactFinder:
     def __init__(self, rows: Rows, start: float, step: float) -> None:
         met = list(zip(rows.interfaces, rows.meeting, strict=True))
         self._stops = [row.component for row in rows.interfaces]
-        self._period = [longest_period(bodies) for bodies in rows.meeting]
+        self._period = [longest_period(bodies) for _, bodies in met]
         self._mass = [effective_mass(*pair) for pair in met]
         self._mobility = [mobility(*pair) for pair in met]
         self._rest = [rest_time(*pair) for pair in met]

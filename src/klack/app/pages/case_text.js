@@ -6,7 +6,7 @@ const told = CM.Annotation.define();  // a change that the server made
 const mark = CM.StateEffect.define();  // [[line, column, kind] ...] from 1, an error first
 const NONE = { lines: CM.RangeSet.empty, numbers: CM.RangeSet.empty, first: null, isWrong: false };
 
-class Number extends CM.GutterMarker {
+class MarkedNumber extends CM.GutterMarker {
   constructor(kind) {
     super();
     this.elementClass = kind;
@@ -19,7 +19,7 @@ const marked = (doc, places) => {
   const line = number ? doc.line(Math.min(number, doc.lines)) : null;
   return {
     lines: set((kind) => CM.Decoration.line({ class: kind })),
-    numbers: set((kind) => new Number(kind)),
+    numbers: set((kind) => new MarkedNumber(kind)),
     first: line && Math.min(line.from + Math.max(column - 1, 0), line.to),
     isWrong: kind === "k-wrong",
   };
